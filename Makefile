@@ -1,0 +1,48 @@
+# make setup   .venv with all dependencies, the package and its compiled messages   make run    the example rack
+# make test    style, types and tests; CI runs the same                            make soak   the long tests
+# make bench   measurements                     make format   rewrite the style    make clean  remove what was built
+#
+# PYTHON=python3.12 chooses the interpreter of .venv (3.10 to 3.13); without it an existing .venv is kept.
+
+SHELL := /bin/bash
+BIN := .venv/bin
+CONFIG ?= config/section_drive/rack.yaml
+
+# .venv brings its own ROS 2. A sourced distribution or another environment must not mix its libraries in.
+ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+unexport LD_LIBRARY_PATH
+endif
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH RMW_IMPLEMENTATION
+unexport PYTHONPATH PYTHONHOME PYTHONSTARTUP VIRTUAL_ENV _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: setup run test soak bench format clean
+
+setup:
+	@tools/setup_environment.sh "$(PYTHON)"
+
+# exec: Ctrl-C and the exit code are the program's own.
+run: setup
+	@exec $(BIN)/automax run $(CONFIG)
+
+# Every step runs, the first failure decides the result, pytest's summary comes last.
+test: setup
+	@status=0; \
+	$(BIN)/ruff check . || status=$$?; \
+	$(BIN)/ruff format --check . || status=$$?; \
+	$(BIN)/mypy automax_ros tools || status=$$?; \
+	$(BIN)/python -m pytest -q test -m "not soak" || status=$$?; \
+	exit $$status
+
+soak: setup
+	@exec $(BIN)/python -m pytest -q test -m soak --timeout 3600
+
+bench: setup
+	@set -e; for program in bench/*.py; do echo "== $$program"; $(BIN)/python "$$program"; done
+
+format: setup
+	@$(BIN)/ruff check --fix . || true
+	@$(BIN)/ruff format .
+
+clean:
+	rm -rf .venv build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""Recordings: messages to and from rosbag2 folders, without ROS."""

@@ -1,0 +1,262 @@
+"""The messages of a recording as Python tuples with names: one class a type, fields as in its .msg file.
+
+A time (``builtin_interfaces/Time``) is an integer of nanoseconds. Sequences may be given as list, tuple or array;
+read from a bag they are tuples.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class WriteKind(enum.IntEnum):
+    """How a write came about: CommonWrite.kind."""
+
+    COMMIT = 1
+    BASIC = 2
+    OUTSIDE = 3
+
+
+class VariableType(enum.IntEnum):
+    """Data type of a common variable: Variable.type."""
+
+    INTEGER = 1
+    DOUBLE_INTEGER = 2
+    REAL = 3
+    BOOLEAN = 4
+    STRING = 5
+
+
+class Direction(enum.IntEnum):
+    """What ROS may do with a common variable: Variable.direction."""
+
+    CLOSED = 0
+    OUT = 1
+    IN = 2
+
+
+class WriterKind(enum.IntEnum):
+    """Who writes common memory: Writer.kind."""
+
+    TASK = 1
+    ROS = 2
+    PRESET = 3
+    IO = 4
+    PLANT = 5
+    OPERATOR = 6
+    FORCE = 7
+
+
+class Values(NamedTuple):
+    """Values of common variables: entry i is ``element[i]`` of ``variable[i]``."""
+
+    variable: Sequence[int] = ()
+    element: Sequence[int] = ()
+    value: Sequence[float] = ()
+    text: Sequence[str] = ()
+
+
+NO_VALUES = Values()
+
+
+class CommonWrite(NamedTuple):
+    """Writes of one writer to common memory at one instant."""
+
+    stamp: int
+    run_id: int
+    writer: int
+    slot: int
+    kind: int
+    sequence: int
+    values: Values
+
+
+class CommonImage(NamedTuple):
+    """All of common memory at one instant; ``sequence`` is that of the last write it contains."""
+
+    stamp: int
+    run_id: int
+    sequence: int
+    values: Values
+
+
+class ScanError(NamedTuple):
+    """One run-time error that a task logged: BASIC line and problem number."""
+
+    line: int
+    code: int
+
+
+class Scan(NamedTuple):
+    """One scan of one task: all that is needed to execute it again and to compare."""
+
+    stamp: int
+    slot: int
+    task: str
+    scan: int
+    duration_ns: int = 0
+    skipped: int = 0
+    full: bool = False
+    latched: Values = NO_VALUES
+    read: Values = NO_VALUES
+    written: Values = NO_VALUES
+    committed: Values = NO_VALUES
+    errors: Sequence[ScanError] = ()
+
+
+class TaskState(NamedTuple):
+    """The state of a task between two scans."""
+
+    stamp: int
+    slot: int
+    task: str
+    scan: int
+    layout_hash: str
+    source_hash: str
+    field: Sequence[str] = ()
+    size: Sequence[int] = ()
+    value: Sequence[float] = ()
+    text: Sequence[str] = ()
+
+
+class Variable(NamedTuple):
+    """One common variable of a rack."""
+
+    id: int
+    name: str
+    type: int
+    dimensions: Sequence[int] = ()
+    length: int = 0
+    slot: int = 0
+    non_volatile: bool = False
+    direction: int = Direction.CLOSED
+    topic: str = ""
+    unit: str = ""
+    description: str = ""
+
+
+class Writer(NamedTuple):
+    """Who may write common memory."""
+
+    id: int
+    name: str
+    kind: int
+    slot: int
+
+
+class VariableTable(NamedTuple):
+    """The common variables and the writers of a rack."""
+
+    stamp: int
+    rack: str
+    run_id: int
+    variables: Sequence[Variable] = ()
+    writers: Sequence[Writer] = ()
+
+
+class Clock(NamedTuple):
+    """rosgraph_msgs/Clock."""
+
+    clock: int
+
+
+class Bool(NamedTuple):
+    """std_msgs/Bool."""
+
+    data: bool
+
+
+class Int16(NamedTuple):
+    """std_msgs/Int16."""
+
+    data: int
+
+
+class Int32(NamedTuple):
+    """std_msgs/Int32."""
+
+    data: int
+
+
+class Float32(NamedTuple):
+    """std_msgs/Float32."""
+
+    data: float
+
+
+class String(NamedTuple):
+    """std_msgs/String."""
+
+    data: str
+
+
+class MultiArrayDimension(NamedTuple):
+    """std_msgs/MultiArrayDimension."""
+
+    label: str
+    size: int
+    stride: int
+
+
+class MultiArrayLayout(NamedTuple):
+    """std_msgs/MultiArrayLayout."""
+
+    dim: Sequence[MultiArrayDimension] = ()
+    data_offset: int = 0
+
+
+NO_LAYOUT = MultiArrayLayout()
+
+
+class Int16MultiArray(NamedTuple):
+    """std_msgs/Int16MultiArray."""
+
+    layout: MultiArrayLayout = NO_LAYOUT
+    data: Sequence[int] = ()
+
+
+class Int32MultiArray(NamedTuple):
+    """std_msgs/Int32MultiArray."""
+
+    layout: MultiArrayLayout = NO_LAYOUT
+    data: Sequence[int] = ()
+
+
+class Float32MultiArray(NamedTuple):
+    """std_msgs/Float32MultiArray."""
+
+    layout: MultiArrayLayout = NO_LAYOUT
+    data: Sequence[float] = ()
+
+
+class UInt8MultiArray(NamedTuple):
+    """std_msgs/UInt8MultiArray."""
+
+    layout: MultiArrayLayout = NO_LAYOUT
+    data: Sequence[int] = ()
+
+
+_OWN = (CommonImage, CommonWrite, Scan, ScanError, TaskState, Values, Variable, VariableTable, Writer)
+_STANDARD = (
+    Bool,
+    Float32,
+    Float32MultiArray,
+    Int16,
+    Int16MultiArray,
+    Int32,
+    Int32MultiArray,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    String,
+    UInt8MultiArray,
+)
+CLASSES: dict[str, type[tuple[object, ...]]] = {
+    **{f"automax_msgs/msg/{cls.__name__}": cls for cls in _OWN},
+    **{f"std_msgs/msg/{cls.__name__}": cls for cls in _STANDARD},
+    "rosgraph_msgs/msg/Clock": Clock,
+}
+"""The class of each message type by its full name; a time has none."""
+NAMES: dict[type[tuple[object, ...]], str] = {cls: name for name, cls in CLASSES.items()}
+"""The full name of the message type by its class."""

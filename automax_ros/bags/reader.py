@@ -1,0 +1,231 @@
+"""Reads recordings: rosbag2 folders with mcap files, and single .mcap files, those of other programs too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path, PurePath
+from typing import Any, NamedTuple
+
+import yaml
+from mcap.records import Attachment, Channel, Metadata, Schema
+
+from automax_ros.bags.cdr import CdrError, Message, decoder
+from automax_ros.bags.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.mcap_file import McapFile, RawMessage
+from automax_ros.bags.metadata import METADATA_FILE
+
+MAX_METADATA_BYTES = 4 << 20
+"""Longest metadata.yaml that is read (decision)."""
+_MAX_YAML_DEPTH = 16
+_MAX_FILES = 10_000
+_Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+"""Leaves every scalar a string: numbers and dates of a hostile file cost nothing."""
+_NO_BAG_HINT = "give the folder of a recording, which holds metadata.yaml, or one .mcap file"
+
+
+class BagMessage(NamedTuple):
+    """One message of a recording; times in nanoseconds.
+
+    ``stamp`` is the time at which it was sent, ``log_time`` that of the log, which is unique in our own recordings.
+    """
+
+    topic: str
+    type_name: str
+    stamp: int
+    log_time: int
+    message: Message
+
+
+class BagReader:
+    """A recording: a rosbag2 folder or one .mcap file. It may be read any number of times, always as a stream.
+
+    ``custom_data`` is what the recorder wrote into metadata.yaml (empty for a single file).
+
+    Raises:
+        BagError: there is no recording at the path, or its metadata.yaml cannot be used.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.custom_data: dict[str, str] = {}
+        if path.is_dir():
+            information = _information(path)
+            self.files = _data_files(path, information)
+            custom = information.get("custom_data")
+            if isinstance(custom, dict):
+                self.custom_data = {str(key): str(value) for key, value in custom.items()}
+        elif path.is_file():
+            self.files = [path]
+        else:
+            raise BagError("AMX6810", path, "does not exist", _NO_BAG_HINT)
+
+    def messages(
+        self, *, topics: Collection[str] | None = None, types: Collection[str] | None = None
+    ) -> Iterator[BagMessage]:
+        """Return the decoded messages in the order of the file, of all topics and types or only of those given.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits, or holds a wanted message of a type that
+                we do not know or that was recorded with another definition.
+        """
+        for file in self.files:
+            channels: dict[int, _ChannelReader] = {}
+            for record in McapFile(file).records():
+                if not isinstance(record, RawMessage):
+                    continue
+                channel = channels.get(record.channel.id)
+                if channel is None:
+                    wanted = _is_wanted(record, topics, types)
+                    channel = channels[record.channel.id] = _ChannelReader(file, record.channel, record.schema, wanted)
+                if channel.wanted:
+                    yield BagMessage(
+                        channel.topic, channel.type_name, record.publish_time, record.log_time, channel.decoded(record)
+                    )
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Return the files stored in the recording; messages are not unpacked.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits.
+        """
+        for file in self.files:
+            for record in McapFile(file).records(messages=False):
+                if isinstance(record, Attachment):
+                    yield record
+
+    def metadata_records(self) -> Iterator[Metadata]:
+        """Return the metadata records of the mcap files.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits.
+        """
+        for file in self.files:
+            for record in McapFile(file).records(messages=False):
+                if isinstance(record, Metadata):
+                    yield record
+
+
+class _ChannelReader:
+    """Decodes the messages of one channel of one file."""
+
+    def __init__(self, file: Path, channel: Channel, schema: Schema | None, wanted: bool) -> None:
+        self.topic = channel.topic
+        self.type_name = schema.name if schema else ""
+        self.wanted = wanted
+        self._file = file
+        self._decode: Callable[[bytes], Message] | None = None
+        if wanted:
+            _check_encoding(file, channel)
+            _check_schema(file, channel.topic, schema)
+            self._decode = decoder(self.type_name)
+
+    def decoded(self, record: RawMessage) -> Message:
+        """The message of a record of this channel."""
+        assert self._decode is not None
+        try:
+            return self._decode(record.data)
+        except CdrError as error:
+            raise BagError(
+                "AMX6816",
+                self._file,
+                f"the message on {self.topic[:247]} at {record.log_time} ns is malformed: {error}",
+            ) from error
+
+
+def _is_wanted(record: RawMessage, topics: Collection[str] | None, types: Collection[str] | None) -> bool:
+    type_name = record.schema.name if record.schema else ""
+    return (topics is None or record.channel.topic in topics) and (types is None or type_name in types)
+
+
+def _check_encoding(file: Path, channel: Channel) -> None:
+    if channel.message_encoding != "cdr":
+        raise BagError(
+            "AMX6811",
+            file,
+            f"the messages of {channel.topic[:247]} are in {channel.message_encoding[:40]!r}, not in CDR",
+        )
+
+
+def _check_schema(file: Path, topic: str, schema: Schema | None) -> None:
+    """Make sure that the messages of a channel are those that our decoder expects."""
+    name = schema.name[:247] if schema else ""
+    if schema is None or name not in message_types():
+        raise BagError("AMX6815", file, f"topic {topic[:247]} has messages of type {name!r}, which is not known here")
+    if schema.encoding != "ros2msg" or len(schema.data) > MAX_SCHEMA_BYTES:
+        raise BagError(
+            "AMX6815",
+            file,
+            f"the definition of {name} is in {schema.encoding[:40]!r} or too long",
+            "record where the package automax_msgs is installed, so that its .msg files are stored",
+        )
+    try:
+        same = same_layout(name, parse_schema(name, schema.data.decode()))
+    except (DefinitionError, UnicodeDecodeError) as error:
+        raise BagError("AMX6813", file, f"the definition of {name} cannot be read: {error}") from error
+    if not same:
+        raise BagError(
+            "AMX6815",
+            file,
+            f"{name} was recorded with another definition",
+            "use the version of automax_ros that made the recording",
+        )
+
+
+def _information(folder: Path) -> dict[str, Any]:
+    """The content of metadata.yaml, checked as far as it is used."""
+    path = folder / METADATA_FILE
+    try:
+        with path.open("rb") as file:
+            text = file.read(MAX_METADATA_BYTES + 1)
+    except FileNotFoundError:
+        hint = (
+            "the recording was not finished, or this is another folder; a single .mcap file can be read by its own name"
+        )
+        raise BagError("AMX6810", folder, "has no metadata.yaml", hint) from None
+    except OSError as error:
+        raise BagError("AMX6810", path, f"cannot be read: {error.strerror or error}") from error
+    if len(text) > MAX_METADATA_BYTES:
+        raise BagError("AMX6814", path, f"is longer than {MAX_METADATA_BYTES} bytes")
+    data = _load_yaml(path, text)
+    information = data.get("rosbag2_bagfile_information") if isinstance(data, dict) else None
+    if not isinstance(information, dict):
+        raise BagError("AMX6813", path, "does not describe a recording (rosbag2_bagfile_information is missing)")
+    compressed = str(information.get("compression_mode", "")).lower() not in {"", "none"}
+    if information.get("storage_identifier") != "mcap" or compressed:
+        hint = "convert it with `ros2 bag convert` to storage mcap without compression of files or messages"
+        raise BagError("AMX6811", path, "is stored in another way than mcap", hint)
+    return information
+
+
+def _load_yaml(path: Path, text: bytes) -> Any:
+    """Load YAML without aliases and of bounded depth, which keeps the loader's effort and stack in bounds."""
+    depth = 0
+    try:
+        for event in yaml.parse(text, Loader=_Loader):
+            if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
+                depth += 1
+            elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
+                depth -= 1
+            if depth > _MAX_YAML_DEPTH or isinstance(event, yaml.AliasEvent):
+                raise BagError("AMX6814", path, f"is nested deeper than {_MAX_YAML_DEPTH} or uses aliases")
+        return yaml.load(text, Loader=_Loader)
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
+        reason = str(error).split("\n", 1)[0]
+        raise BagError("AMX6813", path, f"is not readable YAML: {reason}") from error
+
+
+def _data_files(folder: Path, information: dict[str, Any]) -> list[Path]:
+    """The mcap files of a folder; a name that leads out of it is refused."""
+    names = information.get("relative_file_paths")
+    if not isinstance(names, list) or not 0 < len(names) <= _MAX_FILES:
+        raise BagError("AMX6813", folder / METADATA_FILE, "names no data files (relative_file_paths)")
+    for name in names:
+        if not isinstance(name, str) or "\0" in name or PurePath(name).name != name or name in {"", ".", ".."}:
+            raise BagError(
+                "AMX6813", folder / METADATA_FILE, f"names a data file outside of its folder: {str(name)[:80]!r}"
+            )
+    missing = [name for name in names if not (folder / name).is_file()]
+    if missing:
+        raise BagError("AMX6810", folder, f"lacks the data file {missing[0][:80]!r} that metadata.yaml names")
+    return [folder / name for name in names]

@@ -1,0 +1,76 @@
+"""Coefficients of the dynamic blocks: mapping constant, limits, range of the integrator (sections 41 to 51)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from automax_ros.blocks.declaration import Block, Bound, Coefficients
+
+TWO_TO_MINUS_18 = 2.0**-18
+
+
+def default_wm(period_s: float) -> float:
+    """Return the mapping frequency in rad/s where none is given: the scan frequency (2 pi / T) over 20."""
+    return math.pi / (10.0 * period_s)
+
+
+def mapping_default(period_s: float) -> dict[str, float]:
+    """Return the default of WM, for ``Coefficients.defaults``."""
+    return {"WM": default_wm(period_s)}
+
+
+def mapping_constant(wm: float, period_s: float) -> float:
+    """Return C = wm / tan(wm T / 2) in 1/s, for the bilinear mapping s = C (z - 1)/(z + 1)."""
+    return wm / math.tan(wm * period_s / 2.0)
+
+
+def constant(value: float) -> Bound:
+    """Return a limit that depends on nothing."""
+    return lambda _period_s, _values: value
+
+
+def per_period(factor: float) -> Bound:
+    """Return the limit factor / T."""
+    return lambda period_s, _values: factor / period_s
+
+
+def times_c(factor: float) -> Bound:
+    """Return the limit factor x C, with C of the WM in force; the Limit ``uses`` WM."""
+    return lambda period_s, values: factor * mapping_constant(values["WM"], period_s)
+
+
+def integrator_range(coefficient: float) -> float:
+    """Return the limit of an integrator's magnitude in counts by the size of its coefficient Kx (section 51)."""
+    if coefficient < 0.125:
+        return 8191.0
+    return 16383.0 if coefficient < 0.25 else 32767.0
+
+
+def limited(declared: Coefficients, period_s: float, given: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
+    """Return the parameters in force and the names of those that had to be moved to a limit.
+
+    ``given`` has the parameters that the CALL programs; the others come from the declaration's defaults.
+    A limit that reads a parameter sees its limited value: the order of ``limits`` counts. Only a given parameter is
+    limited: 42.1 bounds WM by 0.01 rad/s, which the default itself falls below at periods over 31 s (decision).
+    """
+    values = {**declared.defaults(period_s), **given}
+    moved = []
+    for limit in declared.limits:
+        if limit.parameter not in given:
+            continue
+        low, high = limit.low(period_s, values), limit.high(period_s, values)
+        value = values[limit.parameter]
+        if not low <= value <= high:
+            values[limit.parameter] = high if value > high else low
+            moved.append(limit.parameter)
+    return values, moved
+
+
+def evaluate(block: Block, period_s: float, given: Mapping[str, float]) -> tuple[tuple[float, ...], bool]:
+    """Return the coefficients of a block in the order of their names, and whether a parameter was out of limits."""
+    declared = block.coefficients
+    if declared is None:
+        return (), False
+    values, moved = limited(declared, period_s, given)
+    return declared.compute(period_s, values), bool(moved)

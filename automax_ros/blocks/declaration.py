@@ -1,0 +1,270 @@
+"""How a control block is declared: data plus one step function.
+
+Checker, compiler, documentation, templates and the cost model all read the one declaration; nothing about a block
+stands anywhere else.
+
+The step function is pure. Its parameters are named after the declaration, in lower case: inputs, coefficients and
+states, in any order, and only those it uses. An output named there too (one that ``holds``) brings the value the output
+variable has. It returns one tuple of plain names: the outputs, then the new states, both in the order of the
+declaration, and, where the block has ``logs``, last the number of the problem (0 for none). Its body is straight
+assignments, ``if`` and one ``return`` at the end; it uses integers, floats, booleans, comparisons, numeric constants of
+its module and the helpers of ``HELPERS``. So it can be called as it stands, inlined by the compiler from its syntax
+tree, and compiled to machine code.
+
+Three habits keep the inlined code fast. Inputs and coefficients are never assigned, so that a literal can stand in
+their place. An optional output is assigned whole (``rate = a if c else b``) and never read, so that it vanishes where
+it is not programmed. The common case takes the fewest comparisons and no call.
+
+Booleans are ``bool``, INTEGERs ``int``, REALs and coefficients ``float``.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from automax_ros.core.numbers import clamp16, clamp32, round_count, sign_extended, truncated_quotient
+from automax_ros.core.types import DataType, Value
+
+HELPERS: dict[str, Callable[..., object]] = {
+    "abs": abs,
+    "clamp16": clamp16,
+    "clamp32": clamp32,
+    "float": float,
+    "int": int,
+    "max": max,
+    "min": min,
+    "round_count": round_count,
+    "sign_extended": sign_extended,
+    "truncated_quotient": truncated_quotient,
+}
+"""All that a step function may call."""
+
+CLAMPED = 7001
+"""Number that a step function returns for AMX7001: its output was clamped to 16 bits."""
+OVERFLOW = 7002
+"""Number for AMX7002: a sum left 32 bits."""
+DIVIDED_BY_ZERO = 7003
+"""Number for AMX7003."""
+COEFFICIENT_LIMITED = 7004
+"""Number for AMX7004, which no step function returns: it is logged where coefficients are computed."""
+
+
+class Processor(enum.Enum):
+    """What can run a block; the value is the word of ``automax check --target``."""
+
+    AUTOMAX = "automax"
+    PC3000 = "pc3000"
+    UDC = "udc"
+
+
+EVERYWHERE = frozenset(Processor)
+
+
+class Form(enum.Enum):
+    """How a parameter may be written."""
+
+    ANY = "variable or literal"
+    VARIABLE = "variable only"
+    LITERAL = "literal only"
+
+
+class Special(enum.Enum):
+    """Parameters that are not values: the name of an event."""
+
+    EVENT = "event name"
+
+
+ParameterType = DataType | Special
+
+
+@dataclass(frozen=True)
+class Input:
+    """An input parameter (3.1: required, default or optional).
+
+    ``default`` None with ``required`` False makes it optional: the block does without. ``low`` and ``high`` bound a
+    literal (both ends allowed); ``symbol`` is the abbreviation in the manual's graphic; ``text`` says what it does.
+    ``runs_on`` names the processors whose tasks may program it.
+    """
+
+    name: str
+    type: ParameterType
+    symbol: str
+    text: str
+    required: bool = False
+    default: Value | None = None
+    form: Form = Form.ANY
+    low: int | float | None = None
+    high: int | float | None = None
+    runs_on: frozenset[Processor] = EVERYWHERE
+
+    @property
+    def variable(self) -> str:
+        """Its name in the step function."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Output:
+    """An output parameter: always a variable, never inverted.
+
+    ``holds``: the step function is given the present value and may return it unchanged, which then counts as not
+    written.
+    """
+
+    name: str
+    type: DataType
+    symbol: str
+    text: str
+    required: bool = True
+    holds: bool = False
+
+    @property
+    def variable(self) -> str:
+        """Its name in the step function."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class State:
+    """A value that a block keeps from scan to scan: ``initial`` at its first execution since RUN.
+
+    INTEGER states are ints of any width the step function keeps to, REAL states double precision.
+    """
+
+    name: str
+    type: DataType
+    initial: Value
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A rule that a CALL breaks: ``keyword`` is the parameter at fault, None for the CALL as a whole."""
+
+    message: str
+    keyword: str | None = None
+
+
+class Rule(Protocol):
+    """A rule over the set of parameters that a CALL gives, beyond those of each parameter."""
+
+    @property
+    def text(self) -> str:
+        """The rule as a sentence for the documentation."""
+        ...
+
+    def faults(self, given: Mapping[str, object]) -> list[Fault]:
+        """Return what is wrong with the given parameters, by keyword in the order in which they stand."""
+        ...
+
+
+Bound = Callable[[float, Mapping[str, float]], float]
+"""A limit of a coefficient: from the scan period in seconds and the REAL parameters in force."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The limits of one REAL parameter at a scan period, both ends allowed.
+
+    ``uses`` names the other parameters that the bounds read; ``low_text`` and ``high_text`` are the formulas.
+    """
+
+    parameter: str
+    low: Bound
+    high: Bound
+    low_text: str
+    high_text: str
+    uses: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """What a dynamic block computes outside its step function, once and again when a variable parameter changes.
+
+    ``parameters`` are the REAL inputs they come from; ``names`` the values handed to the step function;
+    ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that depends on the period
+    where it is not programmed (WM) is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits
+    is limited and logs AMX7004.
+    """
+
+    parameters: tuple[str, ...]
+    names: tuple[str, ...]
+    limits: tuple[Limit, ...]
+    defaults: Callable[[float], Mapping[str, float]]
+    compute: Callable[[float, Mapping[str, float]], tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Time:
+    """An execution time in microseconds: ``base`` plus a term for each letter of the manual's tables 4 to 6.
+
+    n outputs, k input pairs, j inputs, p input/output pairs, m elements searched, o order of the filter;
+    t, i, b, d: common variables referenced (all latched ones, INTEGER, BOOLEAN, DOUBLE INTEGER). ``alone`` is added
+    where only one task runs on a UDC module (x and z of table 5).
+    """
+
+    base: float
+    n: float = 0.0
+    k: float = 0.0
+    j: float = 0.0
+    p: float = 0.0
+    m: float = 0.0
+    o: float = 0.0
+    t: float = 0.0
+    i: float = 0.0
+    b: float = 0.0
+    d: float = 0.0
+    alone: float = 0.0
+
+
+@dataclass(frozen=True)
+class Times:
+    """Execution times by Processor: 7010 (57C435), 6010/6011 (57C430A, 57C431), UDC, PC3000; None: cannot run it."""
+
+    model_7010: Time | None
+    model_6010: Time | None
+    udc: Time | None
+    pc3000: Time | None
+
+
+Step = Callable[..., tuple[Value, ...]]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A control block. ``function`` is its equation in one or a few lines, ``notes`` what a user must know besides.
+
+    ``step`` is None for SCAN_LOOP alone, which the task itself carries out. ``logs`` are the problems whose number
+    the step function returns.
+    """
+
+    name: str
+    section: str
+    title: str
+    function: str
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    times: Times
+    step: Step | None
+    states: tuple[State, ...] = ()
+    coefficients: Coefficients | None = None
+    rules: tuple[Rule, ...] = ()
+    logs: tuple[str, ...] = ()
+    runs_on: frozenset[Processor] = EVERYWHERE
+    notes: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Input | Output, ...]:
+        """Inputs, then outputs."""
+        return (*self.inputs, *self.outputs)
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Codes of all that the block can log: ``logs``, and AMX7004 where it has coefficients."""
+        return self.logs if self.coefficients is None else (*self.logs, f"AMX{COEFFICIENT_LIMITED}")
+
+    def parameter(self, keyword: str) -> Input | Output | None:
+        """Return the parameter of that name, None where the block has none."""
+        return next((item for item in self.parameters if item.name == keyword), None)

@@ -1,0 +1,214 @@
+"""INTEGRATE and PROP_INT (sections 42, 49 and 51)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from automax_ros.blocks.coefficients import (
+    TWO_TO_MINUS_18,
+    constant,
+    integrator_range,
+    mapping_constant,
+    mapping_default,
+    per_period,
+    times_c,
+)
+from automax_ros.blocks.declaration import Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN
+from automax_ros.core.types import DataType
+
+
+def integrate_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float]:
+    """Return the gain Kx = KI / C of INPUT + INPUT(n-1) and the integrator's range."""
+    kx = values["KI"] / mapping_constant(values["WM"], period_s)
+    return kx, integrator_range(kx)
+
+
+def integrate_step(
+    input: int,
+    initial_value: int,
+    limit_plus: int,
+    limit_minus: int,
+    reset: bool,
+    hold_plus: bool,
+    hold_minus: bool,
+    gain: float,
+    span: float,
+    x1: int,
+    y1: float,
+) -> tuple[bool, bool, int, int, float]:
+    """OUTPUT = Kx (INPUT + INPUT(n-1)) + OUTPUT(n-1), the integrator itself held and limited (42.3).
+
+    A hold keeps the integrator from moving that way, then the limits act, themselves cut to the range of section 51;
+    LIMIT_PLUS comes last and wins. While RESET is TRUE, INITIAL_VALUE is shown as it is, even beyond a
+    limit or the range, and the next free scan limits it; the history of INPUT goes on (decisions).
+    """
+    if reset:
+        y1 = float(initial_value)
+        output = initial_value
+    else:
+        y = gain * (input + x1) + y1
+        if (hold_plus and y > y1) or (hold_minus and y < y1):
+            y = y1
+        low = -span if limit_minus < -span else limit_minus + 0.0
+        if y < low:
+            y = low
+        high = span if limit_plus > span else -span if limit_plus < -span else limit_plus + 0.0
+        if y > high:
+            y = high
+        y1 = y
+        output = int(y1 + 0.5) if y1 >= 0.0 else int(y1 - 0.5)
+    x1 = input
+    saturated_plus = output >= limit_plus
+    saturated_minus = output <= limit_minus
+    return saturated_plus, saturated_minus, output, x1, y1
+
+
+INTEGRATE = Block(
+    name="INTEGRATE",
+    section="42",
+    title="Integrate",
+    function="KI / s",
+    inputs=(
+        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
+        Input("KI", DataType.REAL, "KI", "gain in 1/s", required=True),
+        Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL),
+        Input("INITIAL_VALUE", DataType.INTEGER, "IV", "the output while RESET is TRUE", default=0),
+        Input("LIMIT_PLUS", DataType.INTEGER, "LP", "upper limit of the integrator", default=INT16_MAX),
+        Input("LIMIT_MINUS", DataType.INTEGER, "LM", "lower limit of the integrator", default=-32767),
+        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        Input("HOLD_PLUS", DataType.BOOLEAN, "HP", "TRUE keeps OUTPUT from becoming more positive", default=False),
+        Input("HOLD_MINUS", DataType.BOOLEAN, "HM", "TRUE keeps OUTPUT from becoming more negative", default=False),
+    ),
+    outputs=(
+        Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
+        Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
+        Output("OUTPUT", DataType.INTEGER, "O", "the integral"),
+    ),
+    states=(State("x1", DataType.INTEGER, 0), State("y1", DataType.REAL, 0.0)),
+    coefficients=Coefficients(
+        parameters=("KI", "WM"),
+        names=("gain", "span"),
+        limits=(
+            Limit("WM", constant(0.01), per_period(0.9 * math.pi), "0.01", "0.9 pi / T"),
+            Limit("KI", times_c(TWO_TO_MINUS_18), per_period(0.9 * math.pi), "C x 2**-18", "0.9 pi / T", uses=("WM",)),
+        ),
+        defaults=mapping_default,
+        compute=integrate_coefficients,
+    ),
+    times=Times(Time(39.14), Time(193.0), Time(58.60), Time(27.40)),
+    notes=(
+        "With Kx = KI / C below 0.125 the integrator is limited to +-8191, below 0.25 to +-16383 (section 51).",
+        "For y counts/s at a constant input of x, with WM not programmed: KI = 0.99179 y / x.",
+        "A limit wins over a hold; SATURATED compares OUTPUT as shown.",
+    ),
+    step=integrate_step,
+)
+
+
+def prop_int_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float, float]:
+    """Return KP, the integrator's gain Kx = KP WLD / C of INPUT + INPUT(n-1), and its range."""
+    kx = values["KP"] * values["WLD"] / mapping_constant(values["WM"], period_s)
+    return values["KP"], kx, integrator_range(kx)
+
+
+def prop_int_step(
+    input: int,
+    initial_value: int,
+    limit_plus: int,
+    limit_minus: int,
+    reset: bool,
+    hold_plus: bool,
+    hold_minus: bool,
+    proportional: float,
+    integral: float,
+    span: float,
+    x1: int,
+    integrator: float,
+) -> tuple[bool, bool, int, int, float]:
+    """OUTPUT = INTEGRATOR + KP INPUT, where INTEGRATOR gains Kx (INPUT + INPUT(n-1)) a scan (49).
+
+    Holds act on INTEGRATOR, then the limits, themselves cut to the range of section 51, LIMIT_PLUS last, so that it
+    never winds up; then the limits act on OUTPUT. A coefficient that changes leaves INTEGRATOR where it is. While RESET is
+    TRUE both are INITIAL_VALUE, even beyond a limit, and the history of INPUT goes on (decisions).
+    """
+    if reset:
+        integrator = float(initial_value)
+        output = initial_value
+    else:
+        moved = integral * (input + x1) + integrator
+        if (hold_plus and moved > integrator) or (hold_minus and moved < integrator):
+            moved = integrator
+        low = -span if limit_minus < -span else limit_minus + 0.0
+        if moved < low:
+            moved = low
+        high = span if limit_plus > span else -span if limit_plus < -span else limit_plus + 0.0
+        if moved > high:
+            moved = high
+        integrator = moved
+        total = integrator + proportional * input
+        output = int(total + 0.5) if total >= 0.0 else int(total - 0.5)
+        if output < limit_minus:
+            output = limit_minus
+        if output > limit_plus:
+            output = limit_plus
+    x1 = input
+    saturated_plus = output >= limit_plus
+    saturated_minus = output <= limit_minus
+    return saturated_plus, saturated_minus, output, x1, integrator
+
+
+PROP_INT = Block(
+    name="PROP_INT",
+    section="49",
+    title="Proportional + integral",
+    function="KP (s + WLD) / s",
+    inputs=(
+        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
+        Input("KP", DataType.REAL, "KP", "proportional gain", required=True),
+        Input("WLD", DataType.REAL, "WLD", "lead frequency in rad/s", required=True),
+        Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL),
+        Input("INITIAL_VALUE", DataType.INTEGER, "IV", "output and integrator while RESET is TRUE", default=0),
+        Input("LIMIT_PLUS", DataType.INTEGER, "LP", "upper limit of integrator and output", default=INT16_MAX),
+        Input("LIMIT_MINUS", DataType.INTEGER, "LM", "lower limit of integrator and output", default=INT16_MIN),
+        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        Input(
+            "HOLD_PLUS", DataType.BOOLEAN, "HP", "TRUE keeps the integrator from becoming more positive", default=False
+        ),
+        Input(
+            "HOLD_MINUS", DataType.BOOLEAN, "HM", "TRUE keeps the integrator from becoming more negative", default=False
+        ),
+    ),
+    outputs=(
+        Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
+        Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
+        Output("OUTPUT", DataType.INTEGER, "O", "integrator plus KP times INPUT"),
+    ),
+    states=(State("x1", DataType.INTEGER, 0), State("integrator", DataType.REAL, 0.0)),
+    coefficients=Coefficients(
+        parameters=("KP", "WLD", "WM"),
+        names=("proportional", "integral", "span"),
+        limits=(
+            Limit("WM", per_period(2.0**-17), per_period(0.9 * math.pi), "2**-17 / T", "0.9 pi / T"),
+            Limit("KP", constant(0.001), constant(128.0), "0.001", "128.0"),
+            Limit(
+                "WLD",
+                lambda period_s, values: TWO_TO_MINUS_18 * mapping_constant(values["WM"], period_s) / values["KP"],
+                per_period(0.9 * math.pi),
+                "C x 2**-18 / KP",
+                "0.9 pi / T",
+                uses=("WM", "KP"),
+            ),
+        ),
+        defaults=mapping_default,
+        compute=prop_int_coefficients,
+    ),
+    times=Times(Time(40.32), Time(193.0), Time(70.85), Time(28.24)),
+    notes=(
+        "With Kx = KP x WLD / C below 0.125 the integrator is limited to +-8191, below 0.25 to +-16383 (section 51).",
+        "The holds act on the integrator alone: OUTPUT still follows KP times INPUT.",
+        "A limit wins over a hold; SATURATED compares OUTPUT as shown.",
+    ),
+    step=prop_int_step,
+)

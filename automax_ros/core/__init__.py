@@ -1,0 +1,1 @@
+"""What every floor speaks: number types, integer time, problem codes and diagnostics."""

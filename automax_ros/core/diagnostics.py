@@ -1,0 +1,128 @@
+"""Diagnostics: what is wrong, where, and what to do about it, for sources and configurations alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+
+from automax_ros.core.problems import PROBLEMS, Severity
+
+TAB_STOP = 8
+
+
+@dataclass(frozen=True, order=True)
+class Span:
+    """A stretch of one physical line of a text; lines and columns count from 1, ``end_column`` is behind the last."""
+
+    line: int
+    column: int
+    end_column: int
+
+    def to(self, other: Span) -> Span:
+        """Return the span from here to the end of ``other``; a span never leaves its first line."""
+        return self if other.line != self.line else Span(self.line, self.column, max(self.end_column, other.end_column))
+
+
+@dataclass(frozen=True)
+class Note:
+    """A second place that a diagnostic talks about, such as an earlier declaration."""
+
+    message: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One finding. Its severity comes from the table of problems, never from the place that reports it.
+
+    ``statement`` is the BASIC line number where the fault lies, None where there is none.
+    """
+
+    code: str
+    message: str
+    span: Span
+    statement: int | None = None
+    hint: str | None = None
+    notes: tuple[Note, ...] = ()
+    unconfirmed: bool = field(default=False, compare=False)
+
+    @property
+    def severity(self) -> Severity:
+        """ERROR or WARNING, from the table of problems."""
+        return PROBLEMS[self.code].severity
+
+
+@dataclass(frozen=True)
+class SourceText:
+    """A text with the name that messages call it by."""
+
+    name: str
+    text: str
+
+    @property
+    def lines(self) -> list[str]:
+        """The physical lines without their ends; CR LF, LF and CR all end a line."""
+        return self.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def render(diagnostic: Diagnostic, source: SourceText) -> str:
+    """Return a diagnostic as the person reads it: place, message, source line, caret, notes and hint."""
+    lines = source.lines
+    parts = [
+        f"{source.name}:{diagnostic.span.line}:{diagnostic.span.column}: "
+        f"{diagnostic.severity.value}[{diagnostic.code}]: {diagnostic.message}",
+        *_excerpt(diagnostic.span, lines),
+    ]
+    for note in diagnostic.notes:
+        parts.append(f"{source.name}:{note.span.line}:{note.span.column}: note: {note.message}")
+        parts.extend(_excerpt(note.span, lines))
+    if diagnostic.hint:
+        parts.append(f"  hint: {diagnostic.hint}")
+    return "\n".join(parts)
+
+
+def render_all(diagnostics: Iterable[Diagnostic], source: SourceText) -> str:
+    """Return all diagnostics in the order of their places, each ended by a line feed."""
+    return "".join(render(item, source) + "\n" for item in in_order(diagnostics))
+
+
+def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return diagnostics sorted by place, then code."""
+    return sorted(diagnostics, key=lambda item: (item.span, item.code, item.message))
+
+
+def as_json(diagnostic: Diagnostic, source: SourceText) -> dict[str, object]:
+    """Return the object that ``automax check --json`` prints for a diagnostic."""
+    record: dict[str, object] = {
+        "file": source.name,
+        **asdict(diagnostic.span),
+        "statement": diagnostic.statement,
+        "severity": diagnostic.severity.value,
+        "code": diagnostic.code,
+        "message": diagnostic.message,
+    }
+    if diagnostic.hint:
+        record["hint"] = diagnostic.hint
+    if diagnostic.unconfirmed:
+        record["unconfirmed"] = True
+    return record
+
+
+def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
+    """Return whether any of the diagnostics is an error."""
+    return any(item.severity is Severity.ERROR for item in diagnostics)
+
+
+def _excerpt(span: Span, lines: list[str]) -> list[str]:
+    if not 1 <= span.line <= len(lines):
+        return []
+    line = printable(lines[span.line - 1])
+    start = min(max(span.column - 1, 0), len(line))
+    length = max(1, min(span.end_column, len(line) + 2) - span.column)
+    pad = "".join("\t" if char == "\t" else " " for char in line[:start])
+    return [f"  {line}", f"  {pad}{'^' * length}"]
+
+
+def printable(text: str) -> str:
+    """Return a text with control characters (but the tab) replaced, so that a hostile source cannot drive a terminal."""
+    return "".join(char if char == "\t" or char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)

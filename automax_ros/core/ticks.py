@@ -1,0 +1,49 @@
+"""Integer time: every instant and period below ``nodes/`` is a whole number of nanoseconds."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+NS_PER_US = 1_000
+NS_PER_MS = 1_000_000
+NS_PER_S = 1_000_000_000
+
+TICK_STEP_NS = NS_PER_MS // 2
+MIN_TICK_NS = NS_PER_MS // 2
+MAX_TICK_NS = 10 * NS_PER_MS
+DEFAULT_TICK_NS = 5_500_000
+"""Tick of a Processor unless the rack says otherwise (section 4)."""
+UDC_TICK_NS = NS_PER_MS // 2
+"""Tick of a UDC module (2.3)."""
+UDC_MAX_TICKS = 20
+MAX_TICKS = 32767
+
+
+def tick_ns(milliseconds: float | str) -> int:
+    """Return a Processor's tick in ns.
+
+    Raises:
+        ValueError: not 0.5 to 10 ms in steps of 0.5 ms (section 4, J2-3093 p. 1-7).
+    """
+    try:
+        exact = Fraction(str(milliseconds)) * NS_PER_MS
+    except (ValueError, ZeroDivisionError) as error:
+        raise ValueError(f"tick rate {milliseconds!r} is not a number") from error
+    if exact.denominator != 1 or exact % TICK_STEP_NS or not MIN_TICK_NS <= exact <= MAX_TICK_NS:
+        raise ValueError(f"tick rate {milliseconds} ms is not 0.5 to 10 ms in steps of 0.5 ms")
+    return int(exact)
+
+
+def seconds_ns(seconds: float | str) -> int:
+    """Return a time given in seconds as whole ns, rounded to the nearest.
+
+    Raises:
+        ValueError: not a finite number, or negative.
+    """
+    try:
+        exact = Fraction(str(seconds))
+    except (ValueError, ZeroDivisionError) as error:
+        raise ValueError(f"{seconds!r} is not a number of seconds") from error
+    if exact < 0:
+        raise ValueError(f"{seconds} s is negative")
+    return round(exact * NS_PER_S)

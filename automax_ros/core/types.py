@@ -1,0 +1,83 @@
+"""The five data types of the AutoMax languages (J-3676-5, 2.4.3)."""
+
+from __future__ import annotations
+
+import enum
+from typing import Union
+
+Value = Union[int, float, bool, str]
+"""A value of a variable: int for INTEGER and DOUBLE, float for REAL, bool for BOOLEAN, str for STRING."""
+
+NAME_LIMIT = 16
+"""Longest variable name without its type character (2.4.1)."""
+TASK_NAME_LIMIT = 8
+"""Longest task name (2.4.1)."""
+DEFAULT_STRING_LENGTH = 31
+MAX_STRING_LENGTH = 255
+MAX_DIMENSIONS = 4
+MAX_SUBSCRIPT = 65534
+"""Largest subscript that can be declared: a dimension has at most 65535 elements, the first is 0 (2.4.4)."""
+MAX_ARRAY_ELEMENTS = 1_000_000
+"""Largest number of elements of one array (decision: a bound on memory for untrusted sources)."""
+
+
+class DataType(enum.Enum):
+    """A data type; the value is its type character."""
+
+    INTEGER = "%"
+    DOUBLE = "!"
+    REAL = ""
+    BOOLEAN = "@"
+    STRING = "$"
+
+    @property
+    def is_integer(self) -> bool:
+        """INTEGER or DOUBLE."""
+        return self is DataType.INTEGER or self is DataType.DOUBLE
+
+    @property
+    def is_numeric(self) -> bool:
+        """INTEGER, DOUBLE or REAL."""
+        return self.is_integer or self is DataType.REAL
+
+    @property
+    def word(self) -> str:
+        """The manual's word for the type, for messages and YAML files."""
+        return _WORDS[self]
+
+    @property
+    def zero(self) -> Value:
+        """The value at installation (2.4.5)."""
+        return _ZEROS[self]
+
+    @property
+    def latched(self) -> bool:
+        """TRUE for the types whose simple commons a scan latches (3.3)."""
+        return self is not DataType.REAL and self is not DataType.STRING
+
+
+_WORDS = {
+    DataType.INTEGER: "INTEGER",
+    DataType.DOUBLE: "DOUBLE INTEGER",
+    DataType.REAL: "REAL",
+    DataType.BOOLEAN: "BOOLEAN",
+    DataType.STRING: "STRING",
+}
+_ZEROS: dict[DataType, Value] = {
+    DataType.INTEGER: 0,
+    DataType.DOUBLE: 0,
+    DataType.REAL: 0.0,
+    DataType.BOOLEAN: False,
+    DataType.STRING: "",
+}
+_BY_SUFFIX = {kind.value: kind for kind in DataType if kind.value}
+
+
+def type_of_name(name: str) -> DataType:
+    """Return the data type that the last character of a variable's full name tells."""
+    return _BY_SUFFIX.get(name[-1:], DataType.REAL)
+
+
+def bare_name(name: str) -> str:
+    """Return a variable's name without its type character."""
+    return name[:-1] if name[-1:] in _BY_SUFFIX else name

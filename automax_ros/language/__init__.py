@@ -1,0 +1,1 @@
+"""From .BLK text to a checked program: lexer, parser, syntax tree, printer, checker."""

@@ -1,0 +1,56 @@
+"""What the parts of the checker share: the symbols found so far and where findings go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from automax_ros.blocks.declaration import Block, Processor
+from automax_ros.core.diagnostics import Diagnostic, Note, Span
+from automax_ros.language.broken_lines import BrokenLines
+from automax_ros.language.program import BoundCall, CommonSpec, Symbol
+from automax_ros.language.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
+from automax_ros.language.suggestions import Suggester
+from automax_ros.language.tree import Data, Event
+
+
+@dataclass
+class Context:
+    """One check of one task. ``line`` is the BASIC line number in force, None before the first."""
+
+    target: Processor
+    tick_ns: int
+    catalogue: Mapping[str, Block]
+    commons: Mapping[str, CommonSpec] | None = None
+    broken: BrokenLines = field(default_factory=BrokenLines)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    symbols: dict[str, Symbol] = field(default_factory=dict)
+    events: dict[str, Event] = field(default_factory=dict)
+    data: list[tuple[int, Data]] = field(default_factory=list)
+    calls: dict[Span, BoundCall] = field(default_factory=dict)
+    suggest: Suggester = field(default_factory=Suggester)
+    line: int | None = None
+    ticks: int | None = None
+
+    def report(
+        self, code: str, message: str, span: Span, hint: str | None = None, notes: tuple[Note, ...] = ()
+    ) -> None:
+        """Add a finding in the line in force.
+
+        Raises:
+            TooManyProblemsError: there are DIAGNOSTIC_LIMIT findings already.
+        """
+        if len(self.diagnostics) >= DIAGNOSTIC_LIMIT:
+            raise TooManyProblemsError
+        self.diagnostics.append(Diagnostic(code, message, span, self.line, hint, notes))
+
+    @property
+    def period_s(self) -> float | None:
+        """The scan period T in seconds, None as long as TICKS is not known to be good."""
+        return None if self.ticks is None else self.ticks * self.tick_ns / 1e9
+
+    def is_input_point(self, name: str) -> bool:
+        """Return whether the rack defines a common as an input, which nothing but the rack writes."""
+        spec = self.commons.get(name) if self.commons is not None else None
+        symbol = self.symbols.get(name)
+        return spec is not None and spec.is_input and symbol is not None and symbol.scope.value == "COMMON"

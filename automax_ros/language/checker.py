@@ -1,0 +1,120 @@
+"""The checker: from the text of a task to a checked Program, or to all that is wrong with it in one pass."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from automax_ros.blocks.declaration import Block, Processor
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
+from automax_ros.core.ticks import DEFAULT_TICK_NS
+from automax_ros.language.broken_lines import broken_lines
+from automax_ros.language.calls_check import check_call, check_scan_loop, event_name
+from automax_ros.language.check_context import Context
+from automax_ros.language.declarations_check import check_declarations
+from automax_ros.language.flow_check import check_flow
+from automax_ros.language.parser import parse
+from automax_ros.language.program import CommonSpec, Program
+from automax_ros.language.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
+from automax_ros.language.sharing_check import check_sharing
+from automax_ros.language.statements_check import check_reads, check_statement, data_pool
+from automax_ros.language.task_layout import TaskLayout, find_layout
+from automax_ros.language.tree import Call, Declaration, Module, Read, Statement
+from automax_ros.language.unconfirmed_check import find_unconfirmed
+
+AUTOMAX = Processor.AUTOMAX
+_TOO_MANY = "AMX0002"
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """What a check found. ``program`` is None if there are errors; ``diagnostics`` are in the order of the text.
+
+    ``unconfirmed`` are the places at which the task uses a form that no source confirms, with what is not confirmed.
+    """
+
+    program: Program | None
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    unconfirmed: list[tuple[Span, str]] = field(default_factory=list)
+
+
+def check(
+    source: SourceText,
+    *,
+    name: str,
+    catalogue: Mapping[str, Block],
+    target: Processor = AUTOMAX,
+    tick_ns: int = DEFAULT_TICK_NS,
+    commons: Mapping[str, CommonSpec] | None = None,
+) -> CheckResult:
+    """Check a control-block task; never raises, whatever the text.
+
+    ``name`` is the task's name, ``catalogue`` the blocks by name, ``tick_ns`` the tick in ns. ``commons`` is what the
+    rack defines, by full name: a COMMON that it lacks or defines otherwise is an error, and so is a write to an input
+    point. None takes the task's declarations as the definition.
+
+    At most DIAGNOSTIC_LIMIT problems are reported, by one more that says so.
+    """
+    module, found = parse(source)
+    if any(item.code == _TOO_MANY for item in found):
+        return CheckResult(None, in_order(found))
+    context = Context(target, tick_ns, catalogue, commons, broken_lines(source, found), list(found))
+    layout = None
+    try:
+        layout = _check_module(context, module)
+    except TooManyProblemsError:
+        message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"
+        context.diagnostics.append(Diagnostic(_TOO_MANY, message, context.diagnostics[-1].span, context.line))
+    diagnostics = in_order(context.diagnostics)
+    unconfirmed = find_unconfirmed(module)
+    if layout is None or has_errors(diagnostics):
+        return CheckResult(None, diagnostics, unconfirmed)
+    return CheckResult(_program(context, layout, name, source), diagnostics, unconfirmed)
+
+
+def _check_module(context: Context, module: Module) -> TaskLayout:
+    layout = find_layout(context, module)
+    check_declarations(context, layout)
+    if layout.scan_loop is not None:
+        context.line = layout.scan_loop_line
+        check_scan_loop(context, layout.scan_loop)
+    reads: list[tuple[Read, int | None]] = []
+    for statement, line, _ in layout.numbered():
+        context.line = line
+        if isinstance(statement, Call):
+            check_call(context, statement)
+        else:
+            check_statement(context, statement)
+            if isinstance(statement, Read):
+                reads.append((statement, line))
+    check_reads(context, reads)
+    check_flow(context, layout)
+    check_sharing(context, layout)
+    return layout
+
+
+def _program(context: Context, layout: TaskLayout, name: str, source: SourceText) -> Program:
+    assert layout.scan_loop is not None
+    assert context.ticks is not None
+    data, data_lines = data_pool(context)
+    return Program(
+        name=name,
+        symbols=context.symbols,
+        startup=_executed(layout.startup),
+        scan=_executed(layout.scan),
+        ticks=context.ticks,
+        tick_ns=context.tick_ns,
+        calls=context.calls,
+        data=data,
+        data_lines=data_lines,
+        events=tuple(context.events.values()),
+        event=event_name(layout.scan_loop),
+        target=context.target.value,
+        source_hash=hashlib.sha256(source.text.encode("utf-8", "surrogatepass")).hexdigest(),
+    )
+
+
+def _executed(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Return the statements without the declarations."""
+    return tuple(statement for statement in statements if not isinstance(statement, Declaration))

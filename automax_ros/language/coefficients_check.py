@@ -1,0 +1,50 @@
+"""Checks of the coefficients that a CALL gives as constants against limits that depend on the scan period."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from automax_ros.blocks.declaration import Block, Limit
+from automax_ros.language.check_context import Context
+from automax_ros.language.tree import Expression, RealLiteral
+
+
+def check_coefficients(
+    context: Context, block: Block, values: Mapping[str, Expression], given: Collection[str]
+) -> None:
+    """Report constants outside of their limits at the task's scan period.
+
+    ``given`` are the keywords of the CALL, ``values`` the arguments among them that are good as such.
+    A limit that reads other parameters is checked only where these are constants too, or defaulted, and good.
+    """
+    period = context.period_s
+    if block.coefficients is None or period is None:
+        return
+    known = {name: value for name, value in block.coefficients.defaults(period).items() if name not in given}
+    known.update({name: item.value for name, item in values.items() if isinstance(item, RealLiteral)})
+    for limit in block.coefficients.limits:
+        value = values.get(limit.parameter)
+        if not isinstance(value, RealLiteral) or not all(name in known for name in limit.uses):
+            continue
+        bounds = _bounds(limit, period, known)
+        if bounds is not None and not bounds[0] <= value.value <= bounds[1]:
+            _report(context, limit, value, bounds, period)
+            del known[limit.parameter]
+
+
+def _bounds(limit: Limit, period: float, values: dict[str, float]) -> tuple[float, float] | None:
+    """Return the limits as numbers, None where a parameter without limits of its own makes them no numbers."""
+    try:
+        return limit.low(period, values), limit.high(period, values)
+    except (ArithmeticError, ValueError):
+        return None
+
+
+def _report(context: Context, limit: Limit, value: RealLiteral, bounds: tuple[float, float], period: float) -> None:
+    above = value.value > bounds[1]
+    side, bound = ("above its high", bounds[1]) if above else ("below its low", bounds[0])
+    formula = limit.high_text if above else limit.low_text
+    message = (
+        f"{limit.parameter} = {value.value:.7g} is {side} limit {bound:.7g} ({formula}, T = {period * 1000.0:g} ms)"
+    )
+    context.report("AMX4084", message, value.span, f"it may be {bounds[0]:.7g} to {bounds[1]:.7g} at this scan period")

@@ -1,0 +1,108 @@
+"""A checked task: what the compiler, the rack and the documentation of a task need to know about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from automax_ros.blocks.declaration import Block
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.types import DataType, Value
+from automax_ros.language.tree import Call, Event, Expression, Scope, Statement
+
+
+@dataclass(frozen=True)
+class TuningLimits:
+    """The tuning of a tunable variable, in its own type: ``low <= current <= high``, ``step > 0``."""
+
+    current: Value
+    low: Value
+    high: Value
+    step: Value
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A declared variable. ``dimensions`` are numbers of elements (largest subscript + 1), () for a simple one."""
+
+    name: str
+    type: DataType
+    scope: Scope
+    span: Span
+    dimensions: tuple[int, ...] = ()
+    length: int = 0
+    tuning: TuningLimits | None = None
+
+    @property
+    def elements(self) -> int:
+        """Number of values the variable holds."""
+        count = 1
+        for size in self.dimensions:
+            count *= size
+        return count
+
+    @property
+    def latched(self) -> bool:
+        """TRUE for what the scan latches: a simple common INTEGER, DOUBLE INTEGER or BOOLEAN (3.3)."""
+        return self.scope is Scope.COMMON and not self.dimensions and self.type.latched
+
+
+@dataclass(frozen=True)
+class CommonSpec:
+    """A common variable as the rack defines it, for comparison with a task's COMMON statement.
+
+    ``name`` is full; ``dimensions`` are numbers of elements, () for a simple variable; ``length`` is a string's
+    maximum, 0 for other types. ``place`` is the definition for messages, such as ``rack.yaml:14``.
+    """
+
+    name: str
+    type: DataType
+    place: str
+    dimensions: tuple[int, ...] = ()
+    length: int = 0
+    is_input: bool = False
+
+
+@dataclass(frozen=True)
+class BoundCall:
+    """A CALL whose block and keywords are known and checked.
+
+    ``arguments`` has the given parameters by keyword (a literal keeps its node, rounded and checked);
+    ``defaults`` has the value of every other input that has a default. Optional parameters without a default that
+    were not given are in neither. ``line`` is the BASIC line number.
+    """
+
+    call: Call
+    block: Block
+    line: int
+    arguments: dict[str, Expression]
+    defaults: dict[str, Value]
+
+
+@dataclass(frozen=True)
+class Program:
+    """A task without errors.
+
+    ``startup`` are the statements before SCAN_LOOP, which run once when the task goes into RUN; ``scan`` those behind it
+    up to END. ``calls`` maps a Call node (by identity of its span) to what the checker bound it to; ``data`` is the
+    pool of DATA values, ``data_lines`` the index in it at which each DATA line begins. ``events`` are declared by EVENT;
+    ``event`` is the one that starts the scan, None where the clock does.
+    """
+
+    name: str
+    symbols: dict[str, Symbol]
+    startup: tuple[Statement, ...]
+    scan: tuple[Statement, ...]
+    ticks: int
+    tick_ns: int
+    calls: dict[Span, BoundCall]
+    data: tuple[Value, ...] = ()
+    data_lines: tuple[tuple[int, int], ...] = ()
+    events: tuple[Event, ...] = ()
+    event: str | None = None
+    target: str = "automax"
+    source_hash: str = ""
+
+    @property
+    def period_ns(self) -> int:
+        """The scan period, TICKS x tick rate."""
+        return self.ticks * self.tick_ns

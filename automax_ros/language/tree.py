@@ -1,0 +1,398 @@
+"""The syntax tree of a .BLK task: typed, frozen, equal by meaning.
+
+Every node carries the span of its text; spans (and the spelling of constants) do not take part in equality,
+so that a printed tree parses back to an equal one.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Union
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.types import DataType, type_of_name
+
+NO_SPAN = Span(0, 0, 0)
+
+
+def _span() -> Span:
+    """Return a span field's default: nodes made by hand have none."""
+    return field(default=NO_SPAN, compare=False, kw_only=True)  # type: ignore[return-value]
+
+
+# Expressions
+
+
+@dataclass(frozen=True)
+class IntegerLiteral:
+    """A decimal or hexadecimal integer constant; ``value`` is the signed 32-bit value (decimal ones may exceed it)."""
+
+    value: int
+    hexadecimal: bool = False
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class RealLiteral:
+    """A real constant; ``text`` is its spelling."""
+
+    value: float
+    text: str = field(default="", compare=False)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class StringLiteral:
+    """A string constant without its quotes."""
+
+    value: str
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class BooleanLiteral:
+    """TRUE, ON, FALSE or OFF."""
+
+    value: bool
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A simple variable, or a whole array where one is expected; ``name`` ends with the type character."""
+
+    name: str
+    span: Span = _span()
+
+    @property
+    def type(self) -> DataType:
+        """The data type that the name tells."""
+        return type_of_name(self.name)
+
+
+@dataclass(frozen=True)
+class Element:
+    """An array element."""
+
+    name: str
+    subscripts: tuple[Expression, ...]
+    span: Span = _span()
+
+    @property
+    def type(self) -> DataType:
+        """The data type that the array's name tells."""
+        return type_of_name(self.name)
+
+
+@dataclass(frozen=True)
+class Unary:
+    """A sign or NOT: ``operator`` is ``-``, ``+`` or ``NOT``. ``-NAME@`` in a block parameter inverts."""
+
+    operator: str
+    operand: Expression
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Binary:
+    """Two operands: ``** * / + - = <> < > <= >= AND OR XOR``."""
+
+    operator: str
+    left: Expression
+    right: Expression
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class FunctionCall:
+    """A call of a built-in function; ``name`` keeps its type character, such as ``BIT_SET%``."""
+
+    name: str
+    arguments: tuple[Expression, ...] = ()
+    span: Span = _span()
+
+
+Expression = Union[
+    IntegerLiteral, RealLiteral, StringLiteral, BooleanLiteral, Variable, Element, Unary, Binary, FunctionCall
+]
+Target = Union[Variable, Element]
+
+
+# Statements
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """The bracket of a tunable: expressions are constants, possibly with a sign; None where a key is absent."""
+
+    current: Expression | None
+    high: Expression | None = None
+    low: Expression | None = None
+    step: Expression | None = None
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Declared:
+    """One variable of a LOCAL or COMMON statement.
+
+    ``subscripts`` are the largest subscripts of an array, () for a simple variable;
+    ``length`` is a string's maximum, None for the default.
+    """
+
+    name: str
+    subscripts: tuple[int, ...] = ()
+    length: int | None = None
+    tuning: Tuning | None = None
+    span: Span = _span()
+
+    @property
+    def type(self) -> DataType:
+        """The data type that the name tells."""
+        return type_of_name(self.name)
+
+
+class Scope(enum.Enum):
+    """The control type of a variable (2.4.5)."""
+
+    LOCAL = "LOCAL"
+    COMMON = "COMMON"
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """LOCAL, COMMON or GLOBAL (which is COMMON)."""
+
+    scope: Scope
+    variables: tuple[Declared, ...]
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """[LET] target = value."""
+
+    target: Target
+    value: Expression
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class If:
+    """IF condition THEN ... [ELSE ...] [END_IF]. ``one_line`` tells the form; ``IF c THEN 200`` holds a Goto."""
+
+    condition: Expression
+    then: tuple[Statement, ...]
+    otherwise: tuple[Statement, ...] = ()
+    one_line: bool = False
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class For:
+    """FOR variable = start TO stop [STEP step] ... NEXT variable."""
+
+    variable: Variable
+    start: Expression
+    stop: Expression
+    step: Expression | None
+    body: tuple[Statement, ...]
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Goto:
+    """GOTO line."""
+
+    line: int
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Gosub:
+    """GOSUB line."""
+
+    line: int
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Return:
+    """RETURN from a subroutine."""
+
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class OnJump:
+    """ON selector GOTO lines, or GOSUB lines; the first line is number 1."""
+
+    selector: Expression
+    lines: tuple[int, ...]
+    gosub: bool = False
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Read:
+    """READ targets: the next DATA values."""
+
+    targets: tuple[Target, ...]
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Data:
+    """DATA constants, each possibly with a sign."""
+
+    values: tuple[Expression, ...]
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Restore:
+    """RESTORE [line]: READ goes on at the first DATA of the task, or at the first from that line on."""
+
+    line: int | None = None
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Print:
+    """PRINT items; ``separators`` follow the items: ``,`` or ``;``, the last one may be absent ("")."""
+
+    items: tuple[Expression, ...] = ()
+    separators: tuple[str, ...] = ()
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Stop:
+    """STOP: the task ends."""
+
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Event:
+    """EVENT NAME = event [, INTERRUPT_STATUS = variable, TIMEOUT = count]."""
+
+    name: str
+    interrupt_status: Variable | None = None
+    timeout: int | None = None
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Argument:
+    """KEYWORD = value inside a CALL. The name of an event or a data structure parses as a Variable."""
+
+    keyword: str
+    value: Expression
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Call:
+    """CALL block(KEYWORD = value, ...)."""
+
+    block: str
+    arguments: tuple[Argument, ...] = ()
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class IoWrite:
+    """IOWRITE slot, register, value."""
+
+    slot: Expression
+    register: Expression
+    value: Expression
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class ClearErrorLog:
+    """CLR_ERRLOG."""
+
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class End:
+    """END: the end of the scan."""
+
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A remark; ``costs`` is true for ``!`` remarks, which take execution time, and false for REM (section 53)."""
+
+    text: str
+    costs: bool
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+@dataclass(frozen=True)
+class Label:
+    """A numbered line that does nothing but can be jumped to.
+
+    The lines of ELSE, END_IF and NEXT leave one: ELSE as the last statement of ``then``, NEXT as the last of the loop's
+    body (a jump there takes the next turn), END_IF behind the If. A line with a number alone is one too.
+    """
+
+    number: int | None = field(default=None, kw_only=True)
+    span: Span = _span()
+
+
+Statement = Union[
+    Declaration,
+    Assignment,
+    If,
+    For,
+    Goto,
+    Gosub,
+    Return,
+    OnJump,
+    Read,
+    Data,
+    Restore,
+    Print,
+    Stop,
+    Event,
+    Call,
+    IoWrite,
+    ClearErrorLog,
+    End,
+    Remark,
+    Label,
+]
+
+
+@dataclass(frozen=True)
+class Module:
+    """A whole task: its statements in order. ``number`` of a statement is the line number that stands before it,
+    None for a further statement of the same line; the statement it belongs to is the last number before it."""
+
+    statements: tuple[Statement, ...]

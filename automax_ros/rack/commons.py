@@ -1,0 +1,169 @@
+"""The ``common`` section: the rack's common variables and their options."""
+
+from __future__ import annotations
+
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.types import DataType, bare_name
+from automax_ros.rack.config import DEFAULT_OUT_LIMIT, MAX_VARIABLES, CommonVariable, Direction
+from automax_ros.rack.findings import Findings, did_you_mean, quoted
+from automax_ros.rack.names import PREDEFINED, NameFault, VariableName, variable_name
+from automax_ros.rack.presets import preset_value
+from automax_ros.rack.reserved import is_reserved
+from automax_ros.rack.scalars import boolean_value, number_value, text_value, wrong_kind
+from automax_ros.rack.sections import Section, entries_of, report_twice
+from automax_ros.rack.yaml_text import Node, Scalar
+
+UNIT_LIMIT = 16
+DESCRIPTION_LIMIT = 200
+"""Longest unit and description, in characters (decision)."""
+MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
+"""Range of a rate limit (decision: 2000 Hz is one message a tick of 0.5 ms)."""
+
+_OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "description")
+_DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
+_PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
+
+
+class CommonReader:
+    """Reads the ``common`` section."""
+
+    def __init__(self, findings: Findings) -> None:
+        """Begin with no variables."""
+        self._findings = findings
+        self._names: dict[str, Span] = {}
+        self._bare: dict[str, tuple[str, Span]] = {}
+        self._simple = 0
+        self._left_closed: list[CommonVariable] = []
+        self._left_span = Span(1, 1, 2)
+
+    def read(self, node: Node) -> tuple[CommonVariable, ...]:
+        """Return the variables that are right, in the order of the file."""
+        entries = entries_of(node, "common", self._findings) or ()
+        if len(entries) > MAX_VARIABLES:
+            message = f"the rack has {len(entries)} common variables; it may have at most {MAX_VARIABLES}"
+            self._findings.add("AMX6409", message, entries[MAX_VARIABLES][0].span)
+            return ()
+        variables = [self._variable(key, value) for key, value in entries]
+        self._report_left_closed()
+        return tuple(item for item in variables if item is not None)
+
+    def _variable(self, key: Scalar, node: Node) -> CommonVariable | None:
+        declared = self._name(key)
+        options = entries_of(node, f"options of {quoted(key.text)}", self._findings)
+        if declared is None or options is None:
+            return None
+        section = Section(options, f"common variable {declared.name}", _OPTIONS, self._findings)
+        self._check_predefined(key, declared, section)
+        variable = CommonVariable(declared.name, declared.type, declared.dimensions, declared.length)
+        preset = section.get("preset")
+        direction = self._direction(section, variable, key)
+        return CommonVariable(
+            name=declared.name,
+            type=declared.type,
+            dimensions=declared.dimensions,
+            length=declared.length,
+            non_volatile=self._flag(section, "non_volatile", declared.name),
+            preset=preset_value(preset, declared, variable.elements, self._findings) if preset else None,
+            direction=direction,
+            rate_limit_hz=self._rate(section, declared.name, direction),
+            unit=self._text(section, "unit", declared.name, UNIT_LIMIT),
+            description=self._text(section, "description", declared.name, DESCRIPTION_LIMIT),
+            line=key.span.line,
+        )
+
+    def _name(self, key: Scalar) -> VariableName | None:
+        try:
+            declared = variable_name(self._findings.upper_case(key.text, key.span))
+        except NameFault as fault:
+            self._findings.add(fault.code, f"{quoted(key.text)}: {fault}", key.span, fault.hint)
+            return None
+        bare = bare_name(declared.name)
+        if is_reserved(declared.name):
+            message = f"{declared.name} is a word of the language and cannot name a variable"
+            self._findings.add("AMX6401", message, key.span)
+        if declared.name in self._names:
+            report_twice(key, f"variable {declared.name}", self._names[declared.name], self._findings, "AMX6402")
+            return None
+        if bare in self._bare:
+            other, place = self._bare[bare]
+            message = f"{declared.name} and {other} are two variables: they differ only in type"
+            notes = (Note(f"{other} is defined here", place),)
+            self._findings.add("AMX6403", message, key.span, "give one of them another name", notes)
+        self._names[declared.name] = key.span
+        self._bare.setdefault(bare, (declared.name, key.span))
+        return declared
+
+    def _check_predefined(self, key: Scalar, declared: VariableName, section: Section) -> None:
+        """The rack writes these (2.4.6); a preset or a writer on ROS would contradict it (decision)."""
+        name = _PREDEFINED_BARE.get(bare_name(declared.name))
+        if name is None:
+            return
+        if declared.name != name or declared.dimensions:
+            message = f"{declared.name} must be the simple BOOLEAN {name}: the name is pre-defined"
+            self._findings.add("AMX6410", message, key.span)
+        for option in ("preset", "non_volatile"):
+            if option in section:
+                message = f"{name} has no {option}: the rack itself writes it"
+                self._findings.add("AMX6410", message, section.key_span(option))
+        ros = section.get("ros")
+        if isinstance(ros, Scalar) and ros.text == "in":
+            self._findings.add("AMX6410", f"{name} cannot be written: the rack itself writes it", ros.span)
+
+    def _direction(self, section: Section, variable: CommonVariable, key: Scalar) -> Direction:
+        if not variable.is_array:
+            self._simple += 1
+        node = section.get("ros")
+        if node is None:
+            return self._default_direction(variable, key)
+        if not isinstance(node, Scalar) or node.is_null:
+            wrong_kind(node, f"ros of {variable.name}", "out, in or closed", self._findings)
+            return Direction.CLOSED
+        direction = _DIRECTIONS.get(node.text)
+        if direction is None:
+            message = f"ros of {variable.name} is {quoted(node.text)}; it must be out, in or closed"
+            self._findings.add("AMX6407", message, node.span, did_you_mean(node.text, _DIRECTIONS))
+            return Direction.CLOSED
+        if direction is not Direction.CLOSED and variable.is_array and variable.type is DataType.STRING:
+            message = f"{variable.name} cannot be published: ROS 2 has no standard message for an array of strings"
+            self._findings.add("AMX6413", message, node.span, "write ros: closed")
+        return direction
+
+    def _default_direction(self, variable: CommonVariable, key: Scalar) -> Direction:
+        if variable.is_array:
+            return Direction.CLOSED
+        if self._simple <= DEFAULT_OUT_LIMIT:
+            return Direction.OUT
+        if not self._left_closed:
+            self._left_span = key.span
+        self._left_closed.append(variable)
+        return Direction.CLOSED
+
+    def _report_left_closed(self) -> None:
+        if self._left_closed:
+            message = (
+                f"{len(self._left_closed)} simple commons from {self._left_closed[0].name} on have no topic: "
+                f"without the key ros only the first {DEFAULT_OUT_LIMIT} of a rack are published"
+            )
+            self._findings.add("AMX6412", message, self._left_span, "write ros: out or ros: closed for each of them")
+
+    def _rate(self, section: Section, name: str, direction: Direction) -> float | None:
+        node = section.get("rate_limit_hz")
+        if node is None:
+            return None
+        rate = number_value(
+            node, f"rate_limit_hz of {name}", self._findings, low=MIN_RATE_HZ, high=MAX_RATE_HZ, code="AMX6408"
+        )
+        if direction is Direction.CLOSED:
+            message = f"rate_limit_hz of {name} has no effect: the variable has no topic"
+            self._findings.add("AMX6414", message, section.key_span("rate_limit_hz"), "write ros: out as well")
+        return rate
+
+    def _flag(self, section: Section, key: str, name: str) -> bool:
+        node = section.get(key)
+        return bool(node is not None and boolean_value(node, f"{key} of {name}", self._findings))
+
+    def _text(self, section: Section, key: str, name: str, limit: int) -> str:
+        node = section.get(key)
+        if node is None:
+            return ""
+        return text_value(node, f"{key} of {name}", self._findings, limit=limit) or ""

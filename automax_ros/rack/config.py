@@ -1,0 +1,132 @@
+"""What a rack's YAML file means: checked, frozen, without a trace of YAML.
+
+``line`` is the line of the file (from 1) where a thing is defined, for messages that show both places.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.core.types import DataType, Value
+
+MIN_PRIORITY, MAX_PRIORITY = 4, 11
+"""Priorities of tasks: 4 is served first (J2-3106-1 p. 8-2)."""
+MAX_TASKS = 32
+"""Tasks of one Processor (J2-3106-1 p. 2-5)."""
+MAX_PROCESSORS = 4
+"""Processors of one rack (J2-3106-1 p. 2-5)."""
+MAX_SLOT = 15
+"""Highest slot of the largest rack (J2-3106-1 p. 10-2)."""
+MAX_VARIABLES = 65535
+"""Commons of one rack (decision: their ids in messages have 16 bits)."""
+DEFAULT_OUT_LIMIT = 200
+"""Simple commons of a file that are published although it does not say so (decision)."""
+
+
+class Direction(enum.IntEnum):
+    """What ROS 2 sees of a common variable; the numbers are those of ``Variable.direction``."""
+
+    CLOSED = 0
+    OUT = 1
+    IN = 2
+
+
+@dataclass(frozen=True)
+class CommonVariable:
+    """One variable of common memory.
+
+    ``name`` carries its type character. ``dimensions`` are numbers of elements (largest subscript + 1), () for a simple
+    variable. ``length`` is the longest text of a STRING, 0 for other types. ``preset`` is one value, for an array with
+    different values one for each element in the order of memory (last subscript fastest), None where the file has none.
+    """
+
+    name: str
+    type: DataType
+    dimensions: tuple[int, ...] = ()
+    length: int = 0
+    non_volatile: bool = False
+    preset: Value | tuple[Value, ...] | None = None
+    direction: Direction = Direction.CLOSED
+    rate_limit_hz: float | None = None
+    unit: str = ""
+    description: str = ""
+    line: int = 0
+
+    @property
+    def is_array(self) -> bool:
+        """Whether the variable has subscripts."""
+        return bool(self.dimensions)
+
+    @property
+    def elements(self) -> int:
+        """Number of values the variable holds."""
+        count = 1
+        for size in self.dimensions:
+            count *= size
+        return count
+
+    @property
+    def registers(self) -> int:
+        """16-bit registers it takes (decision: a BOOLEAN counts 1 bit, a STRING its characters and 1 byte)."""
+        if self.type is DataType.BOOLEAN:
+            return -(-self.elements // 16)
+        if self.type is DataType.STRING:
+            return self.elements * ((self.length + 2) // 2)
+        return self.elements * (1 if self.type is DataType.INTEGER else 2)
+
+    @property
+    def presets(self) -> tuple[Value, ...]:
+        """The preset of every element, () where there is none."""
+        if self.preset is None:
+            return ()
+        return self.preset if isinstance(self.preset, tuple) else (self.preset,) * self.elements
+
+
+@dataclass(frozen=True)
+class TaskConfig:
+    """A task of a Processor: ``file`` is its source, ``priority`` is 4 (first) to 11."""
+
+    name: str
+    file: Path
+    priority: int
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class ProcessorConfig:
+    """A Processor module; ``model`` is its number as the manuals write it (``57C430A``), tasks in the file's order."""
+
+    slot: int
+    model: str
+    tick_ns: int
+    tasks: tuple[TaskConfig, ...] = ()
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class CommonMemoryConfig:
+    """The common memory module in slot 0."""
+
+    slot: int
+    model: str
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class RackConfig:
+    """A rack without errors.
+
+    ``namespace`` is its ROS namespace without the slash, ``path`` the YAML file and ``text`` what it says. Processors
+    stand in the order of slots, variables in the order of the file.
+    """
+
+    name: str
+    namespace: str
+    path: Path
+    text: str
+    operator: bool
+    common_memory: CommonMemoryConfig | None
+    processors: tuple[ProcessorConfig, ...]
+    variables: tuple[CommonVariable, ...]

@@ -1,0 +1,69 @@
+"""Collects what is wrong with a rack file."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from automax_ros.core.diagnostics import Diagnostic, Note, Span, in_order, printable
+from automax_ros.core.problems import PROBLEMS, Severity
+
+MAX_FINDINGS = 200
+"""Most errors, and most warnings, that one file reports (decision: nobody reads more; hostile files have millions)."""
+_LONGEST_GUESS = 40
+
+
+class Findings:
+    """The diagnostics of one file so far."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._items: dict[Severity, list[Diagnostic]] = {Severity.ERROR: [], Severity.WARNING: []}
+        self._refused: set[Span] = set()
+        self._lower_case = False
+
+    def add(self, code: str, message: str, span: Span, hint: str | None = None, notes: tuple[Note, ...] = ()) -> None:
+        """Report a problem, unless the YAML at this very place was already refused as such."""
+        if span in self._refused:
+            return
+        items = self._items[PROBLEMS[code].severity]
+        if len(items) < MAX_FINDINGS:
+            items.append(Diagnostic(code, message, span, hint=hint, notes=notes))
+
+    def refuse(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
+        """Report that the text at a place cannot be taken for what it is; later problems of that place are not new."""
+        self.add(code, message, span, hint)
+        self._refused.add(span)
+
+    def upper_case(self, text: str, span: Span) -> str:
+        """Return a name of the rack in upper case; the first that was not gets a warning (semantics, BASIC)."""
+        upper = text.upper() if text.isascii() else text
+        if upper != text and not self._lower_case:
+            self._lower_case = True
+            message = f"name {quoted(text)} is read as {quoted(upper)}, and so are all others in this file"
+            self.add("AMX6411", message, span, "the rack's names are in upper case")
+        return upper
+
+    @property
+    def errors(self) -> int:
+        """Number of errors so far, at most MAX_FINDINGS."""
+        return len(self._items[Severity.ERROR])
+
+    def in_order(self) -> list[Diagnostic]:
+        """Return the diagnostics sorted by place."""
+        return in_order(self._items[Severity.ERROR] + self._items[Severity.WARNING])
+
+
+def quoted(text: str, *, marks: str = "'", limit: int = 40) -> str:
+    """Return a piece of the file for a message: shortened, without control characters or line ends, in quotes."""
+    short = text if len(text) <= limit else text[: limit - 3] + "..."
+    return f"{marks}{printable(short)}{marks}"
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str | None:
+    """Return a hint with the known word that looks most like the one given, None if none does."""
+    if len(word) > _LONGEST_GUESS:
+        return None
+    choices = {item.casefold(): item for item in known}
+    close = difflib.get_close_matches(word.casefold(), choices, n=1, cutoff=0.6)
+    return f"did you mean {choices[close[0]]}?" if close else None

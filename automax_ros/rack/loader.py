@@ -1,0 +1,137 @@
+"""Reads a rack's YAML file into its configuration and finds everything that is wrong with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.rack.commons import CommonReader
+from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.files import FileFault, read_bytes
+from automax_ros.rack.findings import Findings, quoted
+from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS, PROCESSOR_REGISTERS
+from automax_ros.rack.names import is_rack_name
+from automax_ros.rack.ros_names import namespace
+from automax_ros.rack.scalars import boolean_value, text_value
+from automax_ros.rack.sections import Section, entries_of
+from automax_ros.rack.slots import SlotReader, Slots
+from automax_ros.rack.tasks import TaskReader
+from automax_ros.rack.yaml_text import Node, read_yaml
+
+_START = Span(1, 1, 2)
+_KEYS = ("rack", "operator", "slots", "common")
+
+
+@dataclass(frozen=True)
+class LoadResult:
+    """What came of a rack file: ``config`` is None if there are errors. ``source`` is what the diagnostics refer to."""
+
+    config: RackConfig | None
+    diagnostics: list[Diagnostic]
+    source: SourceText
+
+
+def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
+    """Read a rack file; whatever it holds becomes a configuration or diagnostics (AMX6000 to AMX6499), by place.
+
+    Task sources must lie in the file's folder, symbolic links followed, unless ``allow_outside``. They are read to see
+    that they can be, not compiled.
+    """
+    path = Path(path)
+    findings = Findings()
+    source = SourceText(str(path), _text_of(path, findings))
+    root = read_yaml(source, findings) if not findings.errors else None
+    config = None
+    if root is not None:
+        config = _RackReader(path, source.text, allow_outside, findings).read(root)
+    return LoadResult(config if not findings.errors else None, findings.in_order(), source)
+
+
+def _text_of(path: Path, findings: Findings) -> str:
+    try:
+        data = read_bytes(path)
+    except FileFault as fault:
+        code = "AMX6001" if fault.too_large else "AMX6000"
+        findings.add(code, f"the rack file {fault}", _START)
+        return ""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8-sig")
+        line = before.count("\n") + 1
+        column = len(before) - (before.rfind("\n") + 1) + 1
+        message = f"the rack file is not UTF-8: byte {error.start + 1} is {data[error.start]:#04x}"
+        findings.add("AMX6002", message, Span(line, column, column + 1), "save the file as UTF-8")
+        return data.decode("utf-8-sig", errors="replace")
+
+
+class _RackReader:
+    def __init__(self, path: Path, text: str, allow_outside: bool, findings: Findings) -> None:
+        self._path = path
+        self._text = text
+        self._findings = findings
+        self._tasks = TaskReader(path.parent, allow_outside, findings)
+
+    def read(self, root: Node) -> RackConfig | None:
+        entries = entries_of(root, "a rack file", self._findings)
+        if entries is None:
+            return None
+        section = Section(entries, "a rack file", _KEYS, self._findings)
+        section.require(("rack", "slots"), "the rack file", _START, self._findings)
+        name = self._name(section.get("rack"))
+        operator = self._operator(section.get("operator"))
+        slots = self._slots(section)
+        common = section.get("common")
+        variables = CommonReader(self._findings).read(common) if common is not None else ()
+        if common is not None:
+            self._check_size(variables, slots, section.key_span("common"))
+        if name is None or self._findings.errors:
+            return None
+        return RackConfig(
+            name=name,
+            namespace=namespace(name),
+            path=self._path,
+            text=self._text,
+            operator=operator,
+            common_memory=slots.common_memory,
+            processors=slots.processors,
+            variables=variables,
+        )
+
+    def _name(self, node: Node | None) -> str | None:
+        if node is None:
+            return None
+        text = text_value(node, "the rack's name", self._findings, limit=100)
+        if text is None:
+            return None
+        name = self._findings.upper_case(text, node.span)
+        if not is_rack_name(name):
+            hint = "for example LINE1: no blank, hyphen or underscore"
+            self._findings.add(
+                "AMX6100", f"{quoted(text)}: a rack's name has 1 to 8 letters and digits", node.span, hint
+            )
+            return None
+        return name
+
+    def _operator(self, node: Node | None) -> bool:
+        return bool(node is not None and boolean_value(node, "operator", self._findings))
+
+    def _slots(self, section: Section) -> Slots:
+        node = section.get("slots")
+        if node is None:
+            return Slots()
+        return SlotReader(self._tasks, self._findings).read(node, section.key_span("slots"))
+
+    def _check_size(self, variables: tuple[CommonVariable, ...], slots: Slots, span: Span) -> None:
+        """Compare the commons with the module that holds them (J-3636 p. 1-1; alone, a Processor counts as 57C413)."""
+        if slots.common_memory is not None:
+            holder, size = slots.common_memory.model, COMMON_MEMORY_REGISTERS[slots.common_memory.model]
+        elif slots.processors:
+            holder, size = slots.processors[0].model, PROCESSOR_REGISTERS
+        else:
+            return
+        needed = sum(variable.registers for variable in variables)
+        if needed > size:
+            message = f"the common variables take {needed} registers; the {holder} has {size}"
+            self._findings.add("AMX6409", message, span)

@@ -1,0 +1,79 @@
+"""Values that common variables have when the rack starts, each in the variable's own type.
+
+The hardware has no presets; in the emulator one is a write by the rack at time 0 (semantics, Scan, memory, tasks).
+"""
+
+from __future__ import annotations
+
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, stored_real
+from automax_ros.core.types import DataType, Value
+from automax_ros.rack.findings import Findings
+from automax_ros.rack.names import VariableName
+from automax_ros.rack.scalars import DECIMAL, WHOLE, kind_of, number_hint, text_value, truth
+from automax_ros.rack.yaml_text import Node, Scalar, Sequence
+
+_CODE = "AMX6406"
+
+
+def preset_value(
+    node: Node, variable: VariableName, elements: int, findings: Findings
+) -> Value | tuple[Value, ...] | None:
+    """Return the preset of a variable with ``elements`` values; None where there was something to report."""
+    what = f"preset of {variable.name}"
+    if not isinstance(node, Sequence):
+        return _one(node, variable, what, findings)
+    if not variable.dimensions:
+        findings.add(_CODE, f"{what} is a list, but the variable is not an array", node.span)
+        return None
+    if len(node.items) != elements:
+        message = f"{what} has {len(node.items)} values; the array has {elements} elements"
+        findings.add(_CODE, message, node.span, "subscripts count from 0: an array (10) has 11 elements")
+        return None
+    values = [_one(item, variable, what, findings) for item in node.items]
+    return tuple(value for value in values if value is not None) if None not in values else None
+
+
+def _one(node: Node, variable: VariableName, what: str, findings: Findings) -> Value | None:
+    kind = variable.type
+    if kind is DataType.STRING:
+        return _text(node, variable.length, what, findings)
+    value: Value | None = truth(node) if kind is DataType.BOOLEAN else _number(node, kind)
+    if value is None:
+        findings.add(_CODE, f"{what} must be {_RANGES[kind]}, not {kind_of(node)}", node.span, number_hint(node))
+    return value
+
+
+def _text(node: Node, length: int, what: str, findings: Findings) -> str | None:
+    text = text_value(node, what, findings, limit=1000)
+    if text is not None and len(text) > length:
+        findings.add(_CODE, f"{what} has {len(text)} characters; the string holds {length}", node.span)
+        return None
+    return text
+
+
+def _number(node: Node, kind: DataType) -> int | float | None:
+    if not isinstance(node, Scalar) or not node.plain:
+        return None
+    if kind is DataType.REAL:
+        return _real(node.text)
+    if not WHOLE.match(node.text):
+        return None
+    low, high = (INT16_MIN, INT16_MAX) if kind is DataType.INTEGER else (INT32_MIN, INT32_MAX)
+    return int(node.text) if low <= int(node.text) <= high else None
+
+
+def _real(text: str) -> float | None:
+    """Return what a REAL variable would hold; None for no number, or one beyond the ranges of 2.4.2."""
+    if not DECIMAL.match(text):
+        return None
+    given = float(text)
+    held, clamped = stored_real(given)
+    return None if clamped or (given != 0.0 and held == 0.0) else held
+
+
+_RANGES = {
+    DataType.INTEGER: f"a whole number from {INT16_MIN} to {INT16_MAX}",
+    DataType.DOUBLE: f"a whole number from {INT32_MIN} to {INT32_MAX}",
+    DataType.REAL: "a number of magnitude 5.4210107E-20 to 9.2233717E18, or 0",
+    DataType.BOOLEAN: "true or false",
+}

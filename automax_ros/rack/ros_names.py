@@ -1,0 +1,55 @@
+"""The rack's names as names of ROS 2.
+
+The rack's own names have upper-case letters, digits and underscores only. Whatever is added here is in lower case, so
+it can never make two names equal:
+
+- the namespace is the rack's name in lower case; one that begins with a digit, which ROS does not allow, gets
+  ``rack_`` in front (decision; a rack's name has no underscore, so none else looks like it);
+- the topic of a variable is its name without the type character: ``common/LINE_SPEED``;
+- commons that differ only in type get the type's word: ``common/SPEED_int`` and ``common/SPEED_bool``;
+- a name that begins with an underscore gets ``u`` in front, since ROS tools hide such topics: ``common/u_SPARE``
+  (decision). Repeated underscores, which the ROS design page advises against and ROS accepts, stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from automax_ros.core.types import DataType, bare_name, type_of_name
+
+TYPE_WORDS = {
+    DataType.INTEGER: "int",
+    DataType.DOUBLE: "dint",
+    DataType.REAL: "real",
+    DataType.BOOLEAN: "bool",
+    DataType.STRING: "string",
+}
+"""What tells apart the topics of variables that differ only in type."""
+
+
+def namespace(rack_name: str) -> str:
+    """Return a rack's namespace without the slash: ``LINE1`` is ``line1``, ``2A`` is ``rack_2a``."""
+    lower = rack_name.lower()
+    return f"rack_{lower}" if lower[:1].isdigit() else lower
+
+
+def topic_names(names: Iterable[str]) -> dict[str, str]:
+    """Return the topic of each variable, relative to the rack's namespace.
+
+    ``names`` are the names of all commons of a rack with their type characters, each once.
+    """
+    every = list(names)
+    shared = Counter(bare_name(name) for name in every)
+    return {name: f"common/{_word(name, shared[bare_name(name)] > 1)}" for name in every}
+
+
+def set_topic(topic: str) -> str:
+    """Return the topic on which a variable with ``ros: in`` is written."""
+    return f"{topic}/set"
+
+
+def _word(name: str, shared: bool) -> str:
+    bare = bare_name(name)
+    visible = f"u{bare}" if bare.startswith("_") else bare
+    return f"{visible}_{TYPE_WORDS[type_of_name(name)]}" if shared else visible

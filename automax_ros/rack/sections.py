@@ -1,0 +1,72 @@
+"""Mappings of a rack file: known keys, each once, and none missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.rack.findings import Findings, did_you_mean, quoted
+from automax_ros.rack.scalars import wrong_kind
+from automax_ros.rack.yaml_text import Mapping, Node, Scalar
+
+Entry = tuple[Scalar, Node]
+
+
+def entries_of(node: Node, what: str, findings: Findings) -> tuple[Entry, ...] | None:
+    """Return keys and values, () for a key without a value; None (reported) where something else stands."""
+    if isinstance(node, Mapping):
+        return node.entries
+    if isinstance(node, Scalar) and node.is_null:
+        return ()
+    wrong_kind(node, what, "keys and values", findings)
+    return None
+
+
+class Section:
+    """A mapping whose keys have fixed names.
+
+    Reports AMX6006 a key twice and AMX6007 a key that is not known.
+    """
+
+    def __init__(self, entries: Iterable[Entry], what: str, known: tuple[str, ...], findings: Findings) -> None:
+        """Sort the entries; ``what`` names the section in messages."""
+        self._values: dict[str, Entry] = {}
+        for key, value in entries:
+            if key.text not in known:
+                _report_unknown(key, what, known, findings)
+            elif key.text in self._values:
+                report_twice(key, f"key {quoted(key.text)} of {what}", self._values[key.text][0].span, findings)
+            else:
+                self._values[key.text] = (key, value)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values
+
+    def get(self, key: str) -> Node | None:
+        """Return the value of a key, None where the file does not have it."""
+        entry = self._values.get(key)
+        return entry[1] if entry else None
+
+    def key_span(self, key: str) -> Span:
+        """Return the place of a key that the section has."""
+        return self._values[key][0].span
+
+    def require(self, keys: Iterable[str], what: str, span: Span, findings: Findings) -> bool:
+        """Report AMX6009 if keys are missing; return whether all are there."""
+        missing = [key for key in keys if key not in self._values]
+        if missing:
+            word = "key" if len(missing) == 1 else "keys"
+            names = ", ".join(quoted(key) for key in missing)
+            findings.add("AMX6009", f"{what} lacks the {word} {names}", span)
+        return not missing
+
+
+def _report_unknown(key: Scalar, what: str, known: tuple[str, ...], findings: Findings) -> None:
+    hint = did_you_mean(key.text, known) or f"{what} has the keys {', '.join(known)}"
+    findings.add("AMX6007", f"{what} has no key {quoted(key.text)}", key.span, hint)
+
+
+def report_twice(key: Scalar, what: str, first: Span, findings: Findings, code: str = "AMX6006") -> None:
+    """Report that something is defined a second time."""
+    notes = (Note("first defined here", first),)
+    findings.add(code, f"{what} is already defined in line {first.line}", key.span, notes=notes)

@@ -1,0 +1,134 @@
+"""The tasks of a Processor, as its ``tasks`` section lists them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import TypeGuard
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.rack.config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
+from automax_ros.rack.files import FileFault, is_inside, read_bytes
+from automax_ros.rack.findings import Findings, did_you_mean, quoted
+from automax_ros.rack.names import NameFault, check_task_name
+from automax_ros.rack.scalars import integer_value, text_value
+from automax_ros.rack.sections import Section, entries_of, report_twice
+from automax_ros.rack.yaml_text import Node, Scalar
+
+_OTHER_TASKS = {
+    ".BAS": "BASIC tasks",
+    ".PC": "ladder tasks",
+    ".CNF": "configuration tasks",
+    ".INC": "include files",
+}
+_PATH_LIMIT = 200
+_LISTED_FILES = 1000
+
+
+@dataclass
+class TaskReader:
+    """Reads the tasks of all Processors of a rack, whose names must differ.
+
+    ``folder`` is the rack file's; sources lie in it unless ``allow_outside``.
+    """
+
+    folder: Path
+    allow_outside: bool
+    findings: Findings
+    seen: dict[str, Span] = field(default_factory=dict)
+
+    def read(self, node: Node, where: str) -> tuple[TaskConfig, ...]:
+        """Return the tasks of one Processor that are right; ``where`` names it in messages."""
+        entries = entries_of(node, f"tasks of {where}", self.findings) or ()
+        if len(entries) > MAX_TASKS:
+            message = f"{where} has {len(entries)} tasks; a Processor runs at most {MAX_TASKS}"
+            self.findings.add("AMX6303", message, entries[MAX_TASKS][0].span)
+        tasks = (self._task(key, value) for key, value in entries)
+        return tuple(task for task in tasks if task is not None)
+
+    def _task(self, key: Scalar, node: Node) -> TaskConfig | None:
+        name = self._name(key)
+        what = f"task {quoted(key.text)}"
+        if _is_file_name(node):
+            hint = f"write {quoted(key.text, marks='')}: {{file: {node.text}, priority: 8}}"
+            self.findings.add("AMX6008", f"{what} must be keys and values, not a file's name", node.span, hint)
+            return None
+        entries = entries_of(node, what, self.findings)
+        if entries is None:
+            return None
+        section = Section(entries, what, ("file", "priority"), self.findings)
+        section.require(("priority",), what, key.span, self.findings)
+        priority = self._priority(section.get("priority"), what)
+        file = self._file(section.get("file"), key, name, what)
+        if name is None or priority is None or file is None:
+            return None
+        return TaskConfig(name, file, priority, key.span.line)
+
+    def _name(self, key: Scalar) -> str | None:
+        name = self.findings.upper_case(key.text, key.span)
+        try:
+            check_task_name(name)
+        except NameFault as fault:
+            self.findings.add(fault.code, f"{quoted(key.text)}: {fault}", key.span, fault.hint)
+            return None
+        if name in self.seen:
+            report_twice(key, f"task {name}", self.seen[name], self.findings, "AMX6301")
+            return None
+        self.seen[name] = key.span
+        return name
+
+    def _priority(self, node: Node | None, what: str) -> int | None:
+        if node is None:
+            return None
+        what = f"priority of {what}"
+        return integer_value(node, what, self.findings, low=MIN_PRIORITY, high=MAX_PRIORITY, code="AMX6302")
+
+    def _file(self, node: Node | None, key: Scalar, name: str | None, what: str) -> Path | None:
+        """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1)."""
+        if node is None:
+            return self._usable(f"{name}.BLK", key.span) if name is not None else None
+        text = text_value(node, f"file of {what}", self.findings, limit=_PATH_LIMIT)
+        return self._usable(text, node.span) if text is not None else None
+
+    def _usable(self, text: str, span: Span) -> Path | None:
+        suffix = PurePosixPath(text).suffix.upper()
+        if suffix != ".BLK":
+            other = _OTHER_TASKS.get(suffix)
+            message = f"{other} ({suffix}) are not supported yet" if other else "a task's source is a .BLK file"
+            self.findings.add("AMX6304", f"{quoted(text)}: {message}", span)
+            return None
+        path = self.folder / text
+        if not self.allow_outside and not self._stays_inside(text, path):
+            message = f"{quoted(text)} lies outside the rack file's folder"
+            hint = "put the source beside the rack file, or allow it with --allow-outside"
+            self.findings.add("AMX6305", message, span, hint)
+            return None
+        return path if self._readable(text, path, span) else None
+
+    def _stays_inside(self, text: str, path: Path) -> bool:
+        windows = PureWindowsPath(text)
+        absolute = PurePosixPath(text).is_absolute() or bool(windows.drive or windows.root)
+        return not absolute and ".." not in windows.parts and is_inside(path, self.folder)
+
+    def _readable(self, text: str, path: Path, span: Span) -> bool:
+        try:
+            read_bytes(path)
+        except FileFault as fault:
+            code = "AMX6307" if fault.too_large else "AMX6306"
+            hint = None if fault.too_large else did_you_mean(path.name, _names_in(path.parent))
+            self.findings.add(code, f"{quoted(text)} {fault}", span, hint)
+            return False
+        return True
+
+
+def _is_file_name(node: Node) -> TypeGuard[Scalar]:
+    return isinstance(node, Scalar) and len(node.text) <= 40 and PurePosixPath(node.text).suffix.upper() == ".BLK"
+
+
+def _names_in(folder: Path) -> list[str]:
+    """Return the sources in a folder, in a fixed order."""
+    try:
+        names = sorted(item.name for item in folder.iterdir() if item.suffix.upper() == ".BLK")
+    except (OSError, ValueError):
+        return []
+    return names[:_LISTED_FILES]

@@ -1,0 +1,1 @@
+"""From a checked program to a running task: memory, compiler, task, scheduler, cost."""

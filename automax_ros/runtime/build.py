@@ -1,0 +1,149 @@
+"""Short builders of Python syntax trees, for the compiler."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+
+from automax_ros.core.types import Value
+
+
+def name(identifier: str) -> ast.Name:
+    """Return a reference to a variable."""
+    return ast.Name(identifier, ast.Load())
+
+
+def constant(value: Value) -> ast.expr:
+    """Return a literal; negative numbers as Python itself would parse them."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and value < 0:
+        return ast.UnaryOp(ast.USub(), ast.Constant(-value))
+    return ast.Constant(value)
+
+
+def assign(target: str, value: ast.expr) -> ast.Assign:
+    """Return ``target = value``."""
+    return ast.Assign([ast.Name(target, ast.Store())], value)
+
+
+def assign_all(targets: Sequence[str], value: ast.expr) -> ast.Assign:
+    """Return ``a, b, c = value``."""
+    names: list[ast.expr] = [ast.Name(target, ast.Store()) for target in targets]
+    return ast.Assign([ast.Tuple(names, ast.Store())], value)
+
+
+def add_to(target: str, value: ast.expr) -> ast.AugAssign:
+    """Return ``target += value``."""
+    return ast.AugAssign(ast.Name(target, ast.Store()), ast.Add(), value)
+
+
+def names(identifiers: Sequence[str]) -> ast.Tuple:
+    """Return a tuple of variables."""
+    return ast.Tuple([name(identifier) for identifier in identifiers], ast.Load())
+
+
+def call(function: str | ast.expr, *arguments: ast.expr) -> ast.Call:
+    """Return ``function(arguments)``."""
+    return ast.Call(name(function) if isinstance(function, str) else function, list(arguments), [])
+
+
+def attribute(base: str, member: str) -> ast.Attribute:
+    """Return ``base.member``."""
+    return ast.Attribute(name(base), member, ast.Load())
+
+
+def do(value: ast.expr) -> ast.Expr:
+    """Return an expression as a statement."""
+    return ast.Expr(value)
+
+
+def when(test: ast.expr, body: list[ast.stmt], otherwise: list[ast.stmt] | None = None) -> ast.If:
+    """Return ``if test: body else: otherwise``; empty branches become ``pass``."""
+    return ast.If(test, body or [ast.Pass()], otherwise or [])
+
+
+def loop(test: ast.expr, body: list[ast.stmt]) -> ast.While:
+    """Return ``while test: body``."""
+    return ast.While(test, body or [ast.Pass()], [])
+
+
+_COMPARE: dict[str, type[ast.cmpop]] = {
+    "=": ast.Eq,
+    "<>": ast.NotEq,
+    "<": ast.Lt,
+    ">": ast.Gt,
+    "<=": ast.LtE,
+    ">=": ast.GtE,
+}
+_ARITHMETIC: dict[str, type[ast.operator]] = {
+    "+": ast.Add,
+    "-": ast.Sub,
+    "*": ast.Mult,
+    "/": ast.Div,
+    "//": ast.FloorDiv,
+    "AND": ast.BitAnd,
+    "OR": ast.BitOr,
+    "XOR": ast.BitXor,
+}
+
+
+def compare(left: ast.expr, operator: str, right: ast.expr) -> ast.Compare:
+    """Return a comparison; ``operator`` as BASIC writes it."""
+    return ast.Compare(left, [_COMPARE[operator]()], [right])
+
+
+def binary(left: ast.expr, operator: str, right: ast.expr) -> ast.BinOp:
+    """Return an arithmetic or bitwise operation; ``operator`` as BASIC writes it, ``//`` for floor division."""
+    return ast.BinOp(left, _ARITHMETIC[operator](), right)
+
+
+def negative(operand: ast.expr) -> ast.UnaryOp:
+    """Return ``-operand``."""
+    return ast.UnaryOp(ast.USub(), operand)
+
+
+def inverse(operand: ast.expr) -> ast.UnaryOp:
+    """Return ``not operand``."""
+    return ast.UnaryOp(ast.Not(), operand)
+
+
+def both(*operands: ast.expr) -> ast.BoolOp:
+    """Return ``a and b and ...``."""
+    return ast.BoolOp(ast.And(), list(operands))
+
+
+def either(*operands: ast.expr) -> ast.BoolOp:
+    """Return ``a or b or ...``."""
+    return ast.BoolOp(ast.Or(), list(operands))
+
+
+def choose(test: ast.expr, value: ast.expr, otherwise: ast.expr) -> ast.IfExp:
+    """Return ``value if test else otherwise``."""
+    return ast.IfExp(test, value, otherwise)
+
+
+def item(base: str, index: ast.expr) -> ast.Subscript:
+    """Return ``base[index]`` to be read."""
+    return ast.Subscript(name(base), index, ast.Load())
+
+
+def set_item(base: str, index: ast.expr, value: ast.expr) -> ast.Assign:
+    """Return ``base[index] = value``."""
+    return ast.Assign([ast.Subscript(name(base), index, ast.Store())], value)
+
+
+def function(identifier: str, parameters: Sequence[str], body: list[ast.stmt]) -> ast.FunctionDef:
+    """Return a function definition."""
+    arguments = ast.arguments(
+        posonlyargs=[], args=[ast.arg(parameter) for parameter in parameters], kwonlyargs=[], kw_defaults=[], defaults=[]
+    )
+    made = ast.parse("def f(): pass").body[0]
+    assert isinstance(made, ast.FunctionDef)
+    made.name, made.args, made.body = identifier, arguments, body or [ast.Pass()]
+    return made
+
+
+def is_simple(expression: ast.expr) -> bool:
+    """Return whether an expression may be written twice without cost: a variable or a literal."""
+    if isinstance(expression, ast.UnaryOp) and isinstance(expression.op, ast.USub):
+        return isinstance(expression.operand, ast.Constant)
+    return isinstance(expression, (ast.Name, ast.Constant))

@@ -1,0 +1,287 @@
+"""The compiler: a checked program becomes one Python function a scan.
+
+Three functions come from one lowering of the same tree:
+
+- ``startup(state, io)``: the statements before SCAN_LOOP;
+- ``scan(state, io)``: one scan from SCAN_LOOP to END, at one instant;
+- ``scan_steps(state, io)``: the same as a generator, which yields the modeled time in ns that has passed before each
+  read or write of actual memory, for execution with modeled times.
+
+Each returns True if the task executed STOP. ``state`` is the list of the layout's fields: loaded into locals at the
+start, stored back at the end, also when the scan is broken off. ``io`` is what a scan may touch: see ``ScanIo``.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
+from typing import Protocol, cast
+
+from automax_ros.blocks.declaration import HELPERS
+from automax_ros.core.types import Value
+from automax_ros.language.program import Program, Symbol
+from automax_ros.language.tree import Call, For, If, Scope, Statement, Variable
+from automax_ros.runtime import build
+from automax_ros.runtime.calls import BlockInstance, instance_of
+from automax_ros.runtime.cost import CostModel
+from automax_ros.runtime.emitter import Emitter
+from automax_ros.runtime.functions import BUILTINS, OPERATIONS
+from automax_ros.runtime.layout import Field, Layout, Role, StateValue
+from automax_ros.runtime.memory import Latched
+from automax_ros.runtime.pynames import block_prefix, latched_name, variable_name
+from automax_ros.runtime.statements import STOPPED, StatementLowering
+
+State = list[StateValue]
+
+
+class ScanTooLong(Exception):
+    """A scan executed more statements than a scan may; ``line`` is the BASIC line it was at."""
+
+    def __init__(self, line: int) -> None:
+        """Take the BASIC line number."""
+        super().__init__(f"more statements than a scan may execute, at line {line}")
+        self.line = line
+
+
+class ScanIo(Protocol):
+    """What a compiled scan touches beside its own state."""
+
+    def latch(self) -> Latched:
+        """Return the latched commons in the order of ``CompiledTask.latched``."""
+        ...
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Write back what blocks changed: pairs of view and value."""
+        ...
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Read actual memory."""
+        ...
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Write actual memory."""
+        ...
+
+    def log(self, line: int, code: int) -> None:
+        """Log a run-time error."""
+        ...
+
+    def print_line(self, values: tuple[Value, ...], separators: str) -> None:
+        """Print to the task's log; a separator (``,`` ``;`` or a blank) follows each value."""
+        ...
+
+    def errors_logged(self) -> bool:
+        """Return whether the error log holds an entry."""
+        ...
+
+    def clear_errors(self) -> None:
+        """Clear the error log."""
+        ...
+
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+        """Return a register of an I/O module, and the problem or 0."""
+        ...
+
+    def io_write(self, slot: int, register: int, value: int) -> int:
+        """Write a register of an I/O module; return the problem or 0."""
+        ...
+
+
+Scan = Callable[[State, ScanIo], bool]
+ScanSteps = Callable[[State, ScanIo], Generator[int, None, bool]]
+
+
+@dataclass(frozen=True)
+class CompiledTask:
+    """A task ready to run. ``latched`` are the names of the commons that a scan latches, in order."""
+
+    program: Program
+    layout: Layout
+    latched: tuple[str, ...]
+    startup: Scan
+    scan: Scan
+    scan_steps: ScanSteps
+    source: str
+
+
+def compile_program(
+    program: Program, views: Mapping[str, int], cost_model: CostModel | None = None
+) -> CompiledTask:
+    """Compile a checked program against a rack's views (full name -> view) of all commons it declares."""
+    return _Compilation(program, views, cost_model or CostModel()).result()
+
+
+class _Compilation:
+    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel) -> None:
+        self._program = program
+        self._views = {
+            name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON
+        }
+        self._cost = cost_model
+        self._instances = _instances(program)
+        self._latched = tuple(symbol.name for symbol in program.symbols.values() if symbol.latched)
+        self._fields: dict[str, Field] = {
+            variable_name(symbol.name): _local_field(symbol)
+            for symbol in program.symbols.values()
+            if symbol.scope is Scope.LOCAL
+        }
+        for instance in self._instances.values():
+            self._fields.update(instance.fields)
+        self._globals: dict[str, object] = {"ScanTooLong": ScanTooLong}
+
+    def result(self) -> CompiledTask:
+        """Compile the three functions."""
+        functions = [
+            self._function("startup", self._program.startup, scans=False, modeled=False),
+            self._function("scan", self._program.scan, scans=True, modeled=False),
+            self._function("scan_steps", self._program.scan, scans=True, modeled=True),
+        ]
+        definitions = [self._wrapped(*parts) for parts in functions]
+        module = ast.fix_missing_locations(ast.Module(list(definitions), []))
+        made: dict[str, object] = {"__builtins__": {}, **self._globals}
+        exec(compile(module, f"<{self._program.name}>", "exec"), made)  # noqa: S102 - made of syntax trees only
+        return CompiledTask(
+            program=self._program,
+            layout=Layout(tuple(self._fields.values())),
+            latched=self._latched,
+            startup=cast(Scan, made["startup"]),
+            scan=cast(Scan, made["scan"]),
+            scan_steps=cast(ScanSteps, made["scan_steps"]),
+            source="\n\n\n".join(ast.unparse(definition) for definition in definitions) + "\n",
+        )
+
+    def _function(
+        self, name: str, statements: tuple[Statement, ...], *, scans: bool, modeled: bool
+    ) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
+        emitter = Emitter(self._program, self._views, modeled, self._cost)
+        lowering = StatementLowering(emitter, dict(self._instances.items()))
+        if scans:
+            emitter.add_cost(self._cost.scan_loop_ns(self._program))
+            self._latch(emitter)
+        lowering.lower_all(statements)
+        self._fields.update(lowering.fields)
+        body = emitter.body
+        if scans:
+            commit = self._commit(emitter)
+            body.extend([build.when(build.inverse(build.name(STOPPED)), commit)] if lowering.can_stop else commit)
+        return name, body, emitter, lowering
+
+    def _latch(self, emitter: Emitter) -> None:
+        """Emit the latch; a task without latched commons still takes the time of SCAN_LOOP."""
+        emitter.checkpoint()
+        latch = build.call(emitter.member("latch"))
+        if not self._latched:
+            emitter.emit(build.do(latch))
+            return
+        written = self._written()
+        kept = [name for name in self._latched if name in written]
+        names = [latched_name(name) if name in written else variable_name(name) for name in self._latched]
+        emitter.emit(build.assign_all(names, latch))
+        for name in kept:
+            emitter.emit(build.assign(variable_name(name), build.name(latched_name(name))))
+
+    def _written(self) -> frozenset[str]:
+        """Return the latched commons that a block may change."""
+        outputs = {
+            target.name
+            for instance in self._instances.values()
+            for output in instance.bound.block.outputs
+            if isinstance(target := instance.bound.arguments.get(output.name), Variable)
+        }
+        return frozenset(outputs & set(self._latched))
+
+    def _commit(self, emitter: Emitter) -> list[ast.stmt]:
+        """Return END: what differs from the latch is written back."""
+        outer, emitter.body = emitter.body, []
+        emitter.add_cost(self._cost.end_ns(self._program))
+        written = self._written()
+        emitter.checkpoint()
+        emitter.emit(build.assign("changes", ast.List([], ast.Load())))
+        for name in self._latched:
+            if name in written:
+                pair = ast.Tuple([build.constant(self._views[name]), build.name(variable_name(name))], ast.Load())
+                append = build.do(build.call(build.attribute("changes", "append"), pair))
+                changed = build.compare(build.name(variable_name(name)), "<>", build.name(latched_name(name)))
+                emitter.emit(build.when(changed, [append]))
+        emitter.emit(build.do(build.call(emitter.member("commit"), build.name("changes"))))
+        body, emitter.body = emitter.body, outer
+        return body
+
+    def _wrapped(
+        self, name: str, body: list[ast.stmt], emitter: Emitter, lowering: StatementLowering
+    ) -> ast.FunctionDef:
+        """Return the whole function: load the state, bind what is used, the body, store the state."""
+        opening: list[ast.stmt] = [build.assign(member, build.attribute("io", member)) for member in sorted(emitter.members)]
+        store: list[ast.stmt] = []
+        if self._fields:
+            names = list(self._fields)
+            opening.append(build.assign_all(names, build.name("state")))
+            everything = ast.Slice(None, None, None)
+            store = [ast.Assign([ast.Subscript(build.name("state"), everything, ast.Store())], build.names(names))]
+        if "gosub_depth" in self._fields:
+            opening.append(build.assign("gosub_depth", build.constant(0)))
+        if lowering.counts_steps:
+            opening.append(build.assign("steps", build.constant(0)))
+        if lowering.can_stop:
+            opening.append(build.assign(STOPPED, build.constant(False)))
+        if emitter.modeled:
+            opening.append(build.assign("cost", build.constant(0)))
+        ending: list[ast.stmt] = [ast.Return(build.name(STOPPED) if lowering.can_stop else build.constant(False))]
+        if lowering.counts_steps or emitter.modeled:
+            body = [ast.Try(body=body or [ast.Pass()], handlers=[], orelse=[], finalbody=store or [ast.Pass()])]
+        else:
+            body = [*body, *store]
+        self._globals.update(_called(emitter))
+        extra = dict(emitter.extra_globals)
+        if "block_lines" in extra:
+            lines = extra.pop("block_lines")
+            assert isinstance(lines, tuple)
+            opening.append(build.assign("block_lines", ast.Constant(lines)))
+        self._globals.update(extra)
+        return build.function(name, ["state", "io"], [*opening, *body, *ending])
+
+
+def _called(emitter: Emitter) -> dict[str, object]:
+    functions: dict[str, object] = dict(OPERATIONS)
+    functions.update({builtin.carry_out.__name__: builtin.carry_out for builtin in BUILTINS.values()})
+    functions.update(HELPERS)
+    return {**HELPERS, **{name: functions[name] for name in sorted(emitter.calls)}}
+
+
+def _local_field(symbol: Symbol) -> Field:
+    if symbol.tuning is not None:
+        return Field(symbol.name, symbol.type, Role.TUNABLE, symbol.tuning.current)
+    return Field(
+        symbol.name,
+        symbol.type,
+        Role.LOCAL,
+        symbol.type.zero,
+        symbol.elements,
+        is_array=bool(symbol.dimensions),
+        dimensions=symbol.dimensions,
+    )
+
+
+def _instances(program: Program) -> dict[object, BlockInstance]:
+    instances: dict[object, BlockInstance] = {}
+    occurrences: dict[int, int] = {}
+    for call in _calls(program.scan):
+        bound = program.calls[call.span]
+        occurrence = occurrences.get(bound.line, 0)
+        occurrences[bound.line] = occurrence + 1
+        instances[call.span] = instance_of(bound, block_prefix(bound.line, occurrence), occurrence)
+    return instances
+
+
+def _calls(statements: tuple[Statement, ...]) -> list[Call]:
+    found: list[Call] = []
+    for statement in statements:
+        if isinstance(statement, Call) and statement.block != "SCAN_LOOP":
+            found.append(statement)
+        elif isinstance(statement, If):
+            found += _calls(statement.then) + _calls(statement.otherwise)
+        elif isinstance(statement, For):
+            found += _calls(statement.body)
+    return found
+

@@ -1,0 +1,84 @@
+"""A task's error log: the first, the second and the last entry (J2-3106-1 p. 13-4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from automax_ros.core.problems import PROBLEMS
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """One logged run-time error: BASIC line, number of the problem (7001 is AMX7001), number of the scan."""
+
+    line: int
+    code: int
+    scan: int
+
+    @property
+    def problem(self) -> str:
+        """The problem's code, such as AMX7001."""
+        return f"AMX{self.code:04d}"
+
+    def describe(self) -> str:
+        """Return the entry as a person reads it."""
+        problem = PROBLEMS.get(self.problem)
+        title = problem.title if problem else "unknown problem"
+        hardware = f" (code {problem.hardware} on the rack)" if problem and problem.hardware else ""
+        return f"scan {self.scan}, line {self.line}: {self.problem} {title}{hardware}"
+
+
+@dataclass
+class ErrorLog:
+    """The log: errors between the second and the last are counted, not kept."""
+
+    first: LogEntry | None = None
+    second: LogEntry | None = None
+    last: LogEntry | None = None
+    count: int = 0
+
+    def add(self, entry: LogEntry) -> None:
+        """Log an error."""
+        self.count += 1
+        if self.first is None:
+            self.first = entry
+        elif self.second is None:
+            self.second = entry
+        self.last = entry
+
+    def clear(self) -> None:
+        """Empty the log (CLR_ERRLOG, or the operator)."""
+        self.first = self.second = self.last = None
+        self.count = 0
+
+    @property
+    def entries(self) -> list[LogEntry]:
+        """The kept entries, oldest first; each once."""
+        kept = [entry for entry in (self.first, self.second) if entry is not None]
+        if self.last is not None and self.count > len(kept):
+            kept.append(self.last)
+        return kept
+
+    def flatten(self) -> list[int]:
+        """Return the log as numbers for a snapshot: count, then line, code and scan of first, second and last."""
+        numbers = [self.count]
+        for entry in (self.first, self.second, self.last):
+            numbers += [entry.line, entry.code, entry.scan] if entry else [0, 0, 0]
+        return numbers
+
+    def restore(self, numbers: list[int]) -> None:
+        """Take the log over from ``flatten``'s numbers.
+
+        Raises:
+            ValueError: not ten numbers.
+        """
+        if len(numbers) != LOG_NUMBERS:
+            raise ValueError(f"an error log is {LOG_NUMBERS} numbers, not {len(numbers)}")
+        self.count = numbers[0]
+        triples = [numbers[start : start + 3] for start in (1, 4, 7)]
+        entries = [LogEntry(*triple) if triple[1] else None for triple in triples]
+        self.first, self.second, self.last = entries
+
+
+LOG_NUMBERS = 10
+"""How many numbers ``ErrorLog.flatten`` returns."""

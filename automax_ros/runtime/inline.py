@@ -1,0 +1,167 @@
+"""Inlining of a block's step function into the scan, from its syntax tree.
+
+The parameters become the expressions of the CALL, the locals get the block's prefix, constants fold, branches that
+cannot run and outputs that nobody programs disappear.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from automax_ros.blocks.declaration import HELPERS, Block
+from automax_ros.runtime import build
+from automax_ros.runtime.folding import Fold, fold_body, value_of, without_dead_stores
+
+
+@dataclass(frozen=True)
+class StepTree:
+    """The syntax tree of a step function, taken apart."""
+
+    parameters: tuple[str, ...]
+    body: tuple[ast.stmt, ...]
+    results: tuple[ast.expr, ...]
+    assigned: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Inlined:
+    """Statements that carry a block out. ``outputs`` and ``error`` are expressions valid behind them.
+
+    ``error`` is None where the block cannot log anything as it is programmed.
+    """
+
+    body: list[ast.stmt]
+    outputs: dict[str, ast.expr]
+    error: ast.expr | None
+
+
+@functools.cache
+def step_tree(block: Block) -> StepTree:
+    """Return the taken apart step function of a block.
+
+    Raises:
+        TypeError: the function is not of the form that ``blocks.declaration`` asks for.
+    """
+    if block.step is None:
+        raise TypeError(f"{block.name} has no step function")
+    parsed = ast.parse(textwrap.dedent(inspect.getsource(block.step))).body[0]
+    if not isinstance(parsed, ast.FunctionDef):
+        raise TypeError(f"the step of {block.name} is not a plain function")
+    body = list(parsed.body)
+    if isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
+        body = body[1:]
+    last = body.pop()
+    if not isinstance(last, ast.Return) or last.value is None:
+        raise TypeError(f"the step of {block.name} does not end with its return")
+    results = tuple(last.value.elts) if isinstance(last.value, ast.Tuple) else (last.value,)
+    expected = len(block.outputs) + len(block.states) + bool(_can_log_in_step(block))
+    if len(results) != expected:
+        raise TypeError(f"the step of {block.name} returns {len(results)} values, {expected} are declared")
+    constants = _global_constants(block, body, last)
+    body = [_Constants(constants).visit(statement) for statement in body]
+    results = tuple(_Constants(constants).visit(result) for result in results)
+    assigned = {
+        node.id for part in body for node in ast.walk(part) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    }
+    return StepTree(tuple(argument.arg for argument in parsed.args.args), tuple(body), results, frozenset(assigned))
+
+
+def _can_log_in_step(block: Block) -> bool:
+    """Return whether the step returns an error: all that is logged but coefficients out of limits comes from there."""
+    return any(code != "AMX7004" for code in block.logs)
+
+
+def _global_constants(block: Block, body: Sequence[ast.stmt], last: ast.Return) -> dict[str, ast.expr]:
+    """Return the module constants that a step function reads, as literals."""
+    assert block.step is not None
+    scope = block.step.__globals__
+    names = {node.id for part in (*body, last) for node in ast.walk(part) if isinstance(node, ast.Name)}
+    found = {name: scope[name] for name in sorted(names) if name in scope and name not in HELPERS}
+    parameters = set(inspect.signature(block.step).parameters)
+    return {
+        name: build.constant(value)
+        for name, value in found.items()
+        if name not in parameters and isinstance(value, (int, float, bool))
+    }
+
+
+class _Constants(ast.NodeTransformer):
+    def __init__(self, values: Mapping[str, ast.expr]) -> None:
+        self._values = values
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802 - the visitor protocol's name
+        return self._values.get(node.id, node) if isinstance(node.ctx, ast.Load) else node
+
+
+def inline(
+    block: Block, prefix: str, bindings: Mapping[str, ast.expr], wanted: Mapping[str, str], free: frozenset[str]
+) -> Inlined:
+    """Return the statements of one call of a block.
+
+    Args:
+        block: the declaration.
+        prefix: begins every local's name, such as ``b1030_``.
+        bindings: an expression, simple or without side effects, for each parameter but the states.
+        wanted: for each programmed output its target: the Python name it may be computed in directly, or "" where the
+            result has to stand in a local of its own.
+        free: targets of ``wanted`` that no binding reads, so that they may be assigned before the block is through.
+    """
+    tree = step_tree(block)
+    states = {state.name for state in block.states}
+    results = dict(zip([output.variable for output in block.outputs], tree.results, strict=False))
+    opening: list[ast.stmt] = []
+    names: dict[str, ast.expr] = {}
+    for parameter in tree.parameters:
+        if parameter in states:
+            names[parameter] = build.name(prefix + parameter)
+        elif parameter in tree.assigned:
+            target = _direct_target(parameter, results, wanted, free)
+            names[parameter] = build.name(target or prefix + parameter)
+            given = bindings[parameter]
+            if not (isinstance(given, ast.Name) and given.id == target):
+                opening.append(build.assign(target or prefix + parameter, given))
+        else:
+            names[parameter] = bindings[parameter]
+    for local in sorted(tree.assigned - set(tree.parameters)):
+        names[local] = build.name(_direct_target(local, results, wanted, free) or prefix + local)
+    fold = Fold(names, HELPERS)
+    body = opening + fold_body(tree.body, fold)
+    outputs = {output.name: fold.visit(results[output.variable]) for output in block.outputs if output.name in wanted}
+    state_results = tree.results[len(block.outputs) : len(block.outputs) + len(block.states)]
+    body.extend(_store_states(block, prefix, [fold.visit(result) for result in state_results]))
+    error = fold.visit(tree.results[-1]) if _can_log_in_step(block) else None
+    if error is not None and value_of(error) == 0:
+        error = None
+    needed = {prefix + state.name for state in block.states}
+    needed |= {node.id for part in [*outputs.values(), *([error] if error else [])] for node in ast.walk(part) if isinstance(node, ast.Name)}
+    return Inlined(without_dead_stores(body, needed), outputs, error)
+
+
+def _direct_target(
+    local: str, results: Mapping[str, ast.expr], wanted: Mapping[str, str], free: frozenset[str]
+) -> str | None:
+    """Return the output variable that a local of the step may be, so that no copy is needed."""
+    for keyword, target in wanted.items():
+        result = results[keyword.lower()]
+        if target and target in free and isinstance(result, ast.Name) and result.id == local:
+            return target
+    return None
+
+
+def _store_states(block: Block, prefix: str, results: Sequence[ast.expr]) -> list[ast.stmt]:
+    """Return the assignments of those states that are not already computed in place, all at once."""
+    pairs = [
+        (prefix + state.name, result)
+        for state, result in zip(block.states, results, strict=True)
+        if not (isinstance(result, ast.Name) and result.id == prefix + state.name)
+    ]
+    if not pairs:
+        return []
+    if len(pairs) == 1:
+        return [build.assign(pairs[0][0], pairs[0][1])]
+    return [build.assign_all([name for name, _ in pairs], ast.Tuple([value for _, value in pairs], ast.Load()))]

@@ -1,0 +1,124 @@
+"""The typed layout of a task's state: what a task keeps from scan to scan, by name.
+
+Snapshots, monitoring, forcing of locals, hot reload and replay know a task's state only through its layout and the
+layout's hash.
+"""
+
+from __future__ import annotations
+
+import enum
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Union
+
+from automax_ros.core.types import DataType, Value
+
+StateValue = Union[Value, list[Value]]
+"""A field's value in the state: a list for an array."""
+
+
+class Role(enum.Enum):
+    """What a field of the state is."""
+
+    LOCAL = "local"
+    TUNABLE = "tunable"
+    BLOCK = "block"
+    STACK = "stack"
+    LOG = "log"
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field: ``name`` is the variable's full name, or line, block and state as in ``1030 LAG.y1``.
+
+    ``initial`` is the value at installation (locals), or at the block's first execution since RUN.
+    """
+
+    name: str
+    type: DataType
+    role: Role
+    initial: Value
+    size: int = 1
+    is_array: bool = False
+    dimensions: tuple[int, ...] = ()
+
+    def fresh(self) -> StateValue:
+        """Return the field's value at installation."""
+        return [self.initial] * self.size if self.is_array else self.initial
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The fields of a task's state, in the order in which the scan function loads and stores them."""
+
+    fields: tuple[Field, ...]
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 over names, types and sizes."""
+        text = "\n".join(f"{field.name}:{field.type.word}:{field.size}:{field.role.value}" for field in self.fields)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def index(self, name: str) -> int:
+        """Return the position of a field.
+
+        Raises:
+            KeyError: no field has that name.
+        """
+        for position, field in enumerate(self.fields):
+            if field.name == name:
+                return position
+        raise KeyError(name)
+
+    def fresh(self) -> list[StateValue]:
+        """Return the state at installation."""
+        return [field.fresh() for field in self.fields]
+
+    def restart(self, state: list[StateValue]) -> None:
+        """Put a state where RUN puts it: blocks and stacks start anew, locals and tunables keep their values (2.4.5)."""
+        for position, field in enumerate(self.fields):
+            if field.role in (Role.BLOCK, Role.STACK):
+                state[position] = field.fresh()
+
+    def flatten(self, state: Sequence[StateValue]) -> list[Value]:
+        """Return all values one after the other, arrays element by element."""
+        values: list[Value] = []
+        for value in state:
+            if isinstance(value, list):
+                values.extend(value)
+            else:
+                values.append(value)
+        return values
+
+    def restore(self, values: Sequence[Value]) -> list[StateValue]:
+        """Return the state from flat values, each brought back to its field's type.
+
+        Raises:
+            ValueError: the number of values is not the layout's.
+        """
+        expected = sum(field.size for field in self.fields)
+        if len(values) != expected:
+            raise ValueError(f"a state of {len(values)} values does not fit a layout of {expected}")
+        state: list[StateValue] = []
+        position = 0
+        for field in self.fields:
+            part = [_typed(field.type, value) for value in values[position : position + field.size]]
+            state.append(part if field.is_array else part[0])
+            position += field.size
+        return state
+
+
+def _typed(kind: DataType, value: Value) -> Value:
+    if kind is DataType.STRING:
+        return str(value)
+    if isinstance(value, str):
+        raise ValueError(f"text {value!r} where a {kind.word} is stored")
+    if kind is DataType.BOOLEAN:
+        return bool(value)
+    if kind is DataType.REAL:
+        return float(value)
+    if not math.isfinite(value):
+        raise ValueError(f"{value} where a {kind.word} is stored")
+    return int(value)

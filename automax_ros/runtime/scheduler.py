@@ -1,0 +1,137 @@
+"""The scheduler: an event queue in integer nanoseconds; time belongs to it and to nobody else.
+
+Events are ordered by (time, class, priority, name), so nothing is left to chance. ``run_until`` is simulated time: every
+event at its own instant. ``run_due`` is the wall clock: somebody who knows the time calls it, periodic events whose
+instants have passed unserved are skipped and counted, and the next one stays on the grid.
+"""
+
+from __future__ import annotations
+
+import enum
+import heapq
+from collections.abc import Callable
+from dataclasses import dataclass
+
+Action = Callable[[int], None]
+"""What an event does, given its instant in ns."""
+PeriodicAction = Callable[[int, int], None]
+"""What a periodic event does, given its instant in ns and the number of instants skipped just before it."""
+
+
+class EventClass(enum.IntEnum):
+    """What comes first at one instant: writes from outside, start of tasks, I/O, scans, observers."""
+
+    OUTSIDE = 0
+    START = 1
+    IO = 2
+    SCAN = 3
+    OBSERVE = 4
+
+
+@dataclass(frozen=True, order=True)
+class EventKey:
+    """The place of an event among those of its instant; ``priority`` 4 is the highest."""
+
+    event_class: EventClass
+    priority: int
+    name: str
+
+
+@dataclass(eq=False)
+class Event:
+    """An event that was posted; ``cancel`` takes it out of the queue."""
+
+    key: EventKey
+    action: PeriodicAction
+    period_ns: int = 0
+    cancelled: bool = False
+
+    def cancel(self) -> None:
+        """Let the event not happen again; a second time this does nothing."""
+        self.cancelled = True
+
+
+_Queued = tuple[int, int, int, str, int, Event]
+"""Instant, class, priority, name, serial number: a tuple, since tuples compare fast."""
+
+
+class Scheduler:
+    """The event queue of one rack."""
+
+    def __init__(self, start_ns: int = 0) -> None:
+        """Begin at an instant with an empty queue."""
+        self.now_ns = start_ns
+        self._queue: list[_Queued] = []
+        self._serial = 0
+
+    def at(self, time_ns: int, key: EventKey, action: Action) -> Event:
+        """Post an event that happens once.
+
+        Raises:
+            ValueError: the instant lies in the past.
+        """
+        return self._post(time_ns, Event(key, lambda now, _: action(now)))
+
+    def every(self, period_ns: int, first_ns: int, key: EventKey, action: PeriodicAction) -> Event:
+        """Post an event at ``first_ns`` and each ``period_ns`` after it.
+
+        Raises:
+            ValueError: the first instant lies in the past, or the period is not positive.
+        """
+        if period_ns <= 0:
+            raise ValueError(f"a period of {period_ns} ns is not positive")
+        return self._post(first_ns, Event(key, action, period_ns))
+
+    @property
+    def next_ns(self) -> int | None:
+        """The instant of the next event, None if there is none."""
+        while self._queue and self._queue[0][5].cancelled:
+            heapq.heappop(self._queue)
+        return self._queue[0][0] if self._queue else None
+
+    def run_until(self, end_ns: int) -> None:
+        """Let simulated time pass: every event before ``end_ns`` happens at its instant, then it is ``end_ns``."""
+        queue = self._queue
+        while queue and queue[0][0] < end_ns:
+            instant, event = queue[0][0], queue[0][5]
+            if event.cancelled:
+                heapq.heappop(queue)
+                continue
+            self.now_ns = instant
+            if event.period_ns:
+                heapq.heapreplace(queue, self._queued(instant + event.period_ns, event))
+            else:
+                heapq.heappop(queue)
+            event.action(instant, 0)
+        self.now_ns = max(self.now_ns, end_ns)
+
+    def run_due(self, now_ns: int) -> None:
+        """Carry out, in order, what is due at a time of the wall clock.
+
+        A periodic event that is late by whole periods happens once, at the last of its instants that have passed;
+        the others are skipped and counted. What becomes due while events are carried out waits for the next call.
+        """
+        due: list[tuple[int, int, Event]] = []
+        while self._queue and self._queue[0][0] <= now_ns:
+            instant, event = self._queue[0][0], self._queue[0][5]
+            heapq.heappop(self._queue)
+            skipped = (now_ns - instant) // event.period_ns if event.period_ns else 0
+            due.append((instant + skipped * event.period_ns, skipped, event))
+        for instant, _, event in due:
+            if event.period_ns and not event.cancelled:
+                heapq.heappush(self._queue, self._queued(instant + event.period_ns, event))
+        for instant, skipped, event in due:
+            if not event.cancelled:
+                self.now_ns = max(self.now_ns, instant)
+                event.action(instant, skipped)
+        self.now_ns = max(self.now_ns, now_ns)
+
+    def _queued(self, time_ns: int, event: Event) -> _Queued:
+        self._serial += 1
+        return time_ns, event.key.event_class, event.key.priority, event.key.name, self._serial, event
+
+    def _post(self, time_ns: int, event: Event) -> Event:
+        if time_ns < self.now_ns:
+            raise ValueError(f"an event at {time_ns} ns lies before the present, {self.now_ns} ns")
+        heapq.heappush(self._queue, self._queued(time_ns, event))
+        return event

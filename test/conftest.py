@@ -1,0 +1,43 @@
+"""What all tests share: a ROS 2 environment that stays on this machine, and a domain of its own for each test."""
+
+import fcntl
+import itertools
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from automax_ros.nodes.environment import put_prefix_first
+
+# No test talks to, or hears, the plant's network.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+for inherited in ("ROS_STATIC_PEERS", "RMW_IMPLEMENTATION", "FASTRTPS_DEFAULT_PROFILES_FILE"):
+    os.environ.pop(inherited, None)
+put_prefix_first()
+
+# Fast DDS derives UDP ports from the domain; above 101 they run into Linux's ephemeral ports.
+DOMAINS = 101
+LOCKS = Path(tempfile.gettempdir()) / f"automax_ros_domains_{os.getuid()}"
+turns = itertools.count()
+
+
+@pytest.fixture
+def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A ROS domain (1 to 101) that no other test on this machine uses while this one runs, set as ROS_DOMAIN_ID.
+
+    Child processes inherit it. A lock file guards it, so pytest processes side by side do not hear each other.
+    """
+    LOCKS.mkdir(exist_ok=True)
+    start = os.getpid() * 7 + next(turns)
+    for domain in (1 + (start + offset) % DOMAINS for offset in range(DOMAINS)):
+        with (LOCKS / str(domain)).open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+            yield domain
+            return
+    pytest.fail("all ROS domains are taken by other tests")

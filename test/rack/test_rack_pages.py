@@ -1,0 +1,60 @@
+"""Every page of a rack file's problem: its example has that problem and no other, its cure has none of it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import automax_ros.core
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.rack.files import MAX_BYTES
+from automax_ros.rack.loader import LoadResult, load
+from .helpers import write
+
+PAGES = Path(automax_ros.core.__file__).parent / "pages"
+CODES = [code for code in PROBLEMS if "AMX6000" <= code < "AMX6700"]
+
+
+def part(code: str, heading: str) -> str:
+    text = (PAGES / f"{code}.md").read_text(encoding="utf-8")
+    match = re.search(rf"^## {heading}\n\n```yaml\n(.*?)```$", text, re.M | re.S)
+    assert match, f"{code} has no {heading}"
+    return match[1]
+
+
+def example_file(code: str, folder: Path) -> Path:
+    """Write the example; some of them are about what a page cannot show."""
+    text = part(code, "Example")
+    if code == "AMX6412":
+        text = text.replace("# and so on\n", "\n  ".join(f"V{number}%:" for number in range(2, 201)) + "\n")
+    path = write(folder, text)
+    if code == "AMX6000":
+        return folder / "other.yaml"
+    if code == "AMX6001":
+        path.write_text(text + "#" * MAX_BYTES)
+    if code == "AMX6002":
+        path.write_bytes(text.encode("latin-1"))
+    return path
+
+
+def read(path: Path) -> LoadResult:
+    (path.parent / "BIG.BLK").write_bytes(b"!" * (MAX_BYTES + 1))
+    return load(path)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_example_has_exactly_the_problem_of_its_page(code, tmp_path):
+    assert {item.code for item in read(example_file(code, tmp_path)).diagnostics} == {code}
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_cure_is_a_rack_without_problems(code, tmp_path):
+    result = read(write(tmp_path, part(code, "Cure")))
+    assert result.diagnostics == []
+    assert result.config is not None
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_page_begins_with_code_and_title(code):
+    text = (PAGES / f"{code}.md").read_text(encoding="utf-8")
+    assert text.splitlines()[0] == f"# {code}: {PROBLEMS[code].title}"

@@ -1,0 +1,112 @@
+"""Tasks of a rack file, and above all: which files it may reach."""
+
+import os
+
+import pytest
+
+from automax_ros.rack.loader import load
+
+from .helpers import codes, good, loaded, write
+
+
+def rack(task: str) -> str:
+    return f"rack: A\nslots:\n  0:\n    module: 57C435\n    tasks:\n      {task}\n"
+
+
+@pytest.mark.parametrize("name", ["A", "LINE", "S_1", "ABCDEFGH"])
+def test_task_names(tmp_path, name):
+    assert good(tmp_path, rack(f"{name}: {{file: LINE.BLK, priority: 4}}")).processors[0].tasks[0].name == name
+
+
+@pytest.mark.parametrize("name", ["ABCDEFGHI", "1A", "_A", "A-B", "A B", "A%", "''"])
+def test_task_names_that_the_manual_forbids(tmp_path, name):
+    assert codes(tmp_path, rack(f"{name}: {{file: LINE.BLK, priority: 4}}")) == ["AMX6300"]
+
+
+def test_priorities_are_4_to_11(tmp_path):
+    for priority in range(-1, 14):
+        expected = [] if 4 <= priority <= 11 else ["AMX6302"]
+        assert codes(tmp_path, rack(f"LINE: {{priority: {priority}}}")) == expected
+
+
+@pytest.mark.parametrize(
+    ("file", "code"),
+    [
+        ("../LINE.BLK", "AMX6305"),
+        ("sub/../../LINE.BLK", "AMX6305"),
+        ("/etc/LINE.BLK", "AMX6305"),
+        ("'C:\\LINE.BLK'", "AMX6305"),
+        ("'..\\LINE.BLK'", "AMX6305"),
+        ("LINE.BAS", "AMX6304"),
+        ("line.pc", "AMX6304"),
+        ("LINE", "AMX6304"),
+        (".BLK", "AMX6304"),
+        ("NONE.BLK", "AMX6306"),
+        ("FOLDER.BLK", "AMX6306"),
+        ("PIPE.BLK", "AMX6306"),
+        ('"\\0.BLK"', "AMX6010"),
+        ('"\\ud800.BLK"', "AMX6010"),
+        ("LINE.BLK", None),
+        ("./LINE.BLK", None),
+    ],
+)
+def test_files_that_a_task_may_and_may_not_name(tmp_path, file, code):
+    (tmp_path / "FOLDER.BLK").mkdir()
+    os.mkfifo(tmp_path / "PIPE.BLK")
+    found = codes(tmp_path, rack(f"LINE: {{file: {file}, priority: 4}}"))
+    assert found == ([code] if code else [])
+
+
+def test_symbolic_link_to_itself_is_refused(tmp_path):
+    (tmp_path / "LOOP.BLK").symlink_to(tmp_path / "LOOP.BLK")
+    (found,) = codes(tmp_path, rack("LINE: {file: LOOP.BLK, priority: 4}"))
+    assert found in ("AMX6305", "AMX6306")  # Python 3.13 resolves the loop to itself, earlier ones do not
+
+
+def test_symbolic_links_lead_out_only_when_allowed(tmp_path):
+    inside = tmp_path / "rack"
+    inside.mkdir()
+    (tmp_path / "SECRET.BLK").write_text("10 END\n")
+    (inside / "LINK.BLK").symlink_to(tmp_path / "SECRET.BLK")
+    (inside / "OUT").symlink_to(tmp_path)
+    for file in ("LINK.BLK", "OUT/SECRET.BLK", "../SECRET.BLK", str(tmp_path / "SECRET.BLK")):
+        text = rack(f"LINE: {{file: {file}, priority: 4}}")
+        assert codes(inside, text) == ["AMX6305"]
+        config = loaded(inside, text, allow_outside=True).config
+        assert config.processors[0].tasks[0].file.read_text() == "10 END\n"
+
+
+def test_symbolic_link_inside_the_folder_is_fine(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "ONE.BLK").symlink_to(tmp_path / "LINE.BLK")
+    assert good(tmp_path, rack("LINE: {file: sub/ONE.BLK, priority: 4}")).processors[0].tasks[0].name == "LINE"
+
+
+def test_rack_file_may_be_named_relative_to_the_working_folder(tmp_path, monkeypatch):
+    write(tmp_path, rack("LINE: {priority: 4}"))
+    monkeypatch.chdir(tmp_path)
+    assert load("rack.yaml").config.processors[0].tasks[0].file.name == "LINE.BLK"
+
+
+def test_rack_file_that_is_no_file_is_refused_without_waiting(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for path in (tmp_path / "pipe.yaml", tmp_path, tmp_path / "none.yaml", "/dev/zero"):
+        assert [item.code for item in load(path).diagnostics] == ["AMX6000"]
+
+
+def test_missing_file_gets_a_hint_with_a_name_that_is_there(tmp_path):
+    result = loaded(tmp_path, rack("LINE: {file: line.BLK, priority: 4}"))
+    assert [item.hint for item in result.diagnostics] == ["did you mean LINE.BLK?"]
+
+
+def test_file_name_alone_gets_a_hint_with_the_whole_form(tmp_path):
+    result = loaded(tmp_path, rack("LINE: LINE.BLK"))
+    assert result.diagnostics[0].hint == "write LINE: {file: LINE.BLK, priority: 8}"
+
+
+def test_names_differ_in_the_whole_rack_even_in_case(tmp_path):
+    text = (
+        "rack: A\nslots:\n  0: {module: 57C413}\n  1: {module: 57C435, tasks: {LINE: {priority: 4}}}\n"
+        "  2: {module: 57C435, tasks: {line: {file: LINE.BLK, priority: 4}}}\n"
+    )
+    assert sorted(codes(tmp_path, text)) == ["AMX6301", "AMX6411"]

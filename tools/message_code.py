@@ -1,0 +1,132 @@
+"""Code generation for a ROS interface package without CMake: what rosidl_generate_interfaces() runs, step by step.
+
+.msg -> .idl (rosidl_adapter) -> .json with type descriptions and hashes -> C structs, type supports, Python classes.
+The generators are those of the distribution, taken from PyPI; nothing is computed here.
+"""
+
+import contextlib
+import io
+import json
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+# rclpy loads the C type support, which finds the one of its middleware by name at run time.
+TYPE_SUPPORTS = ["rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"]
+PYTHON_TYPE_SUPPORT = "rosidl_typesupport_c"
+
+
+@dataclass(frozen=True)
+class Interfaces:
+    """One interface package: its sources, where its code goes, and the prefix that holds ROS 2."""
+
+    name: str
+    folder: Path  # holds package.xml and msg/
+    output: Path
+    prefix: Path
+    dependencies: tuple[str, ...]  # interface packages whose types it uses
+
+    @property
+    def messages(self) -> list[Path]:
+        """The .msg files, absolute, sorted by name."""
+        return sorted(self.folder.resolve().glob("msg/*.msg"))
+
+    @property
+    def share(self) -> Path:
+        """What is installed as share/NAME: definitions in three forms."""
+        return self.output / "share"
+
+    def code(self, generator: str) -> Path:
+        """The folder of one generator's files; a compiler finds headers in its parent as NAME/msg/..."""
+        return self.output / generator / self.name
+
+
+def generate(package: Interfaces) -> None:
+    """Write the code of all generators under `package.output`, on all cores."""
+    _write_share(package)
+    generators = [_generate_c, _generate_fastrtps, _generate_introspection, _generate_dispatch, _generate_python]
+    with ProcessPoolExecutor() as pool:
+        for job in [pool.submit(_quietly, generator, package) for generator in generators]:
+            job.result()
+
+
+def _write_share(package: Interfaces) -> None:
+    """The .msg files, their .idl form and the .json type descriptions, from which the hashes of all generators come."""
+    from rosidl_adapter import convert_to_idl
+    from rosidl_generator_type_description import generate_type_hash
+
+    target = package.share / "msg"
+    target.mkdir(parents=True)
+    for message in package.messages:
+        (target / message.name).write_bytes(message.read_bytes())
+        with contextlib.redirect_stdout(io.StringIO()):
+            convert_to_idl(package.share.resolve(), package.name, Path("msg") / message.name, package.share.resolve())
+    generate_type_hash(str(_arguments(package, "rosidl_generator_type_description", package.share)))
+
+
+def _quietly(generator: Callable[[Interfaces], None], package: Interfaces) -> None:
+    with contextlib.redirect_stdout(io.StringIO()):
+        generator(package)
+
+
+def _generate_c(package: Interfaces) -> None:
+    from rosidl_generator_c import generate_c
+
+    generate_c(str(_arguments(package, "rosidl_generator_c")))
+
+
+def _generate_fastrtps(package: Interfaces) -> None:
+    from rosidl_typesupport_fastrtps_c import generate_typesupport_fastrtps_c
+
+    generate_typesupport_fastrtps_c(str(_arguments(package, "rosidl_typesupport_fastrtps_c")))
+
+
+def _generate_introspection(package: Interfaces) -> None:
+    from rosidl_typesupport_introspection_c import generate_c
+
+    generate_c(str(_arguments(package, "rosidl_typesupport_introspection_c")))
+
+
+def _generate_dispatch(package: Interfaces) -> None:
+    from rosidl_typesupport_c import generate_c
+
+    generate_c(str(_arguments(package, "rosidl_typesupport_c")), TYPE_SUPPORTS)
+
+
+def _generate_python(package: Interfaces) -> None:
+    from rosidl_generator_py import generate_py
+
+    generate_py(str(_arguments(package, "rosidl_generator_py")), [PYTHON_TYPE_SUPPORT])
+    (package.code("rosidl_generator_py") / "__init__.py").touch()
+
+
+def _arguments(package: Interfaces, generator: str, output: Path | None = None) -> Path:
+    """The argument file that CMake would write for a generator; returns its path."""
+    output = output or package.code(generator)
+    share = package.prefix / "share"
+    templates = share / generator / "resource"
+    stems = [message.stem for message in package.messages]
+    arguments = {
+        "package_name": package.name,
+        "idl_tuples": [f"{package.share}:msg/{stem}.idl" for stem in stems],
+        "output_dir": str(output),
+        "template_dir": str(templates),
+        "target_dependencies": [],
+        "include_paths": [f"{name}:{share / name}" for name in package.dependencies],
+        "ros_interface_files": [str(message) for message in package.messages],
+    }
+    if generator != "rosidl_generator_type_description":
+        arguments["type_description_tuples"] = [f"msg/{stem}.idl:{package.share / 'msg' / stem}.json" for stem in stems]
+    (output / "msg").mkdir(parents=True, exist_ok=True)
+    _write_visibility_header(package.name, templates, output)
+    path = package.output / f"{generator}.json"
+    path.write_text(json.dumps(arguments, indent=2))
+    return path
+
+
+def _write_visibility_header(name: str, templates: Path, output: Path) -> None:
+    """The header with a library's export macros: a template with two placeholders, filled in as CMake does."""
+    for template in templates.glob("*__visibility_control.h.in"):
+        text = template.read_text().replace("@PROJECT_NAME_UPPER@", name.upper()).replace("@PROJECT_NAME@", name)
+        (output / "msg" / template.stem).write_text(text)
