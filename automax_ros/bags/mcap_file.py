@@ -1,8 +1,8 @@
 """Reads one mcap file from its beginning to its end, trusting nothing in it.
 
 Memory stays bounded whatever the file says: a length is compared with the limit and with what is there before anything
-is read or decompressed. Every checksum that the file has is verified: before the messages of a chunk are handed out, and
-at the end for the rest.
+is read or decompressed. Every checksum that the file has is verified: before the messages of a chunk are handed out,
+and at the end for the rest.
 """
 
 from __future__ import annotations

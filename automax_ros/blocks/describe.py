@@ -77,7 +77,7 @@ def _type_word(item: Input | Output) -> str:
 
 def _input_rows(block: Block) -> list[tuple[str, ...]]:
     return [
-        (item.name, item.symbol, _type_word(item), _need(item), item.form.value, _remarks(block, item))
+        (item.name, item.symbol, _type_word(item), _need(item), _form(item), _remarks(block, item))
         for item in block.inputs
     ]
 
@@ -86,6 +86,10 @@ def _need(item: Input) -> str:
     if item.required:
         return "required"
     return "optional" if item.default is None else f"default {_literal(item.default)}"
+
+
+def _form(item: Input) -> str:
+    return "name only" if isinstance(item.type, Special) else item.form.value
 
 
 def _remarks(block: Block, item: Input) -> str:
@@ -136,7 +140,7 @@ def _section(title: str, rows: Sequence[tuple[str, ...]]) -> str:
 def _list(title: str, sentences: list[str]) -> str:
     if not sentences:
         return ""
-    lines = [textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="    ") for text in sentences]
+    lines = [textwrap.fill(text, WIDTH, initial_indent="  - ", subsequent_indent="    ") for text in sentences]
     return f"{title}\n" + "".join(f"{line}\n" for line in lines)
 
 

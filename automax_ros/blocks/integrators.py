@@ -100,7 +100,7 @@ INTEGRATE = Block(
     times=Times(Time(39.14), Time(193.0), Time(58.60), Time(27.40)),
     notes=(
         "With Kx = KI / C below 0.125 the integrator is limited to +-8191, below 0.25 to +-16383 (section 51).",
-        "For y counts/s at a constant input of x, with WM not programmed: KI = 0.99179 y / x.",
+        "For y counts/s at a constant input of x, with WM not programmed: KI = 0.9918 y / x.",
         "A limit wins over a hold; SATURATED compares OUTPUT as shown.",
     ),
     step=integrate_step,
@@ -130,8 +130,8 @@ def prop_int_step(
     """OUTPUT = INTEGRATOR + KP INPUT, where INTEGRATOR gains Kx (INPUT + INPUT(n-1)) a scan (49).
 
     Holds act on INTEGRATOR, then the limits, themselves cut to the range of section 51, LIMIT_PLUS last, so that it
-    never winds up; then the limits act on OUTPUT. A coefficient that changes leaves INTEGRATOR where it is. While RESET is
-    TRUE both are INITIAL_VALUE, even beyond a limit, and the history of INPUT goes on (decisions).
+    never winds up; then the limits act on OUTPUT. A coefficient that changes leaves INTEGRATOR where it is. While RESET
+    is TRUE both are INITIAL_VALUE, even beyond a limit, and the history of INPUT goes on (decisions).
     """
     if reset:
         integrator = float(initial_value)

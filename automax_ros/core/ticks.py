@@ -25,10 +25,7 @@ def tick_ns(milliseconds: float | str) -> int:
     Raises:
         ValueError: not 0.5 to 10 ms in steps of 0.5 ms (section 4, J2-3093 p. 1-7).
     """
-    try:
-        exact = Fraction(str(milliseconds)) * NS_PER_MS
-    except (ValueError, ZeroDivisionError) as error:
-        raise ValueError(f"tick rate {milliseconds!r} is not a number") from error
+    exact = _exact(milliseconds, "tick rate") * NS_PER_MS
     if exact.denominator != 1 or exact % TICK_STEP_NS or not MIN_TICK_NS <= exact <= MAX_TICK_NS:
         raise ValueError(f"tick rate {milliseconds} ms is not 0.5 to 10 ms in steps of 0.5 ms")
     return int(exact)
@@ -40,10 +37,23 @@ def seconds_ns(seconds: float | str) -> int:
     Raises:
         ValueError: not a finite number, or negative.
     """
-    try:
-        exact = Fraction(str(seconds))
-    except (ValueError, ZeroDivisionError) as error:
-        raise ValueError(f"{seconds!r} is not a number of seconds") from error
+    exact = _exact(seconds, "time in seconds")
     if exact < 0:
         raise ValueError(f"{seconds} s is negative")
     return round(exact * NS_PER_S)
+
+
+def _exact(number: float | str, what: str) -> Fraction:
+    """Return a number as it is written; a huge exponent is refused before it takes memory."""
+    text = str(number).strip()
+    try:
+        if len(text) > _LONGEST_NUMBER or not abs(float(text)) < _LARGEST_NUMBER:
+            raise ValueError(text[:_LONGEST_NUMBER])
+        tiny = float(text) != 0.0 and abs(float(text)) < 1.0 / _LARGEST_NUMBER
+        return Fraction(0) if tiny or float(text) == 0.0 else Fraction(text)
+    except ValueError as error:
+        raise ValueError(f"{what} {text[:_LONGEST_NUMBER]!r} is not a number") from error
+
+
+_LONGEST_NUMBER = 40
+_LARGEST_NUMBER = 1e12

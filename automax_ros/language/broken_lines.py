@@ -11,6 +11,7 @@ from automax_ros.core.problems import Severity
 
 _WORD = re.compile(r"[A-Z_][A-Z0-9_]*[%!@$]?")
 _NUMBER = re.compile(r"\s*([0-9]{1,9})(?![0-9])")
+_BLOCK_WORDS = frozenset({"IF", "ELSE", "END_IF", "FOR", "NEXT"})
 _DECLARING = frozenset({"LOCAL", "COMMON", "GLOBAL", "EVENT"})
 
 
@@ -24,6 +25,11 @@ class BrokenLines:
     words: frozenset[str] = frozenset()
     declared: frozenset[str] = frozenset()
     numbers: frozenset[int] = frozenset()
+
+    @property
+    def blocks(self) -> bool:
+        """TRUE where an IF or FOR may begin or end on a broken line, so that blocks are not where they seem to be."""
+        return not _BLOCK_WORDS.isdisjoint(self.words)
 
     def may_declare(self, name: str) -> bool:
         """Return whether a broken declaration mentions a variable of this full name."""

@@ -65,7 +65,7 @@ class Cursor:
         return self.tokens[self.position].kind is Kind.END
 
     def at_separator(self) -> bool:
-        """Return whether a `\\` stands here."""
+        """Return whether the mark between two statements stands here."""
         return self.tokens[self.position].kind is Kind.SEPARATOR
 
     def fail(self, code: str, message: str, hint: str | None = None, notes: tuple[Note, ...] = ()) -> NoReturn:
@@ -138,5 +138,5 @@ def suggestion(word: str, candidates: Iterable[str]) -> str | None:
     """Return a hint with the candidate that a misspelt word comes closest to, None where none is close."""
     if len(word) > _LONGEST_SUGGESTED:
         return None
-    close = difflib.get_close_matches(word, sorted(candidates), n=1, cutoff=0.7)
+    close = difflib.get_close_matches(word, sorted(candidates), n=1, cutoff=0.65)
     return f"did you mean {close[0]}?" if close else None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NoReturn
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.language.constants import SMALLEST_POSITIVE
+from automax_ros.language.constants import LARGEST_REAL, SMALLEST_POSITIVE
 from automax_ros.language.cursor import Cursor
 from automax_ros.language.functions import FUNCTIONS, REFUSED_FUNCTIONS
 from automax_ros.language.tokens import BOOLEAN_WORDS, RESERVED_WORDS, Fault, Kind, Token
@@ -160,6 +160,7 @@ def _literal(cursor: Cursor, negative: bool) -> _Measured:
     if isinstance(value, int):
         return IntegerLiteral(value, token.text.endswith("H"), span=span), 1
     if isinstance(value, float):
+        value = value if token.fault is None else min(value, LARGEST_REAL)
         if not negative and token.fault is None and 0.0 < value < SMALLEST_POSITIVE:
             hint = "the smallest positive REAL is 5.4210107E-20"
             cursor.reporter.report(Fault("AMX0026", "the real constant is too small", hint), span)

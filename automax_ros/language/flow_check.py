@@ -130,7 +130,7 @@ def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:
     elif place.region is not jump.place.region:
         message = f"{jump.verb} {jump.line} would jump over SCAN_LOOP"
         context.report("AMX4049", message, span, "what lies before SCAN_LOOP runs down to it", note)
-    elif jump.place.blocks[: len(place.blocks)] != place.blocks:
+    elif jump.place.blocks[: len(place.blocks)] != place.blocks and not context.broken.blocks:
         context.report("AMX4050", f"{jump.verb} {jump.line} would jump into an IF or FOR block", span, notes=note)
 
 

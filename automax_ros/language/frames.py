@@ -9,7 +9,7 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.language.cursor import Cursor
 from automax_ros.language.reporter import Reporter
 from automax_ros.language.tokens import Fault
-from automax_ros.language.tree import NO_SPAN, For, If, Label, Statement, Variable
+from automax_ros.language.tree import NO_SPAN, End, For, If, Label, Statement, Variable
 
 NESTING_LIMIT = 16
 """Deepest nesting of IF and FOR together, one-line IFs included (decision)."""
@@ -53,6 +53,7 @@ class FrameStack:
         self._module = Frame("TASK", None)
         self._frames: list[Frame] = []
         self._number: int | None = None
+        self._crossed: set[str] = set()
 
     @property
     def depth(self) -> int:
@@ -95,9 +96,15 @@ class FrameStack:
         self._frames.append(Frame(word, None, span, self._reporter.statement, doubtful=doubtful))
 
     def close_all(self) -> None:
-        """Report and close every block that is still open at the end of the text."""
+        """Report and close every block that is still open at the end of the text; the END there stays the task's."""
+        ends: list[Statement] = []
         while self._frames:
+            statements = self._top.statements
+            if statements and isinstance(statements[-1], End):
+                ends.append(statements.pop())
             self._close_unended()
+            self._top.statements.extend(ends)
+            ends.clear()
 
     def abandon(self) -> list[Statement]:
         """Close what is open without a word and return the task's statements."""
@@ -129,6 +136,10 @@ class FrameStack:
         if matching:
             while self._top is not matching[0]:
                 self._close_unended()
+        elif variable.name in self._crossed:
+            self._crossed.discard(variable.name)
+            self._label(span)
+            return
         elif self._top.word == "FOR":
             self._refuse_next(cursor, variable)
         else:
@@ -166,7 +177,8 @@ class FrameStack:
             code, end = ("AMX0054", "END_IF") if frame.word == "IF" else ("AMX0055", "NEXT")
             hint = f"close the block with {end}"
             if isinstance(frame.node, For):
-                hint = f"close the loop with NEXT {frame.node.variable.name[:20]}"
+                hint = f"close the loop with NEXT {frame.node.variable.name[:20]}, before the end of a block around it"
+                self._crossed.add(frame.node.variable.name)
             in_force, self._reporter.statement = self._reporter.statement, frame.number
             self._reporter.report(Fault(code, f"{frame.word} without {end}", hint), frame.span)
             self._reporter.statement = in_force

@@ -100,8 +100,10 @@ def assignable(target: DataType, value: DataType) -> bool:
 
 
 def check_constant_fits(context: Context, expression: Expression, kind: DataType, what: str) -> None:
-    """Report a constant that a variable of a numeric type cannot hold."""
+    """Report a constant that a variable of a numeric type cannot hold; no REAL at all is the parser's to report."""
     value = constant_value(expression)
+    if isinstance(value, float) and not fits(value, DataType.REAL):
+        return
     if value is not None and not fits(value, kind):
         message = f"{value} does not fit {what}: {kind.word} is {range_text(kind)}"
         context.report("AMX2007", message, expression.span, hex_hint(expression, kind))

@@ -75,7 +75,7 @@ def _check_scan_loops(context: Context, module: Module, loops: list[tuple[Call, 
         if call is not first:
             note = Note("the first SCAN_LOOP is here", first.span)
             context.report("AMX4041", "a task has only one SCAN_LOOP", call.span, notes=(note,))
-        elif id(call) not in top:
+        elif id(call) not in top and not context.broken.blocks:
             context.report("AMX4043", "SCAN_LOOP stands inside an IF or FOR block", call.span)
 
 
@@ -100,6 +100,8 @@ def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
                 statement.span,
                 "END marks the end of the scan; STOP ends a task",
             )
+    if context.broken.blocks and isinstance(_last(module), End):
+        return
     at = next((index for index, item in enumerate(layout.scan) if isinstance(item, End)), None)
     if at is None:
         if "END" not in context.broken.words and not any(isinstance(item, End) for item in layout.startup):
@@ -125,9 +127,13 @@ def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
 
 def _end_of_text(module: Module) -> Span:
     """Return the place of the last statement, the first line of an empty text."""
-    if not module.statements:
-        return Span(1, 1, 2)
-    last = module.statements[-1]
-    while any(bodies(last)):
+    last = _last(module)
+    return Span(1, 1, 2) if last is None else last.span
+
+
+def _last(module: Module) -> Statement | None:
+    """Return the last statement of the text, which may stand inside a block."""
+    last = module.statements[-1] if module.statements else None
+    while last is not None and any(bodies(last)):
         last = [body for body in bodies(last) if body][-1][-1]
-    return last.span
+    return last

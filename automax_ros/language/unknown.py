@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NoReturn
 
 from automax_ros.language.cursor import Cursor, suggestion
+from automax_ros.language.lexer import TYPE_CHARACTERS
 from automax_ros.language.tokens import BASIC_TASK_WORDS, RESERVED_WORDS, STATEMENT_WORDS, Kind
 
 _FOREIGN = {
@@ -60,6 +61,8 @@ def refuse_statement(cursor: Cursor) -> NoReturn:
     token = cursor.current
     hint: str | None = None
     if token.kind is Kind.WORD:
+        if cursor.following.kind is Kind.ERROR and cursor.following.text in tuple(TYPE_CHARACTERS):
+            cursor.advance()
         if token.text in ("THEN", "TO", "STEP", "AND", "OR", "XOR", "NOT"):
             hint = "did the line before it need an `&` at its end?"
             cursor.fail("AMX0030", f"{cursor.found()} cannot begin a statement", hint)

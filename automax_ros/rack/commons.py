@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.types import DataType, bare_name
-from automax_ros.rack.config import DEFAULT_OUT_LIMIT, MAX_VARIABLES, CommonVariable, Direction
+from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable, Direction
 from automax_ros.rack.findings import Findings, did_you_mean, quoted
 from automax_ros.rack.names import PREDEFINED, NameFault, VariableName, variable_name
 from automax_ros.rack.presets import preset_value
@@ -19,7 +19,7 @@ DESCRIPTION_LIMIT = 200
 MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
 """Range of a rate limit (decision: 2000 Hz is one message a tick of 0.5 ms)."""
 
-_OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "description")
+OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "description")
 _DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
 _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 
@@ -39,10 +39,6 @@ class CommonReader:
     def read(self, node: Node) -> tuple[CommonVariable, ...]:
         """Return the variables that are right, in the order of the file."""
         entries = entries_of(node, "common", self._findings) or ()
-        if len(entries) > MAX_VARIABLES:
-            message = f"the rack has {len(entries)} common variables; it may have at most {MAX_VARIABLES}"
-            self._findings.add("AMX6409", message, entries[MAX_VARIABLES][0].span)
-            return ()
         variables = [self._variable(key, value) for key, value in entries]
         self._report_left_closed()
         return tuple(item for item in variables if item is not None)
@@ -52,7 +48,7 @@ class CommonReader:
         options = entries_of(node, f"options of {quoted(key.text)}", self._findings)
         if declared is None or options is None:
             return None
-        section = Section(options, f"common variable {declared.name}", _OPTIONS, self._findings)
+        section = Section(options, f"common variable {declared.name}", OPTIONS, self._findings)
         self._check_predefined(key, declared, section)
         variable = CommonVariable(declared.name, declared.type, declared.dimensions, declared.length)
         preset = section.get("preset")

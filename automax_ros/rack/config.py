@@ -19,8 +19,6 @@ MAX_PROCESSORS = 4
 """Processors of one rack (J2-3106-1 p. 2-5)."""
 MAX_SLOT = 15
 """Highest slot of the largest rack (J2-3106-1 p. 10-2)."""
-MAX_VARIABLES = 65535
-"""Commons of one rack (decision: their ids in messages have 16 bits)."""
 DEFAULT_OUT_LIMIT = 200
 """Simple commons of a file that are published although it does not say so (decision)."""
 

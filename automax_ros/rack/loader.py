@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,20 +51,19 @@ def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
 
 def _text_of(path: Path, findings: Findings) -> str:
     try:
-        data = read_bytes(path)
+        data = read_bytes(path).removeprefix(codecs.BOM_UTF8)
     except FileFault as fault:
         code = "AMX6001" if fault.too_large else "AMX6000"
         findings.add(code, f"the rack file {fault}", _START)
         return ""
     try:
-        return data.decode("utf-8-sig")
+        return data.decode()
     except UnicodeDecodeError as error:
-        before = data[: error.start].decode("utf-8-sig")
-        line = before.count("\n") + 1
-        column = len(before) - (before.rfind("\n") + 1) + 1
-        message = f"the rack file is not UTF-8: byte {error.start + 1} is {data[error.start]:#04x}"
-        findings.add("AMX6002", message, Span(line, column, column + 1), "save the file as UTF-8")
-        return data.decode("utf-8-sig", errors="replace")
+        before = SourceText("", data[: error.start].decode()).lines
+        column = len(before[-1]) + 1
+        message = f"the rack file is not UTF-8: here is a byte {data[error.start]:#04x}"
+        findings.add("AMX6002", message, Span(len(before), column, column + 1), "save the file as UTF-8")
+        return data.decode(errors="replace")
 
 
 class _RackReader:

@@ -43,7 +43,7 @@ class TaskReader:
         if len(entries) > MAX_TASKS:
             message = f"{where} has {len(entries)} tasks; a Processor runs at most {MAX_TASKS}"
             self.findings.add("AMX6303", message, entries[MAX_TASKS][0].span)
-        tasks = (self._task(key, value) for key, value in entries)
+        tasks = (self._task(key, value) for key, value in entries[:MAX_TASKS])
         return tuple(task for task in tasks if task is not None)
 
     def _task(self, key: Scalar, node: Node) -> TaskConfig | None:

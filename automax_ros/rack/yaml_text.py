@@ -18,8 +18,8 @@ from automax_ros.rack.findings import Findings, quoted
 
 MAX_DEPTH = 16
 """Deepest nesting (decision: a rack file needs 6)."""
-MAX_NODES = 250_000
-"""Most keys and values of a file (decision)."""
+MAX_NODES = 100_000
+"""Most keys and values of a file (decision: seconds of reading; fewer variables than 16-bit ids can tell apart)."""
 
 
 @dataclass(frozen=True)

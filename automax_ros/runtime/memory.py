@@ -177,14 +177,14 @@ class CommonMemory:
         for view, element, value in entries:
             self._put(view, element, value)
 
-    def clear(self, *, keep_non_volatile: bool = True) -> None:
+    def clear(self, writer: int = 0, *, keep_non_volatile: bool = True) -> None:
         """Set volatile variables to 0, except what is forced: STOP ALL and system restart (2.4.5)."""
         for view, spec in enumerate(self.specs):
             if spec.non_volatile and keep_non_volatile:
                 continue
             for element in range(spec.elements):
-                if (view, element) not in self._forced:
-                    self._put(view, element, spec.type.zero)
+                if self.read_now(view, element) != spec.type.zero:
+                    self._store(view, element, spec.type.zero, writer, WriteKind.OUTSIDE)
 
     def _put(self, view: int, element: int, value: Value) -> None:
         array = self._arrays[view]

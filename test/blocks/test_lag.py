@@ -9,7 +9,9 @@ PERIODS = (500_000, TICK, 55_000_000)
 
 
 @pytest.mark.parametrize("name", ["steps", "sine", "noise"])
-@pytest.mark.parametrize(("share", "amplitude"), [(2e-5, 8000), (0.01, 8191), (0.13, 16383), (0.26, 32767), (0.7, 32767)])
+@pytest.mark.parametrize(
+    ("share", "amplitude"), [(2e-5, 8000), (0.01, 8191), (0.13, 16383), (0.26, 32767), (0.7, 32767)]
+)
 @pytest.mark.parametrize("period_ns", PERIODS)
 def test_against_scipy(period_ns, share, amplitude, name):
     c = mapping_constant(period_ns / 1e9)

@@ -8,7 +8,8 @@ C = mapping_constant(0.0055)
 
 @pytest.mark.parametrize("name", ["steps", "sine", "noise"])
 @pytest.mark.parametrize(
-    ("kp", "share", "amplitude"), [(0.001, 0.005, 30000), (0.5, 0.002, 8000), (2.0, 0.01, 500), (4.0, 0.05, 40), (128.0, 0.002, 25)]
+    ("kp", "share", "amplitude"),
+    [(0.001, 0.005, 30000), (0.5, 0.002, 8000), (2.0, 0.01, 500), (4.0, 0.05, 40), (128.0, 0.002, 25)],
 )
 @pytest.mark.parametrize("period_ns", [500_000, TICK, 55_000_000])
 def test_against_scipy(period_ns, kp, share, amplitude, name):
@@ -80,7 +81,7 @@ def test_range_of_section_51_limits_the_integrator_alone(share, span, sign):
     outputs_of(block, [sign * 32767] * 100)
     assert block.state["integrator"] == sign * span
     held = block.scan(input=sign * 2000)
-    assert held["output"] == sign * min(span + 1000, 32767)
+    assert held["output"] == sorted((-32768, sign * (span + 1000), 32767))[1]
 
 
 def test_holds_stop_the_integrator_but_not_kp_times_input():

@@ -154,7 +154,9 @@ def test_direction_is_out_for_the_first_200_simple_commons_and_closed_for_arrays
 
 
 def test_all_errors_come_in_one_pass_in_the_order_of_the_file(tmp_path):
-    text = "rack: L-1\nslots:\n  0: {module: 57C435, tick_ms: 3.3, tasks: {A: {priority: 1}}}\ncommon:\n  IF:\n  A%: 5\n"
+    text = (
+        "rack: L-1\nslots:\n  0: {module: 57C435, tick_ms: 3.3, tasks: {A: {priority: 1}}}\ncommon:\n  IF:\n  A%: 5\n"
+    )
     places = [(item.code, item.span.line) for item in loaded(tmp_path, text).diagnostics]
     assert places == [
         ("AMX6100", 1),

@@ -9,6 +9,7 @@ import automax_ros.core
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.loader import LoadResult, load
+
 from .helpers import write
 
 PAGES = Path(automax_ros.core.__file__).parent / "pages"

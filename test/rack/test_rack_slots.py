@@ -1,4 +1,4 @@
-"""Which module may stand where: the rules of J2-3106-1 p. 10-2 and J-3636 p. 1-1, checked against a model of their own."""
+"""Which module may stand where (J2-3106-1 p. 10-2, J-3636 p. 1-1), checked against the rules said once more."""
 
 from itertools import product
 

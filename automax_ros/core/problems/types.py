@@ -23,4 +23,5 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX2016", "REAL constant of a block without its decimal point"),
     Problem("AMX2017", "READ finds no DATA value of its kind"),
     Problem("AMX2018", "tuning value of another kind"),
+    Problem("AMX2019", "constant argument out of range"),
 )

@@ -1,0 +1,226 @@
+"""What happens in a rack as messages: variable table, images, write log, scans, states, values of commons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from itertools import groupby
+
+from automax_ros.bags.messages import (
+    Bool,
+    CommonImage,
+    CommonWrite,
+    Float32,
+    Float32MultiArray,
+    Int16,
+    Int16MultiArray,
+    Int32,
+    Int32MultiArray,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    NO_LAYOUT,
+    NO_VALUES,
+    Scan,
+    ScanError,
+    String,
+    TaskState,
+    UInt8MultiArray,
+    Values,
+    Variable,
+    VariableTable,
+    VariableType,
+    Writer,
+)
+from automax_ros.core.types import DataType, Value
+from automax_ros.rack.config import CommonVariable, Direction
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.ros_names import topic_names
+from automax_ros.runtime.memory import Latched, Write
+from automax_ros.runtime.task import ScanRecord, Task
+
+VARIABLE_TYPES = {
+    DataType.INTEGER: VariableType.INTEGER,
+    DataType.DOUBLE: VariableType.DOUBLE_INTEGER,
+    DataType.REAL: VariableType.REAL,
+    DataType.BOOLEAN: VariableType.BOOLEAN,
+    DataType.STRING: VariableType.STRING,
+}
+Message = tuple[object, ...]
+_SCALARS: dict[DataType, Callable[[Value], Message]] = {
+    DataType.INTEGER: lambda value: Int16(value),  # type: ignore[arg-type]
+    DataType.DOUBLE: lambda value: Int32(value),  # type: ignore[arg-type]
+    DataType.REAL: lambda value: Float32(value),  # type: ignore[arg-type]
+    DataType.BOOLEAN: lambda value: Bool(value),  # type: ignore[arg-type]
+    DataType.STRING: lambda value: String(value),  # type: ignore[arg-type]
+}
+_ARRAYS: dict[DataType, type[Message]] = {
+    DataType.INTEGER: Int16MultiArray,
+    DataType.DOUBLE: Int32MultiArray,
+    DataType.REAL: Float32MultiArray,
+    DataType.BOOLEAN: UInt8MultiArray,
+}
+
+
+def values_of(entries: Iterable[tuple[int, int, Value]]) -> Values:
+    """Return (view, element, value) entries as a Values message."""
+    variables: list[int] = []
+    elements: list[int] = []
+    numbers: list[float] = []
+    texts: list[str] = []
+    for view, element, value in entries:
+        variables.append(view)
+        elements.append(element)
+        if isinstance(value, str):
+            texts.append(value)
+            numbers.append(0.0)
+        else:
+            numbers.append(value)
+    return Values(variables, elements, numbers, texts) if variables else NO_VALUES
+
+
+def value_type_name(variable: CommonVariable) -> str | None:
+    """Return the ROS type of a variable's topic, None for arrays of strings, which std_msgs cannot carry."""
+    message = _ARRAYS.get(variable.type) if variable.is_array else _SCALAR_CLASSES[variable.type]
+    return f"std_msgs/msg/{message.__name__}" if message else None
+
+
+_SCALAR_CLASSES: dict[DataType, type[Message]] = {
+    DataType.INTEGER: Int16,
+    DataType.DOUBLE: Int32,
+    DataType.REAL: Float32,
+    DataType.BOOLEAN: Bool,
+    DataType.STRING: String,
+}
+
+
+def value_message(variable: CommonVariable, values: Sequence[Value]) -> Message:
+    """Return the message of a variable's topic; an array's layout names its dimensions."""
+    if not variable.is_array:
+        return _SCALARS[variable.type](values[0])
+    return _ARRAYS[variable.type](_layout(variable.dimensions), values)
+
+
+def _layout(dimensions: tuple[int, ...]) -> MultiArrayLayout:
+    if not dimensions:
+        return NO_LAYOUT
+    parts = []
+    for number, size in enumerate(dimensions):
+        stride = 1
+        for inner in dimensions[number:]:
+            stride *= inner
+        parts.append(MultiArrayDimension(f"subscript{number + 1}", size, stride))
+    return MultiArrayLayout(parts, 0)
+
+
+class RackMessages:
+    """Makes the messages of one run of a rack.
+
+    ``run_id`` is the number of the run; ``epoch_ns`` is added to rack time to give stamps: 0 in simulated time, the
+    wall clock at the start else.
+    """
+
+    def __init__(self, rack: Rack, run_id: int, epoch_ns: int) -> None:
+        """Begin with the numbering of the write log."""
+        self._rack = rack
+        self._run_id = run_id
+        self._epoch_ns = epoch_ns
+        self._sequence = 0
+        self._slots = {writer.id: writer.slot for writer in rack.writers}
+        self._latched: dict[str, Latched] = {}
+        self._views = {task.name: [rack.memory.view(name) for name in task.compiled.latched] for task in rack.tasks}
+
+    def stamp(self, now_ns: int) -> int:
+        """Return the stamp of an instant of rack time."""
+        return self._epoch_ns + now_ns
+
+    def table(self) -> VariableTable:
+        """Return the table of variables and writers."""
+        config = self._rack.config
+        home = config.common_memory.slot if config.common_memory else 0
+        topics = topic_names(variable.name for variable in config.variables)
+        variables = [
+            Variable(
+                number,
+                variable.name,
+                VARIABLE_TYPES[variable.type],
+                variable.dimensions,
+                variable.length,
+                home,
+                variable.non_volatile,
+                variable.direction,
+                f"/{config.namespace}/{topics[variable.name]}" if variable.direction is not Direction.CLOSED else "",
+                variable.unit,
+                variable.description,
+            )
+            for number, variable in enumerate(config.variables)
+        ]
+        writers = [Writer(writer.id, writer.name, writer.kind, writer.slot) for writer in self._rack.writers]
+        return VariableTable(self.stamp(0), config.name, self._run_id, variables, writers)
+
+    def image(self, now_ns: int) -> CommonImage:
+        """Return all of common memory as it is."""
+        return CommonImage(self.stamp(now_ns), self._run_id, self._sequence, values_of(self._rack.memory.image()))
+
+    def writes(self, writes: Sequence[Write]) -> list[CommonWrite]:
+        """Return entries of the write log, those of one writer, kind and instant together."""
+        messages = []
+        for (time_ns, writer, kind), group in groupby(writes, key=lambda entry: (entry[1], entry[2], entry[3])):
+            self._sequence += 1
+            messages.append(
+                CommonWrite(
+                    self.stamp(time_ns),
+                    self._run_id,
+                    writer,
+                    self._slots[writer],
+                    kind,
+                    self._sequence,
+                    values_of((entry[4], entry[5], entry[6]) for entry in group),
+                )
+            )
+        return messages
+
+    def scan(self, task: Task, record: ScanRecord, *, full: bool) -> Scan:
+        """Return the message of a scan; unless ``full``, only what was latched anew since the task's last message."""
+        name = task.name
+        latched, before = record.latched, self._latched.get(name)
+        if record.scan:
+            self._latched[name] = latched
+        full = full or before is None
+        views = self._views[name]
+        if full or before is None:
+            changed = [(view, 0, value) for view, value in zip(views, latched, strict=False)]
+        elif latched == before:
+            changed = []
+        else:
+            triples = zip(views, latched, before, strict=True)
+            changed = [(view, 0, value) for view, value, old in triples if value != old]
+        return Scan(
+            self.stamp(record.time_ns),
+            task.slot,
+            name,
+            record.scan,
+            min(record.duration_ns, 0xFFFFFFFF),
+            min(record.skipped, 0xFFFFFFFF),
+            full,
+            values_of(changed) if changed else NO_VALUES,
+            values_of(record.reads) if record.reads else NO_VALUES,
+            values_of(record.writes) if record.writes else NO_VALUES,
+            values_of((view, 0, value) for view, value in record.commits) if record.commits else NO_VALUES,
+            [ScanError(line, code) for line, code in record.errors],
+        )
+
+    def state(self, task: Task, now_ns: int) -> TaskState:
+        """Return a snapshot of a task's state."""
+        layout = task.layout
+        values = task.snapshot()
+        return TaskState(
+            self.stamp(now_ns),
+            task.slot,
+            task.name,
+            task.scan_number,
+            layout.hash,
+            task.compiled.program.source_hash,
+            [field.name for field in layout.fields],
+            [field.size for field in layout.fields],
+            [0.0 if isinstance(value, str) else float(value) for value in values],
+            [value for value in values if isinstance(value, str)],
+        )

@@ -1,0 +1,60 @@
+"""Checks every task of a rack against the rack: its commons, and the tick of the Processor that runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.language.checker import CheckResult, check
+from automax_ros.language.program import CommonSpec
+from automax_ros.rack.config import ProcessorConfig, RackConfig, TaskConfig
+from automax_ros.rack.files import FileFault
+from automax_ros.rack.task_source import read_task_source
+
+
+class CheckedTask(NamedTuple):
+    """One task of a rack with what its check found; ``source`` is what the diagnostics refer to."""
+
+    task: TaskConfig
+    source: SourceText
+    result: CheckResult
+
+
+def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
+    """Return the rack's common variables by full name, as the checker compares them with a task's COMMON."""
+    return {
+        variable.name: CommonSpec(
+            name=variable.name,
+            type=variable.type,
+            place=f"{config.path.name}:{variable.line}",
+            dimensions=variable.dimensions,
+            length=variable.length,
+        )
+        for variable in config.variables
+    }
+
+
+def check_tasks(config: RackConfig) -> list[CheckedTask]:
+    """Check all tasks of a rack, Processors in the order of slots, tasks in the order of the file.
+
+    A source that could be read when the rack file was loaded, but cannot be any more, is an error of its task (AMX6306).
+    """
+    commons = commons_of(config)
+    return [
+        _checked(processor, task, commons, config) for processor in config.processors for task in processor.tasks
+    ]
+
+
+def _checked(
+    processor: ProcessorConfig, task: TaskConfig, commons: Mapping[str, CommonSpec], config: RackConfig
+) -> CheckedTask:
+    try:
+        source = read_task_source(task.file)
+    except FileFault as fault:
+        place = SourceText(str(config.path), config.text)
+        gone = Diagnostic("AMX6306", f"the source {task.file.name} of task {task.name} {fault}", Span(task.line, 1, 2))
+        return CheckedTask(task, place, CheckResult(None, [gone]))
+    result = check(source, name=task.name, catalogue=CATALOGUE, tick_ns=processor.tick_ns, commons=commons)
+    return CheckedTask(task, source, result)

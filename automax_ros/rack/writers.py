@@ -1,0 +1,55 @@
+"""Who writes common memory: the ids under which the write log knows tasks and sources outside the tasks."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from automax_ros.rack.config import RackConfig
+
+
+class WriterKind(enum.IntEnum):
+    """What a writer is; the numbers are those of ``Writer.kind``."""
+
+    TASK = 1
+    ROS = 2
+    PRESET = 3
+    OPERATOR = 6
+
+
+@dataclass(frozen=True)
+class WriterSpec:
+    """One writer: ``slot`` is that of its module, the common memory's for sources outside the tasks."""
+
+    id: int
+    name: str
+    kind: WriterKind
+    slot: int
+
+    @property
+    def is_task(self) -> bool:
+        """Whether it is a task of the rack."""
+        return self.kind is WriterKind.TASK
+
+
+PRESET_WRITER, ROS_WRITER, OPERATOR_WRITER = 0, 1, 2
+_FIRST_TASK = 3
+
+
+def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
+    """Return all writers of a rack, in the order of their ids: outside sources, then tasks by slot and name."""
+    home = config.common_memory.slot if config.common_memory else 0
+    outside = [
+        WriterSpec(PRESET_WRITER, "rack", WriterKind.PRESET, home),
+        WriterSpec(ROS_WRITER, "ros", WriterKind.ROS, home),
+        WriterSpec(OPERATOR_WRITER, "operator", WriterKind.OPERATOR, home),
+    ]
+    tasks = [
+        (module.slot, task.name)
+        for module in sorted(config.processors, key=lambda module: module.slot)
+        for task in sorted(module.tasks, key=lambda task: task.name)
+    ]
+    return (
+        *outside,
+        *(WriterSpec(number, name, WriterKind.TASK, slot) for number, (slot, name) in enumerate(tasks, _FIRST_TASK)),
+    )

@@ -1,0 +1,1 @@
+"""Tests of recordings: message bytes, writer, reader, export."""
