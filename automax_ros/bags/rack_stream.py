@@ -27,11 +27,15 @@ SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of the stream: full name, ROS type and quality of service."""
+    """A topic of the stream: full name, ROS type, quality of service; ``slot`` of the module that sends on it.
+
+    Several modules send on one topic: each has a Topic of its own. ``slot`` None is the common memory.
+    """
 
     name: str
     type_name: str
     qos: QosProfile
+    slot: int | None = None
 
 
 Sink = Callable[[Topic, int, bytes], None]
@@ -62,8 +66,11 @@ class RackStream:
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
-        self.scans_topic = Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN)
-        self.states_topic = Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN)
+        slots = [processor.slot for processor in rack.processors]
+        self.scans_topics = {slot: Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN, slot) for slot in slots}
+        self.states_topics = {
+            slot: Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN, slot) for slot in slots
+        }
         self._values = self._value_topics(space)
         self._sinks: list[Sink] = []
         self._encoders = {name: encoder(name) for name in NAMES.values() if name.startswith("automax_msgs/")}
@@ -72,8 +79,13 @@ class RackStream:
     @property
     def topics(self) -> list[Topic]:
         """All topics of the stream."""
-        fixed = [self.variables_topic, self.snapshot_topic, self.backplane_topic, self.scans_topic, self.states_topic]
+        fixed = [self.variables_topic, self.snapshot_topic, self.backplane_topic, *self.module_topics]
         return [*fixed, *(value.topic for value in self._values.values())]
+
+    @property
+    def module_topics(self) -> list[Topic]:
+        """The topics that Processors send on."""
+        return [*self.scans_topics.values(), *self.states_topics.values()]
 
     def value_topic(self, variable: CommonVariable) -> Topic | None:
         """Return the topic of a variable, None if it has none."""
@@ -100,7 +112,7 @@ class RackStream:
             if value.waits:
                 self._send_value(view, value, now)
         for task in self._rack.tasks:
-            self._put(self.states_topic, self._messages.stamp(now), self._messages.state(task, now))
+            self._send_state(task, now)
 
     # RackObserver
 
@@ -108,11 +120,12 @@ class RackStream:
         """Send a scan, its writes and the values that changed; every now and then a snapshot before it."""
         now = record.time_ns
         full = now >= self._next_snapshot.get(task.name, 0) and record.scan > 0
-        self._put(self.scans_topic, self._messages.stamp(now), self._messages.scan(task, record, full=full))
+        message = self._messages.scan(task, record, full=full)
+        self._put(self.scans_topics[task.slot], message.stamp, message)
         if writes:
             self._send_writes(writes, now)
         if full or not record.scan:
-            self._put(self.states_topic, self._messages.stamp(now), self._messages.state(task, now))
+            self._send_state(task, now)
         if full:
             self._next_snapshot[task.name] = (now // SNAPSHOT_PERIOD_NS + 1) * SNAPSHOT_PERIOD_NS
             if now >= self._next_snapshot.get("", SNAPSHOT_PERIOD_NS):
@@ -126,7 +139,7 @@ class RackStream:
     def all_stopped(self, reason: str, now_ns: int) -> None:
         """Send the states in which the tasks were stopped."""
         for task in self._rack.tasks:
-            self._put(self.states_topic, self._messages.stamp(now_ns), self._messages.state(task, now_ns))
+            self._send_state(task, now_ns)
 
     def _value_topics(self, space: str) -> dict[int, _ValueTopic]:
         variables = self._rack.config.variables
@@ -137,6 +150,10 @@ class RackStream:
             if variable.direction is not Direction.CLOSED and type_name is not None:
                 topics[view] = _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
         return topics
+
+    def _send_state(self, task: Task, now_ns: int) -> None:
+        message = self._messages.state(task, now_ns)
+        self._put(self.states_topics[task.slot], message.stamp, message)
 
     def _send_image(self, now_ns: int) -> None:
         self._put(self.snapshot_topic, self._messages.stamp(now_ns), self._messages.image(now_ns))

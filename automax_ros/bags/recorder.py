@@ -5,13 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import automax_ros
+from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.rack_stream import RackStream, Topic
 from automax_ros.bags.writer import BagWriter, Channel
 from automax_ros.rack.rack import Rack
 
 
 class Recorder:
-    """Records one run. Make it before the rack is started; ``close`` finishes the bag."""
+    """Records one run. Make it before the rack is started; ``close`` finishes the bag.
+
+    When the disk refuses, recording ends and ``failure`` tells why; the rack goes on.
+    """
 
     def __init__(self, rack: Rack, stream: RackStream, folder: Path) -> None:
         """Create the bag and take part in the stream.
@@ -19,6 +23,7 @@ class Recorder:
         Raises:
             RecordingError: the folder exists already or cannot be written.
         """
+        self.failure: RecordingError | None = None
         config = rack.config
         self._writer = BagWriter(
             folder,
@@ -42,7 +47,13 @@ class Recorder:
         Raises:
             RecordingError: the disk refuses.
         """
-        self._writer.close()
+        if self.failure is None:
+            self._writer.close()
 
     def _take(self, topic: Topic, stamp: int, payload: bytes) -> None:
-        self._writer.write(self._channels[topic.name], stamp, payload)
+        if self.failure is not None:
+            return
+        try:
+            self._writer.write(self._channels[topic.name], stamp, payload)
+        except RecordingError as error:
+            self.failure = error

@@ -6,7 +6,6 @@ import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import prod
 
 from automax_ros.bags.messages import Variable, VariableTable, VariableType
 
@@ -101,11 +100,6 @@ def flat_index(subscripts: Sequence[int], dimensions: Sequence[int]) -> int:
     for subscript, size in zip(subscripts, dimensions, strict=True):
         index = index * size + subscript
     return index
-
-
-def element_count(entry: Variable) -> int:
-    """Return how many values a variable has: 1, or the elements of an array."""
-    return prod(entry.dimensions)
 
 
 def _element_name(entry: Variable) -> str:

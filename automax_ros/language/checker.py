@@ -24,7 +24,9 @@ from automax_ros.language.tree import Call, Declaration, Module, Read, Statement
 from automax_ros.language.unconfirmed_check import find_unconfirmed
 
 AUTOMAX = Processor.AUTOMAX
-_TOO_MANY = "AMX0002"
+_TOO_LARGE, _TOO_MANY = "AMX0001", "AMX0002"
+_NOT_READ = (_TOO_LARGE, _TOO_MANY)
+"""Findings of the parser after which the tree is not the whole task."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ def check(
     At most DIAGNOSTIC_LIMIT problems are reported, by one more that says so.
     """
     module, found = parse(source)
-    if any(item.code == _TOO_MANY for item in found):
+    if any(item.code in _NOT_READ for item in found):
         return CheckResult(None, in_order(found))
     context = Context(target, tick_ns, catalogue, commons, broken_lines(source, found), list(found))
     layout = None

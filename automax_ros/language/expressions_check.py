@@ -63,10 +63,12 @@ def check_variable(context: Context, target: Variable | Element) -> DataType | N
     The type counts as not known where a whole array stands for a value, and where the variable is not declared but one
     with another type character is: that one was meant.
     """
-    if isinstance(target, Element):
-        for subscript in target.subscripts:
-            check_integer(context, subscript, "AMX2010", f"a subscript of {target.name}")
     symbol = context.symbols.get(target.name)
+    for subscript in target.subscripts if isinstance(target, Element) else ():
+        if symbol is None:
+            check_expression(context, subscript)
+        else:
+            check_integer(context, subscript, "AMX2010", f"a subscript of {target.name}")
     if symbol is None:
         _report_undeclared(context, target)
         return None if _has_twin(context, target.name) else target.type

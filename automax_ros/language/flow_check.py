@@ -75,7 +75,7 @@ def check_flow(context: Context, layout: TaskLayout) -> None:
     if jumps_are_good:
         targets = frozenset(jump.line for jump in jumps)
         _check_reached(context, layout.startup, targets, None)
-        _check_reached(context, layout.scan, targets, layout.scan_loop_line)
+        _check_reached(context, _up_to_end(layout.scan), targets, layout.scan_loop_line)
 
 
 def _collect(layout: TaskLayout) -> tuple[dict[int, Place], list[Jump]]:
@@ -179,7 +179,7 @@ def _check_reached(
         line = line if statement.number is None else statement.number
         if statement.number in targets:
             ended = None
-        if ended is not None and not isinstance(statement, (*_IDLE, End)):
+        if ended is not None and not isinstance(statement, _IDLE):
             context.line = line
             note = Note("the task always leaves here", ended)
             context.report("AMX4054", "this statement is never reached", statement.span, notes=(note,))
@@ -189,6 +189,12 @@ def _check_reached(
         if _leaves(statement, targets):
             ended = statement.span
     return line
+
+
+def _up_to_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Return the statements before END; what stands behind it is an error of its own."""
+    at = next((index for index, item in enumerate(statements) if isinstance(item, End)), len(statements))
+    return statements[:at]
 
 
 def _leaves(statement: Statement, targets: frozenset[int]) -> bool:

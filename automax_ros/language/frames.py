@@ -19,8 +19,8 @@ NESTING_LIMIT = 16
 class Frame:
     """A block whose end was not read yet.
 
-    ``node`` is its IF or FOR without a body, None where the head was wrong: then the statements inside go to the block
-    around. ``doubtful`` blocks may have no end of their own: a wrong head does not tell.
+    ``node`` is its IF or FOR without a body, None where the head was wrong: then ``body`` is the list of the block
+    around it. ``doubtful`` blocks may have no end of their own: a wrong head does not tell.
     """
 
     word: str
@@ -37,12 +37,12 @@ class Frame:
         return self.body if self.otherwise is None else self.otherwise
 
     def closed(self) -> list[Statement]:
-        """Return the statement that the block is, or the statements in it where its head was wrong."""
+        """Return the statement that the block is, none where its head was wrong."""
         if isinstance(self.node, If):
             return [dataclasses.replace(self.node, then=tuple(self.body), otherwise=tuple(self.otherwise or ()))]
         if isinstance(self.node, For):
             return [dataclasses.replace(self.node, body=tuple(self.body))]
-        return [*self.body, *(self.otherwise or ())]
+        return []
 
 
 class FrameStack:
@@ -83,7 +83,7 @@ class FrameStack:
         word = "IF" if isinstance(node, If) else "FOR"
         frame = Frame(word, dataclasses.replace(node, number=self._number, span=span), span, self._reporter.statement)
         if self.depth >= NESTING_LIMIT:
-            frame.node = None
+            frame.node, frame.body = None, self._top.statements
             if self.depth == NESTING_LIMIT:
                 self._reporter.report(too_deep(word), cursor.tokens[max(cursor.position - 1, 0)].span)
             self.end_line(span)
@@ -93,7 +93,8 @@ class FrameStack:
     def open_wrong(self, word: str, span: Span, doubtful: bool) -> None:
         """Begin a block whose head was wrong."""
         self.end_line(span)
-        self._frames.append(Frame(word, None, span, self._reporter.statement, doubtful=doubtful))
+        around = self._top.statements
+        self._frames.append(Frame(word, None, span, self._reporter.statement, around, doubtful=doubtful))
 
     def close_all(self) -> None:
         """Report and close every block that is still open at the end of the text; the END there stays the task's."""
@@ -119,7 +120,7 @@ class FrameStack:
         if frame.word != "IF" or frame.otherwise is not None:
             self._refuse_else(cursor, frame)
         self._label(span)
-        frame.otherwise = []
+        _turn_to_else(frame)
 
     def end_if(self, cursor: Cursor, span: Span) -> None:
         """END_IF: its line number becomes a label behind the block."""
@@ -132,9 +133,9 @@ class FrameStack:
 
     def next(self, cursor: Cursor, variable: Variable, span: Span) -> None:
         """NEXT: its line number becomes a label at the end of the loop's body."""
-        matching = [frame for frame in reversed(self._frames) if _loops_over(frame, variable.name)][:1]
-        if matching:
-            while self._top is not matching[0]:
+        matching = next((frame for frame in reversed(self._frames) if _loops_over(frame, variable.name)), None)
+        if matching is not None:
+            while self._top is not matching:
                 self._close_unended()
         elif variable.name in self._crossed:
             self._crossed.discard(variable.name)
@@ -153,7 +154,7 @@ class FrameStack:
         frame = self._top
         if frame.word == "IF" and word == "ELSE" and frame.otherwise is None:
             self._label(span)
-            frame.otherwise = []
+            _turn_to_else(frame)
         elif (frame.word, word) in (("IF", "END_IF"), ("FOR", "NEXT")):
             self._pop()
 
@@ -208,6 +209,10 @@ class FrameStack:
         if isinstance(last, If) and last.one_line:
             return "an IF with a statement behind THEN ends on its line; for a block put nothing behind THEN"
         return None
+
+
+def _turn_to_else(frame: Frame) -> None:
+    frame.otherwise = [] if frame.node is not None else frame.body
 
 
 def _loops_over(frame: Frame, name: str) -> bool:

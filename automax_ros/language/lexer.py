@@ -42,7 +42,10 @@ _FOREIGN = {
     ">>": "write SHIFTR%(value, places)",
     "!=": "`not equal` is written `<>`",
 }
+_PLAIN = {"mark": Kind.MARK, "separator": Kind.SEPARATOR}
 TYPE_CHARACTERS = "%!@$"
+BROKEN_END = "&!"
+"""Text of an ERROR token behind which the statement goes on in the next line all the same."""
 
 
 class LineLexer:
@@ -59,54 +62,58 @@ class LineLexer:
         """
         result: list[Token] = []
         position, length = start, len(text)
+        match_at = _TOKEN.match
         while position < length:
-            match = _TOKEN.match(text, position)
+            match = match_at(text, position)
             if match is None:
-                token = self._other(text, line, position, result)
-            elif match.lastgroup == "blank":
-                position = match.end()
+                token = self._other(text, Span(line, position + 1, position + 2), result)
+                result.append(token._replace(offset=offset + position))
+                position = token.end_column - 1
                 continue
-            else:
+            group, end = match.lastgroup, match.end()
+            kind = _PLAIN.get(group or "")
+            if kind is not None:
+                result.append(Token(kind, match.group(), line, position + 1, end + 1, offset + position))
+            elif group != "blank":
                 token = self._token(match, line, result)
-            result.append(token._replace(offset=offset + position))
-            position = token.span.end_column - 1
+                result.append(token._replace(offset=offset + position))
+                end = token.end_column - 1
+            position = end
         return result
 
     def remark(self, text: str, line: int, start: int, mark: str) -> Token:
         """Return the remark that goes from index ``start`` to the end of the line; its text begins behind ``mark``."""
         body = text[start + len(mark) :].strip(BLANKS)
         end = len(text.rstrip(BLANKS))
-        return Token(Kind.REMARK, mark.upper(), Span(line, start + 1, max(end, start + 1) + 1), value=body)
+        return Token(Kind.REMARK, mark.upper(), line, start + 1, max(end, start + 1) + 1, value=body)
 
     def _token(self, match: re.Match[str], line: int, before: list[Token]) -> Token:
-        group, text, start = match.lastgroup, match.group(), match.start()
-        span = Span(line, start + 1, match.end() + 1)
+        group, text = match.lastgroup, match.group()
+        column, end_column = match.start() + 1, match.end() + 1
         if group == "name":
-            return self._name(match, span, before)
-        if group == "separator":
-            return Token(Kind.SEPARATOR, text, span)
-        if group == "mark":
-            return Token(Kind.MARK, text, span)
+            return self._name(match, line, before)
         if group == "operator":
             sign = text if len(text) == 1 else text[0] + text[-1]
-            return Token(Kind.OPERATOR, "<>" if sign == "><" else sign, span)
+            return Token(Kind.OPERATOR, "<>" if sign == "><" else sign, line, column, end_column)
         if group == "string":
-            return Token(Kind.STRING, text, span, value=text[1:-1], fault=string_fault(text[1:-1]))
+            return Token(Kind.STRING, text, line, column, end_column, value=text[1:-1], fault=string_fault(text[1:-1]))
         if group == "foreign":
-            return _foreign(text[0] + text[-1] if len(text) > 1 else text, span)
-        return self._number(match, span)
+            return _foreign(text[0] + text[-1] if len(text) > 1 else text, Span(line, column, end_column))
+        return self._number(match, Span(line, column, end_column))
 
-    def _name(self, match: re.Match[str], span: Span, before: list[Token]) -> Token:
+    def _name(self, match: re.Match[str], line: int, before: list[Token]) -> Token:
         text = match.group()
         upper = text.upper()
+        column, end_column = match.start() + 1, match.end() + 1
         if upper != text:
-            self._saw_lower(text, span)
+            self._saw_lower(text, Span(line, column, end_column))
         if upper in ("REM", "REM!") and _begins_statement(before):
-            return self.remark(match.string, span.line, match.start(), text[:3])
-        return Token(Kind.NAME if upper[-1] in TYPE_CHARACTERS else Kind.WORD, upper, span)
+            return self.remark(match.string, line, match.start(), text[:3])
+        return Token(Kind.NAME if upper[-1] in TYPE_CHARACTERS else Kind.WORD, upper, line, column, end_column)
 
     def _number(self, match: re.Match[str], span: Span) -> Token:
         text, source, end = match.group(), match.string, match.end()
+        place = (span.line, span.column, span.end_column)
         tail = _WORD_TAIL.match(source, end)
         if tail is not None and tail.group():
             return _bad_number(text, tail.group(), Span(span.line, span.column, tail.end() + 1))
@@ -115,35 +122,32 @@ class LineLexer:
             self._saw_lower(text, span)
         if match.lastgroup == "hex":
             value, fault = hexadecimal_fault(upper)
-            return Token(Kind.INTEGER, upper, span, value=value, fault=fault)
+            return Token(Kind.INTEGER, upper, *place, value=value, fault=fault)
         if upper.isdigit():
             value, fault = integer_value(upper)
-            return Token(Kind.INTEGER, upper, span, value=value, fault=fault)
-        return Token(Kind.REAL, upper, span, value=float(upper), fault=real_fault(upper))
+            return Token(Kind.INTEGER, upper, *place, value=value, fault=fault)
+        return Token(Kind.REAL, upper, *place, value=float(upper), fault=real_fault(upper))
 
-    def _other(self, text: str, line: int, position: int, before: list[Token]) -> Token:
+    def _other(self, text: str, here: Span, before: list[Token]) -> Token:
+        position = here.column - 1
         char = text[position]
-        here = Span(line, position + 1, position + 2)
         if char == "!":
             unequal = text[position : position + 2] == "!=" and text[position + 2 : position + 3] != "="
             if unequal and not _begins_statement(before):
-                return _foreign("!=", Span(line, position + 1, position + 3))
-            return self.remark(text, line, position, "!")
+                return _foreign("!=", Span(here.line, position + 1, position + 3))
+            return self.remark(text, here.line, position, "!")
         if char == "&":
             return _ampersand(text, here)
         if char in "\"'":
             return _open_string(text, here)
         if char in "%@$" and before and before[-1].is_name:
-            fault = Fault(
-                "AMX0029",
-                f"the type character `{char}` does not stand right behind its name",
-                f"write {before[-1].text[:40]}{char} without a blank" if before[-1].kind is Kind.WORD else None,
-            )
-            return Token(Kind.ERROR, char, here, fault=fault)
+            name = before[-1]
+            hint = f"write {name.text[:40]}{char} without a blank" if name.kind is Kind.WORD else None
+            return _error(char, here, "AMX0029", f"the type character `{char}` is apart from its name", hint)
         strange = _STRANGE.match(text, position)
         if strange is not None:
-            here = Span(line, position + 1, strange.end() + 1)
-        return Token(Kind.ERROR, char, here, fault=_unknown_character(char))
+            here = Span(here.line, position + 1, strange.end() + 1)
+        return _unknown_character(char, here)
 
     def _saw_lower(self, text: str, span: Span) -> None:
         if self.lower_case is None:
@@ -155,64 +159,67 @@ def _begins_statement(before: list[Token]) -> bool:
     return not before or before[-1].kind is Kind.SEPARATOR or before[-1].text in ("THEN", "ELSE")
 
 
+def _error(text: str, span: Span, code: str, message: str, hint: str | None) -> Token:
+    return Token(Kind.ERROR, text, span.line, span.column, span.end_column, fault=Fault(code, message, hint))
+
+
 def _foreign(text: str, span: Span) -> Token:
-    return Token(
-        Kind.ERROR, text, span, fault=Fault("AMX0038", f"`{text}` is not an operator of this language", _FOREIGN[text])
-    )
+    return _error(text, span, "AMX0038", f"`{text}` is not an operator of this language", _FOREIGN[text])
 
 
 def _bad_number(text: str, tail: str, span: Span) -> Token:
-    word = printable(text + tail)
+    word = printable(text[:40] + tail[:40])
     word = word if len(word) <= 40 else word[:40] + "..."
     hint = "put a blank between a number and a word"
     if all(char in "0123456789ABCDEFabcdef" for char in text + tail):
         hint = "a hexadecimal constant ends with H: " + (text + tail)[:40].upper() + "H"
     elif tail[0] == ".":
         hint = "a constant has one decimal point"
-    return Token(Kind.ERROR, word, span, fault=Fault("AMX0023", f"`{word}` is not a number", hint))
+    return _error(word, span, "AMX0023", f"`{word}` is not a number", hint)
 
 
 def _ampersand(text: str, here: Span) -> Token:
-    rest = text[here.column :].strip(BLANKS)
+    rest = text[here.column : here.column + 200].strip(BLANKS) or text[here.column :].strip(BLANKS)
     if not rest:
-        return Token(Kind.CONTINUE, "&", here)
-    hint = "a remark may stand on the statement's first or last line" if rest[0] == "!" else "`and` is written AND"
-    if rest[:1] in ("H", "h"):
+        return Token(Kind.CONTINUE, "&", here.line, here.column, here.end_column)
+    remark = rest[0] == "!"
+    hint = "a remark may stand on the statement's first or last line" if remark else "`and` is written AND"
+    if rest[0] in "Hh":
         hint = "a hexadecimal constant is written 0FFH"
     # A remark behind the `&` shows that a continuation was meant: the statement goes on, with this one fault.
-    end = here.end_column if rest[0] != "!" else len(text) + 1
-    fault = Fault("AMX0015", "`&` is not the last character of its line", hint)
-    return Token(Kind.ERROR, "&!" if rest[0] == "!" else "&", Span(here.line, here.column, end), fault=fault)
+    end = len(text) + 1 if remark else here.end_column
+    span = Span(here.line, here.column, end)
+    return _error(BROKEN_END if remark else "&", span, "AMX0015", "`&` is not the last character of its line", hint)
 
 
 def _open_string(text: str, here: Span) -> Token:
-    ended = len(text.rstrip(BLANKS))
-    continues = text[ended - 1] == "&"
-    fault = Fault("AMX0020", "the string is not closed", f"end it with {text[here.column - 1]} on the same line")
-    return Token(
-        Kind.ERROR,
-        "&!" if continues else text[here.column - 1],
-        Span(here.line, here.column, len(text) + 1),
-        fault=fault,
-    )
+    quote = text[here.column - 1]
+    continues = text.rstrip(BLANKS).endswith("&")
+    span = Span(here.line, here.column, len(text) + 1)
+    hint = f"end it with {quote} on the same line; a remark begins with `!`"
+    return _error(BROKEN_END if continues else quote, span, "AMX0020", "the string is not closed", hint)
 
 
-def _unknown_character(char: str) -> Fault:
-    hints = {
-        "%": "`%` is the type character of an INTEGER and stands right behind a name",
-        "@": "`@` is the type character of a BOOLEAN and stands right behind a name",
-        "$": "`$` is the type character of a STRING and stands right behind a name",
-        "?": "write PRINT",
-        "|": "write OR",
-        "~": "write NOT",
-        "{": "subscripts stand in ( ) or [ ]",
-        "}": "subscripts stand in ( ) or [ ]",
-        ".": "a real constant needs a digit: 0.5",
-        "`": "strings stand in \" or '",
-        "\N{LEFT DOUBLE QUOTATION MARK}": "strings stand in \" or '",
-        "\N{RIGHT DOUBLE QUOTATION MARK}": "strings stand in \" or '",
-        "\N{EN DASH}": "a minus sign is `-`",
-        "\N{MINUS SIGN}": "a minus sign is `-`",
-    }
+def _unknown_character(char: str, span: Span) -> Token:
     shown = f"`{char}`" if char.isprintable() else f"with the code {ord(char):02X} hex"
-    return Fault("AMX0004", f"character {shown} has no meaning here", hints.get(char))
+    return _error(char, span, "AMX0004", f"character {shown} has no meaning here", _CHARACTER_HINTS.get(char))
+
+
+_CHARACTER_HINTS = {
+    "%": "`%` is the type character of an INTEGER and stands right behind a name",
+    "@": "`@` is the type character of a BOOLEAN and stands right behind a name",
+    "$": "`$` is the type character of a STRING and stands right behind a name",
+    "?": "write PRINT",
+    "|": "write OR",
+    "~": "write NOT",
+    "{": "subscripts stand in ( ) or [ ]",
+    "}": "subscripts stand in ( ) or [ ]",
+    ".": "a real constant needs a digit: 0.5",
+    "`": "strings stand in \" or '",
+    "\N{LEFT DOUBLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{RIGHT DOUBLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{LEFT SINGLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{RIGHT SINGLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{EN DASH}": "a minus sign is `-`",
+    "\N{MINUS SIGN}": "a minus sign is `-`",
+}

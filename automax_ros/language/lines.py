@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from automax_ros.core.diagnostics import Note, SourceText, Span
-from automax_ros.language.lexer import BLANKS, LineLexer
+from automax_ros.language.lexer import BLANKS, BROKEN_END, LineLexer
 from automax_ros.language.reporter import Reporter
 from automax_ros.language.tokens import OPERATOR_WORDS, STATEMENT_WORDS, Fault, Kind, Token
 
@@ -105,7 +105,7 @@ class LineReader:
             return
         hint = "begin the line with a number, or end the line before it with `&`"
         fault = Fault("AMX0010", "the line has no line number", hint)
-        self._reporter.report(fault, Span(first.span.line, first.span.column, first.span.end_column))
+        self._reporter.report(fault, first.span)
 
     def _assemble(self, line: LogicalLine, start: int) -> None:
         """Fill in the tokens of a logical line, ended by an END token, and step to the line behind it."""
@@ -131,7 +131,7 @@ class LineReader:
                 break
         if remark:
             tokens[-1] = tokens[-1]._replace(value="\n".join(remark))
-        tokens.append(Token(Kind.END, "", end, offset))
+        tokens.append(Token(Kind.END, "", end.line, end.column, end.end_column, offset))
 
     def _goes_on(self, line: LogicalLine, remark: list[str], nesting: _Nesting, end: Span) -> bool:
         last = line.tokens[-1] if line.tokens else None
@@ -142,7 +142,7 @@ class LineReader:
             if continues:
                 remark[-1] = remark[-1][:-1].strip(BLANKS)
         else:
-            continues = last is not None and (last.kind is Kind.CONTINUE or last.text == "&!")
+            continues = last is not None and (last.kind is Kind.CONTINUE or last.text == BROKEN_END)
             if last is not None and last.kind is Kind.CONTINUE:
                 line.tokens.pop()
         if continues:

@@ -63,8 +63,11 @@ class _TaskParser:
     def _statement(self, cursor: Cursor, line: LogicalLine) -> None:
         """Read one statement and the separator behind it; report at most one syntax error."""
         start = cursor.position
+        if self._too_long(cursor, line):
+            cursor.skip_statement()
+            cursor.accept("\\")
+            return
         try:
-            self._check_length(cursor)
             if cursor.current.kind is Kind.REMARK:
                 self._frames.add(_remark(cursor.advance()))
                 return
@@ -83,17 +86,18 @@ class _TaskParser:
         if not line.faulty:
             self._reporter.report(error.fault, error.span, error.notes)
 
-    def _check_length(self, cursor: Cursor) -> None:
-        """Refuse a statement that is too long before anything looks at it."""
+    def _too_long(self, cursor: Cursor, line: LogicalLine) -> bool:
+        """Report a statement that is too long, before anything looks at it."""
         first = cursor.current
         index = cursor.position
-        while cursor.tokens[index].kind not in (Kind.SEPARATOR, Kind.END):
+        while not cursor.tokens[index].kind.ends_segment:
             index += 1
-        if cursor.tokens[index].offset - first.offset > STATEMENT_LIMIT:
-            hint = "divide it over several statements"
-            raise SyntaxFaultError(
-                Fault("AMX0005", f"the statement has more than {STATEMENT_LIMIT} characters", hint), first.span
-            )
+        if cursor.tokens[index].offset - first.offset <= STATEMENT_LIMIT:
+            return False
+        message = f"the statement has more than {STATEMENT_LIMIT} characters"
+        fault = Fault("AMX0005", message, "divide it over several statements")
+        self._report(line, SyntaxFaultError(fault, first.span))
+        return True
 
     def _report_lower_case(self) -> None:
         span = self._reader.lexer.lower_case

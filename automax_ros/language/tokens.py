@@ -25,6 +25,11 @@ class Kind(enum.Enum):
     END = "end of line"
 
     @property
+    def ends_segment(self) -> bool:
+        """Whether the line ends here, or the part of it before the next statement."""
+        return self in (Kind.END, Kind.SEPARATOR)
+
+    @property
     def ends_statement(self) -> bool:
         """Whether a statement can end before such a token."""
         return self in (Kind.END, Kind.SEPARATOR, Kind.REMARK)
@@ -47,10 +52,17 @@ class Token(NamedTuple):
 
     kind: Kind
     text: str
-    span: Span
+    line: int
+    column: int
+    end_column: int
     offset: int = 0
     value: int | float | str | None = None
     fault: Fault | None = None
+
+    @property
+    def span(self) -> Span:
+        """Its place."""
+        return Span(self.line, self.column, self.end_column)
 
     @property
     def is_name(self) -> bool:

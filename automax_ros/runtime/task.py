@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from functools import partial
 
+from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
 from automax_ros.runtime.compiler import CompiledTask, ScanTooLong, State
 from automax_ros.runtime.error_log import LOG_NUMBERS, ErrorLog, LogEntry
@@ -241,7 +242,8 @@ class Task:
             raise ValueError(f"{value!r} is no number")
         if not limits.low <= value <= limits.high:
             raise ValueError(f"{name} = {value} lies outside {limits.low} to {limits.high}")
-        self.state[self.compiled.layout.index(name)] = float(value) if symbol.type is DataType.REAL else int(value)
+        stored = stored_real(float(value))[0] if symbol.type is DataType.REAL else int(value)
+        self.state[self.compiled.layout.index(name)] = stored
 
     def _execute(self, part: Callable[..., bool], now_ns: int, skipped: int) -> ScanRecord | None:
         io = self._io

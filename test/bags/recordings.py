@@ -49,7 +49,9 @@ TABLE = VariableTable(
 )
 
 
-def write_of(sequence: int, stamp: int, entries: dict[tuple[int, int], float], texts: tuple[str, ...] = ()) -> CommonWrite:
+def write_of(
+    sequence: int, stamp: int, entries: dict[tuple[int, int], float], texts: tuple[str, ...] = ()
+) -> CommonWrite:
     """One entry of the write log."""
     variables = tuple(variable for variable, _ in entries)
     elements = tuple(element for _, element in entries)
@@ -57,7 +59,9 @@ def write_of(sequence: int, stamp: int, entries: dict[tuple[int, int], float], t
     return CommonWrite(stamp, RUN, 1, 1, WriteKind.COMMIT, sequence, values)
 
 
-def image_of(sequence: int, stamp: int, entries: dict[tuple[int, int], float], texts: tuple[str, ...] = ()) -> CommonImage:
+def image_of(
+    sequence: int, stamp: int, entries: dict[tuple[int, int], float], texts: tuple[str, ...] = ()
+) -> CommonImage:
     """The whole memory."""
     return CommonImage(stamp, RUN, sequence, write_of(sequence, stamp, entries, texts).values)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import struct
 import tracemalloc
@@ -201,7 +202,9 @@ def test_metadata_that_cannot_be_used(tmp_path: Path, text: str, code: str) -> N
 
 def test_a_number_of_a_million_digits_costs_nothing(tmp_path: Path) -> None:
     (tmp_path / "scans_0.mcap").write_bytes(b"")
-    (tmp_path / "metadata.yaml").write_text(METADATA + f"  message_count: {'9' * 1_000_000}\n  x: {'1:' * 1_000_000}1\n")
+    (tmp_path / "metadata.yaml").write_text(
+        METADATA + f"  message_count: {'9' * 1_000_000}\n  x: {'1:' * 1_000_000}1\n"
+    )
     assert BagReader(tmp_path).files == [tmp_path / "scans_0.mcap"]
 
 
@@ -212,17 +215,15 @@ def test_several_files_follow_each_other(tmp_path: Path, recording: Path) -> Non
     assert len(list(BagReader(tmp_path).messages())) == 2 * (2 + 3 * 218)
 
 
-def test_every_message_before_the_cut_is_handed_out(tmp_path: Path, recording: Path) -> None:
-    data = data_of(recording)
-    path = tmp_path / "cut.mcap"
-    path.write_bytes(data[: len(data) * 2 // 3])
-    read = []
-    with pytest.raises(BagError, match="AMX6812"):
-        for item in BagReader(path).messages():
-            read.append(item)  # noqa: PERF402  # those before the error count
-    whole = list(BagReader(recording).messages())
-    assert 0 < len(read) < len(whole)
-    assert read == whole[: len(read)]
+def test_every_message_before_the_cut_is_handed_out(tmp_path: Path) -> None:
+    folder = sample_recording(tmp_path / "whole", seconds=3.5)
+    data = data_of(folder)
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
+    cut = BagReader(tmp_path / "cut.mcap").messages()
+    whole = BagReader(folder).messages()
+    for _ in range(2 + 3 * 181):  # the image, and the scans of the first second
+        assert next(cut) == next(whole)
+    refused("AMX6812", lambda: list(cut))
 
 
 @pytest.mark.parametrize("part", range(1, 20))
@@ -248,9 +249,9 @@ def check_flips(folder: Path, data: bytes, count: int, seed: int) -> None:
     chance = random.Random(seed)
     for _ in range(count):
         position, bit = chance.randrange(len(data)), chance.randrange(8)
+        mutant = flipped(data, position, bit)
         with pytest.raises(BagError):
-            read_bytes(folder, flipped(data, position, bit))
-            pytest.fail(f"bit {bit} of byte {position} went unnoticed")
+            read_bytes(folder, mutant)
 
 
 def test_every_flipped_bit_is_noticed(tmp_path: Path, recording: Path) -> None:
@@ -259,7 +260,7 @@ def test_every_flipped_bit_is_noticed(tmp_path: Path, recording: Path) -> None:
 
 @pytest.mark.soak
 def test_every_flipped_bit_is_noticed_in_many_places(tmp_path: Path, recording: Path) -> None:
-    check_flips(tmp_path, data_of(recording), 5000, seed=2)
+    check_flips(tmp_path, data_of(recording), 4000, seed=2)
 
 
 def check_garbled(folder: Path, count: int, seed: int) -> None:
@@ -275,10 +276,8 @@ def check_garbled(folder: Path, count: int, seed: int) -> None:
             data[start : start + len(junk)] = junk
         if chance.random() < 0.2:
             del data[chance.randrange(len(data)) :]
-        try:
+        with contextlib.suppress(BagError):
             read_bytes(folder, bytes(data))
-        except BagError as error:
-            assert str(error)
 
 
 def test_garbled_files_without_checksums(tmp_path: Path) -> None:
@@ -287,7 +286,7 @@ def test_garbled_files_without_checksums(tmp_path: Path) -> None:
 
 @pytest.mark.soak
 def test_many_garbled_files_without_checksums(tmp_path: Path) -> None:
-    check_garbled(tmp_path, 20_000, seed=4)
+    check_garbled(tmp_path, 8000, seed=4)
 
 
 def record_of(opcode: int, content: bytes) -> bytes:
@@ -345,8 +344,6 @@ def test_hostile_records(tmp_path: Path, content: bytes, code: str) -> None:
 
 def bombs() -> list[bytes]:
     """A gigabyte of zeros in a small chunk, with and without an honest size."""
-    zeros = zstandard.ZstdCompressor().multi_compress_to_buffer if False else None
-    del zeros
     compressor = zstandard.ZstdCompressor(write_content_size=False).compressobj()
     unsized = b"".join(compressor.compress(bytes(1 << 20)) for _ in range(BOMB >> 20)) + compressor.flush()
     lz4_bomb = lz4.frame.LZ4FrameCompressor()

@@ -29,7 +29,9 @@ OWN = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"))
 
 
 def generator() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("generate_message_types", ROOT / "tools" / "generate_message_types.py")
+    spec = importlib.util.spec_from_file_location(
+        "generate_message_types", ROOT / "tools" / "generate_message_types.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -45,14 +47,18 @@ def test_table_is_what_the_tool_writes_today() -> None:
 def test_every_own_definition_stands_in_the_table_word_for_word() -> None:
     assert OWN
     for stem in OWN:
-        assert message_types()[f"automax_msgs/msg/{stem}"].text == (ROOT / "msg_defs" / "msg" / f"{stem}.msg").read_text()
+        assert (
+            message_types()[f"automax_msgs/msg/{stem}"].text == (ROOT / "msg_defs" / "msg" / f"{stem}.msg").read_text()
+        )
 
 
 def test_hashes_are_those_of_rosbags_for_jazzy() -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     standard = [name for name in message_types() if not name.startswith("automax_msgs")]
     assert len(standard) == 13
-    assert {name: message_types()[name].hash for name in standard} == {name: store.hash_rihs01(name) for name in standard}
+    assert {name: message_types()[name].hash for name in standard} == {
+        name: store.hash_rihs01(name) for name in standard
+    }
 
 
 def test_hashes_are_those_of_the_installed_packages() -> None:
@@ -111,8 +117,8 @@ def test_schema_separates_dependencies_by_80_signs_and_the_short_name() -> None:
 def test_definition_with_everything() -> None:
     definition = parse_definition(
         "pkg/msg/T",
-        "# remark\n\nint32 A=5\nstring B = 'x # y'\nuint8 plain 7\nstring<=10 name\nfloat64[3] fixed\nint8[<=4] few # r\n"
-        "Other[] others\nstd_msgs/String s\nstd_msgs/msg/Int16 i\n",
+        "# remark\n\nint32 A=5\nstring B = 'x # y'\nuint8 plain 7\nstring<=10 name\nfloat64[3] fixed\nint8[<=4] few # r"
+        "\nOther[] others\nstd_msgs/String s\nstd_msgs/msg/Int16 i\n",
     )
     assert definition.constants == (Constant("A", "int32", "5"), Constant("B", "string", "'x # y'"))
     assert definition.fields == (
@@ -134,7 +140,12 @@ def test_what_is_no_definition_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["int32 a\n" + "=" * 80 + "\nint32 b", "int32 a\n" + "=" * 80, "=" * 80 + "\nMSG: ???\n", " " * (MAX_SCHEMA_BYTES + 1)],
+    [
+        "int32 a\n" + "=" * 80 + "\nint32 b",
+        "int32 a\n" + "=" * 80,
+        "=" * 80 + "\nMSG: ???\n",
+        " " * (MAX_SCHEMA_BYTES + 1),
+    ],
 )
 def test_what_is_no_schema_is_refused(text: str) -> None:
     with pytest.raises(DefinitionError):
@@ -146,7 +157,9 @@ def test_layout_is_compared_without_remarks_and_with_nested_types() -> None:
     text = schema_text(name)
     assert same_layout(name, parse_schema(name, text))
     assert same_layout(name, parse_schema(name, text.replace("# All of common memory", "# Anything")))
-    assert same_layout(name, parse_schema(name, text.replace("MSG: automax_msgs/Values", "MSG: automax_msgs/msg/Values")))
+    assert same_layout(
+        name, parse_schema(name, text.replace("MSG: automax_msgs/Values", "MSG: automax_msgs/msg/Values"))
+    )
     assert not same_layout(name, parse_schema(name, text.replace("uint32[] element", "uint16[] element")))
     assert not same_layout(name, parse_schema(name, text.replace("uint64 run_id", "uint64 run")))
     assert not same_layout(name, parse_schema(name, text.split("=" * 80)[0]))

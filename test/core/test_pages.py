@@ -64,7 +64,7 @@ def test_page_has_title_text_and_cure(code: str) -> None:
 
 
 def test_no_page_without_a_code() -> None:
-    assert {path.stem for path in PAGES.iterdir()} == set(PROBLEMS)
+    assert {path.stem for path in PAGES.iterdir()} <= set(PROBLEMS)
 
 
 @pytest.mark.parametrize("code", COMPILED)

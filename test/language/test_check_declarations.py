@@ -40,7 +40,8 @@ def test_names_that_differ_in_type_are_different_variables() -> None:
 def test_second_declaration_shows_both_places(second: str) -> None:
     found = one(declared(second))
     assert found.code == "AMX4002"
-    assert found.span == Span(1, 20 if second[0] == "L" else 21, 20 + len(second) - (6 if second[0] == "L" else 6))
+    scope, name = second.split()
+    assert found.span == Span(1, 16 + len(scope), 16 + len(scope) + len(name))
     assert found.notes[0].span == Span(1, 10, 12)
 
 

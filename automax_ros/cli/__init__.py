@@ -1,0 +1,5 @@
+"""The command `automax`: ``main`` finds the subcommand, one file each; they are thin callers of the floors below.
+
+A subcommand is a module with ``add_arguments(parser)`` and ``run(arguments) -> int``, whose result is the exit code:
+0 fine, 1 the thing checked has errors or differences, 2 wrong usage or unreadable file. It raises ``UsageError`` for 2.
+"""

@@ -1,0 +1,154 @@
+"""Check tasks (.BLK) and rack files (.yaml, .yml) and print everything that is wrong with them.
+
+A task given by itself is checked as if the rack defined its commons as it declares them. A rack file is checked with
+every task it names, against the commons and the ticks it defines.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.cli.task_files import Target, add_target_arguments, check_task_file, name_warning, target_of
+from automax_ros.cli.terminal import count_of, print_diagnostics
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, as_json, has_errors, in_order
+from automax_ros.core.problems import Severity
+
+_RACK_SUFFIXES = (".YAML", ".YML")
+_CANNOT_BE_READ = "AMX6000"
+_LINE_NUMBER = re.compile(r"\s*([0-9]{1,6})")
+
+
+@dataclass(frozen=True)
+class _Findings:
+    """What was found in one text; ``unconfirmed`` are the forms of a task that no source confirms, with their places."""
+
+    source: SourceText
+    diagnostics: list[Diagnostic]
+    unconfirmed: list[tuple[Span, str]]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax check``."""
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="a task (.BLK) or a rack file (.yaml, .yml)")
+    add_target_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one list of problems for programs to read")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check all files; one that cannot be read does not keep the others from being checked."""
+    target = target_of(arguments)
+    findings: list[_Findings] = []
+    unusable = 0
+    for path in arguments.files:
+        try:
+            findings += _rack_file(path) if path.suffix.upper() in _RACK_SUFFIXES else _task_file(path, target)
+        except UsageError as error:
+            print(f"automax check: error: {error}", file=sys.stderr)
+            unusable += 1
+    findings = _each_once(findings)
+    if arguments.json:
+        print(json.dumps([record for item in findings for record in _records(item)], indent=2))
+    else:
+        _print(findings, len(arguments.files) - unusable)
+    if unusable:
+        return 2
+    return 1 if any(has_errors(item.diagnostics) for item in findings) else 0
+
+
+def _task_file(path: Path, target: Target) -> list[_Findings]:
+    source, result = check_task_file(path, target)
+    warning = name_warning(path)
+    return [_Findings(source, [*([warning] if warning else []), *result.diagnostics], result.unconfirmed)]
+
+
+def _rack_file(path: Path) -> list[_Findings]:
+    """Return what is wrong with the rack file, then with each of its tasks.
+
+    Raises:
+        UsageError: the rack file itself cannot be read.
+    """
+    from automax_ros.rack.loader import load
+    from automax_ros.rack.tasks_check import check_tasks
+
+    rack = load(path)
+    for item in rack.diagnostics:
+        if item.code == _CANNOT_BE_READ:
+            raise UsageError(f"{path}: {item.message}")
+    tasks = check_tasks(rack.config) if rack.config is not None else []
+    return [
+        _Findings(rack.source, rack.diagnostics, []),
+        *(_Findings(item.source, item.result.diagnostics, item.result.unconfirmed) for item in tasks),
+    ]
+
+
+def _each_once(findings: list[_Findings]) -> list[_Findings]:
+    """Return the findings without those that a task has by itself and in a rack, or in two places of a rack."""
+    seen: set[tuple[str, Diagnostic | tuple[Span, str]]] = set()
+
+    def new(item: Diagnostic | tuple[Span, str], name: str) -> bool:
+        known = (name, item) in seen
+        seen.add((name, item))
+        return not known
+
+    return [
+        _Findings(
+            one.source,
+            [item for item in in_order(one.diagnostics) if new(item, one.source.name)],
+            [item for item in one.unconfirmed if new(item, one.source.name)],
+        )
+        for one in findings
+    ]
+
+
+def _print(findings: list[_Findings], files: int) -> None:
+    for item in findings:
+        print_diagnostics(item.diagnostics, item.source, sys.stdout)
+    if sys.stdout.isatty():
+        severities = [item.severity for one in findings for item in one.diagnostics]
+        errors, warnings = severities.count(Severity.ERROR), severities.count(Severity.WARNING)
+        counts = [count_of(errors, "error")] * bool(errors) + [count_of(warnings, "warning")] * bool(warnings)
+        print(", ".join(counts) or f"no problems in {count_of(files, 'file')}")
+
+
+def _records(findings: _Findings) -> list[dict[str, object]]:
+    """Return the objects of ``--json`` for one text in the order of their places."""
+    marked = [
+        dataclasses.replace(item, unconfirmed=any(_overlap(item.span, span) for span, _ in findings.unconfirmed))
+        for item in findings.diagnostics
+    ]
+    records = [(item.span, as_json(item, findings.source)) for item in marked]
+    lines = findings.source.lines if findings.unconfirmed else []
+    records += [(span, _note(span, text, lines, findings.source)) for span, text in findings.unconfirmed]
+    return [record for _, record in sorted(records, key=lambda pair: pair[0])]
+
+
+def _overlap(one: Span, other: Span) -> bool:
+    return one.line == other.line and one.column < other.end_column and other.column < one.end_column
+
+
+def _note(span: Span, text: str, lines: list[str], source: SourceText) -> dict[str, object]:
+    """Return the object that marks a form which no source confirms: it is no problem and has no code."""
+    return {
+        "file": source.name,
+        **dataclasses.asdict(span),
+        "statement": _statement(span.line, lines),
+        "severity": "note",
+        "code": None,
+        "message": f"no source confirms {text}",
+        "unconfirmed": True,
+    }
+
+
+def _statement(line: int, lines: list[str]) -> int | None:
+    """Return the BASIC line number in force on a physical line; lines behind an ``&`` have none of their own."""
+    while line > 1 and lines[line - 2].rstrip().endswith("&"):
+        line -= 1
+    number = _LINE_NUMBER.match(lines[line - 1])
+    return int(number[1]) if number else None

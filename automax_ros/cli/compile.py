@@ -1,0 +1,27 @@
+"""Print the Python functions that a task (.BLK) becomes: the part before SCAN_LOOP, a scan, and a scan in steps."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from automax_ros.cli.lone_task import compiled_alone
+from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
+from automax_ros.cli.terminal import print_diagnostics
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax compile``."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a task (.BLK)")
+    add_target_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the generated functions, or what is wrong with the task."""
+    source, result = check_task_file(arguments.file, target_of(arguments))
+    if result.program is None:
+        print_diagnostics(result.diagnostics, source, sys.stderr)
+        return 1
+    sys.stdout.write(compiled_alone(result.program).source)
+    return 0

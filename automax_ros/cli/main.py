@@ -1,0 +1,121 @@
+"""The command line `automax`: finds the subcommand, runs it, and turns what goes wrong into exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import io
+import os
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from automax_ros import __version__
+from automax_ros.cli.usage import UsageError
+
+SUBCOMMANDS: dict[str, str] = {
+    "check": "find everything that is wrong with tasks and rack files",
+    "trace": "run a task scan by scan on a CSV table",
+    "compile": "print the function that a task becomes",
+    "run": "run a rack",
+    "export": "write common memory of a recording to a CSV table",
+    "blocks": "describe the control blocks",
+    "explain": "say what a problem code means and how to cure it",
+}
+"""Every subcommand and its line of help; its module in this folder has the same name and is imported when it is asked for."""
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
+BROKEN_PIPE = 141
+"""Exit code where whoever reads our output has gone: 128 + SIGPIPE."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `automax` with the arguments (the process's own by default) and return its exit code."""
+    _accept_every_character()
+    try:
+        code = _run(sys.argv[1:] if argv is None else list(argv))
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        _discard_output()
+        return BROKEN_PIPE
+    except OSError as error:  # a full disk, for example; what is read or opened by name is a UsageError
+        _discard_output()
+        print(f"automax: error: the output cannot be written: {error.strerror or error}", file=sys.stderr)
+        return 2
+    return code
+
+
+def _run(argv: list[str]) -> int:
+    # The options in front of the subcommand take no values, so the first word is its name.
+    name = next((word for word in argv if not word.startswith("-")), None)
+    try:
+        if name is not None and name not in SUBCOMMANDS:
+            raise _unknown(name)
+        module = _module(name) if name is not None else None
+        parser = _parser(name, module)
+        arguments = parser.parse_args(argv)
+        if module is None:
+            parser.print_help(sys.stderr)
+            return 2
+        return _exit_code(module.run(arguments))
+    except UsageError as error:
+        print(f"automax{f' {name}' if name in SUBCOMMANDS else ''}: error: {error}", file=sys.stderr)
+        return 2
+    except SystemExit as stop:  # argparse's way to end after --help, --version and wrong usage
+        return _exit_code(stop.code)
+
+
+def _parser(chosen: str | None, module: ModuleType | None) -> argparse.ArgumentParser:
+    """Return the parser of the whole command line, where only the chosen subcommand knows its arguments."""
+    parser = argparse.ArgumentParser(prog="automax", description="A Reliance Electric AutoMax rack, emulated.")
+    parser.add_argument("--version", action="version", version=f"automax {__version__}")
+    subcommands = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND")
+    for name, text in SUBCOMMANDS.items():
+        own = module if name == chosen else None
+        subparser = subcommands.add_parser(
+            name,
+            help=text,
+            description=own.__doc__ if own else None,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        if own is not None:
+            own.add_arguments(subparser)
+    return parser
+
+
+def _module(name: str) -> ModuleType:
+    return importlib.import_module(f"automax_ros.cli.{name}")
+
+
+def _unknown(name: str) -> UsageError:
+    from automax_ros.rack.findings import did_you_mean, quoted
+
+    hint = did_you_mean(name, SUBCOMMANDS) or f"there are {', '.join(SUBCOMMANDS)}"
+    return UsageError(f"no subcommand {quoted(name)}", hint)
+
+
+def _exit_code(code: object) -> int:
+    return code if isinstance(code, int) else 0 if code is None else 1
+
+
+def _accept_every_character() -> None:
+    """Let no file name or text stop the program because the terminal's encoding lacks a character."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _discard_output() -> None:
+    """Point standard output nowhere, so that Python's own flush at the end does not complain again."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

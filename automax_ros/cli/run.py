@@ -1,0 +1,120 @@
+"""Run a rack from its YAML file.
+
+On the wall clock the rack's modules are ROS 2 nodes in this process, until Ctrl-C or for --duration seconds. With
+--simulated time passes as fast as the machine can and nothing of ROS is started: the same rack gives the same bag, byte
+for byte.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from automax_ros.bags.errors import BagError
+from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.usage import UsageError
+from automax_ros.cli.watch import add_watch_argument, watch_list
+from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.ticks import seconds_ns
+from automax_ros.core.types import Value
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.rack import Rack, RackError
+from automax_ros.rack.settings import SettingError, setting, watched
+
+_UNREADABLE = frozenset({"AMX6000", "AMX6001", "AMX6002"})
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax run``."""
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file")
+    parser.add_argument("--simulated", action="store_true", help="simulated time, as fast as the machine can, without ROS")
+    parser.add_argument("--duration", metavar="S", help="seconds of rack time after which the run ends by itself")
+    parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help="write a common variable before the tasks start; may be given again",
+    )
+    add_watch_argument(parser, "the first published ones")
+    parser.add_argument(
+        "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
+    duration_ns = _duration(arguments.duration)
+    if not arguments.simulated:
+        from automax_ros.nodes.environment import RosUnavailable, prepare
+
+        try:
+            prepare()
+        except RosUnavailable as error:
+            raise UsageError(str(error), "or run with --simulated, which needs no ROS") from error
+    config = _config(arguments.config, allow_outside=arguments.allow_outside)
+    if config is None:
+        return 1
+    settings = _settings(config, arguments.settings)
+    names = watch_list(arguments.watch)
+    try:
+        watch = watched(config, names)
+        if arguments.simulated:
+            from automax_ros.cli.run_simulated import run_simulated
+
+            return run_simulated(config, duration_ns, arguments.record, settings, watch)
+        from automax_ros.cli.run_live import run_live
+
+        return run_live(config, duration_ns, arguments.record, settings, watch)
+    except SettingError as error:
+        raise UsageError(str(error), error.hint) from error
+    except RackError as error:
+        return _refused(error)
+    except BagError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def warn(rack: Rack) -> None:
+    """Print the warnings that the tasks' checks gave."""
+    for source, diagnostics in rack.warnings:
+        print_diagnostics(diagnostics, source, sys.stderr)
+
+
+def _duration(text: str | None) -> int | None:
+    if text is None:
+        return None
+    try:
+        duration_ns = seconds_ns(text)
+    except ValueError as error:
+        raise UsageError(f"--duration: {error}") from error
+    if duration_ns == 0:
+        raise UsageError("--duration: 0 s is no time to run")
+    return duration_ns
+
+
+def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:
+    from automax_ros.rack.loader import load
+
+    result = load(path, allow_outside=allow_outside)
+    print_diagnostics(result.diagnostics, result.source, sys.stderr)
+    if any(item.code in _UNREADABLE for item in result.diagnostics):
+        raise UsageError(f"{path} cannot be used")
+    return result.config if not has_errors(result.diagnostics) else None
+
+
+def _settings(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
+    try:
+        return [setting(config, text) for text in texts]
+    except SettingError as error:
+        raise UsageError(f"--set: {error}", error.hint) from error
+
+
+def _refused(error: RackError) -> int:
+    for source, diagnostics in error.findings:
+        print_diagnostics(diagnostics, source, sys.stderr)
+    print(f"automax run: {error}", file=sys.stderr)
+    return 1

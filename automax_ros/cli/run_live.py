@@ -1,0 +1,103 @@
+"""A run on the wall clock, with the rack's modules as ROS 2 nodes in this process."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from automax_ros.bags.recorder import Recorder
+from automax_ros.cli.run import warn
+from automax_ros.cli.run_simulated import report_end
+from automax_ros.cli.signals import stop_signals
+from automax_ros.cli.status import StatusDisplay
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.types import Value
+from automax_ros.nodes.launcher import LiveRack
+from automax_ros.nodes.lock import RackAlreadyRuns, RackLock, domain_id
+from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.rack import Rack
+
+
+class _Stop:
+    """Remembers a stop request that comes before the rack lives, and hands it on to the rack."""
+
+    def __init__(self) -> None:
+        self.requested = False
+        self.live: LiveRack | None = None
+
+    def request(self) -> None:
+        """Ask the run to end."""
+        self.requested = True
+        if self.live is not None:
+            self.live.stopping = True
+
+
+def run_live(
+    config: RackConfig,
+    duration_ns: int | None,
+    record: Path | None,
+    settings: list[tuple[str, Value]],
+    watch: Sequence[CommonVariable],
+) -> int:
+    """Run until the duration has passed, Ctrl-C or SIGTERM; return the exit code."""
+    stop = _Stop()
+    domain = domain_id()
+    try:
+        with stop_signals(stop.request), RackLock(config.namespace, domain):
+            return _run_locked(config, duration_ns, record, settings, watch, stop, domain)
+    except RackAlreadyRuns as error:
+        raise UsageError(str(error)) from error
+
+
+def _run_locked(
+    config: RackConfig,
+    duration_ns: int | None,
+    record: Path | None,
+    settings: list[tuple[str, Value]],
+    watch: Sequence[CommonVariable],
+    stop: _Stop,
+    domain: int,
+) -> int:
+    rack = Rack(config, stopwatch=time.perf_counter_ns)
+    warn(rack)
+    live = LiveRack(rack)
+    stop.live = live
+    live.stopping = stop.requested
+    recorder = None
+    display = StatusDisplay(rack, watch, live=True)
+    told = [False, False]
+
+    def on_idle(now_ns: int) -> None:
+        display.update(now_ns)
+        if rack.stop_reason is not None and not told[0]:
+            told[0] = True
+            display.message(f"STOP ALL: {rack.stop_reason}")
+        if recorder is not None and recorder.failure is not None and not told[1]:
+            told[1] = True
+            display.message(f"recording ended, the rack goes on: {recorder.failure}")
+
+    try:
+        if record is not None:
+            recorder = Recorder(rack, live.stream, record)
+        display.message(_opening(rack, domain))
+        live.start(settings)
+        live.run(duration_ns, on_idle)
+    finally:
+        live.close()
+        if recorder is not None:
+            recorder.close()
+    display.finish(record)
+    return report_end(rack, recorder)
+
+
+def _opening(rack: Rack, domain: int) -> str:
+    config = rack.config
+    modules = ", ".join(
+        f"{processor.model} in slot {processor.slot} ({' '.join(task.name for task in processor.tasks)})"
+        for processor in rack.processors
+    )
+    return (
+        f"rack {config.name}: {modules}; {len(config.variables)} common variables\n"
+        f"ROS 2 namespace /{config.namespace} in domain {domain}; Ctrl-C ends the run"
+    )

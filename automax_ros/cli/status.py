@@ -1,0 +1,115 @@
+"""What a person sees of a running rack: a live line on a terminal, plain lines elsewhere, a summary at the end."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Value
+from automax_ros.rack.config import CommonVariable
+from automax_ros.rack.rack import Processor, Rack
+from automax_ros.runtime.functions import text_of
+
+_TERMINAL_PERIOD_NS = 200_000_000
+_PLAIN_PERIOD_NS = 5 * NS_PER_S
+
+
+class StatusDisplay:
+    """Shows a rack's progress on standard output; ``live``: on the wall clock, so loads can be measured."""
+
+    def __init__(self, rack: Rack, watch: Sequence[CommonVariable], *, live: bool) -> None:
+        """Begin; nothing is printed before the first update is due."""
+        self._rack, self._watch, self._live = rack, watch, live
+        self._terminal = sys.stdout.isatty()
+        self._period_ns = _TERMINAL_PERIOD_NS if self._terminal else _PLAIN_PERIOD_NS
+        self._began = self._last = time.monotonic_ns()
+        self._last_rack_ns = 0
+        self._last_scans = 0
+        self._last_busy: dict[int, int] = {}
+        self._drawn = False
+        self._errors_shown = 0
+
+    def update(self, now_ns: int) -> None:
+        """Show the state at a rack time if it is time to."""
+        wall = time.monotonic_ns()
+        if wall - self._last >= self._period_ns:
+            self._show(now_ns, wall)
+
+    def message(self, text: str) -> None:
+        """Print a line of its own."""
+        self._clear()
+        print(text, flush=True)
+
+    def finish(self, bag: Path | None) -> None:
+        """Print the last state and the summary."""
+        wall = time.monotonic_ns()
+        self._clear()
+        rack = self._rack
+        seconds, took = rack.now_ns / NS_PER_S, (wall - self._began) / NS_PER_S
+        pace = "" if self._live else f" in {took:.2f} s ({seconds / took if took else 0:.0f} times real time)"
+        print(f"ran {seconds:.3f} s{pace}")
+        print(f"  {'task':10}{'slot':>4}{'period ms':>11}{'scans':>10}{'late':>7}{'errors':>8}", end="")
+        print(f"{'mean us':>10}{'longest us':>12}" if self._live else "")
+        for task in rack.tasks:
+            statistics = rack.statistics[task.name]
+            print(
+                f"  {task.name:10}{task.slot:>4}{task.period_ns / 1e6:>11g}{statistics.scans:>10}"
+                f"{statistics.skipped:>7}{task.errors.count:>8}",
+                end="",
+            )
+            mean = statistics.total_ns / statistics.scans / 1000 if statistics.scans else 0.0
+            print(f"{mean:>10.1f}{statistics.longest_ns / 1000:>12.1f}" if self._live else "")
+        for task in rack.tasks:
+            for entry in task.errors.entries:
+                print(f"  {task.name}: {entry.describe()}")
+        print("  " + "  ".join(self._values()))
+        if bag is not None:
+            size = sum(item.stat().st_size for item in bag.iterdir())
+            print(f"recorded {bag}: {size / 1e6:.2f} MB")
+        sys.stdout.flush()
+
+    def _show(self, now_ns: int, wall: int) -> None:
+        scans = sum(item.scans for item in self._rack.statistics.values())
+        elapsed = (now_ns - self._last_rack_ns) / NS_PER_S
+        rate = (scans - self._last_scans) / elapsed if elapsed else 0.0
+        parts = [f"{now_ns / NS_PER_S:8.1f} s", f"{rate:.0f} scans/s"]
+        if self._live:
+            parts += [self._load(processor, wall) for processor in self._rack.processors]
+        else:
+            parts.append(f"{(now_ns - self._last_rack_ns) / max(1, wall - self._last):.0f}x")
+        late = sum(item.skipped for item in self._rack.statistics.values())
+        parts += [f"late {late}", *self._values()]
+        self._last, self._last_rack_ns, self._last_scans = wall, now_ns, scans
+        line = "  ".join(parts)
+        if self._terminal:
+            width = shutil.get_terminal_size().columns - 1
+            sys.stdout.write(f"\r\x1b[K{line[:width]}")
+            self._drawn = True
+        else:
+            sys.stdout.write(line + "\n")
+        sys.stdout.flush()
+
+    def _load(self, processor: Processor, wall: int) -> str:
+        """Return a Processor's share of the time since the last line."""
+        busy = sum(self._rack.statistics[task.name].total_ns for task in processor.tasks)
+        share = (busy - self._last_busy.get(processor.slot, 0)) / max(1, wall - self._last)
+        self._last_busy[processor.slot] = busy
+        return f"P{processor.slot} {100 * share:.1f} %"
+
+    def _values(self) -> list[str]:
+        return [f"{variable.name}={_shown(self._rack.value(variable.name))}" for variable in self._watch]
+
+    def _clear(self) -> None:
+        if self._drawn:
+            sys.stdout.write("\r\x1b[K")
+            self._drawn = False
+
+
+def _shown(value: Value) -> str:
+    if isinstance(value, bool):
+        return "1" if value else "0"
+    return text_of(value)

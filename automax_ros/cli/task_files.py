@@ -1,0 +1,106 @@
+"""Task sources on the command line: where a task is meant to run, reading it, checking it."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Processor
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
+from automax_ros.language.checker import CheckResult, check
+from automax_ros.rack.files import FileFault
+from automax_ros.rack.findings import quoted
+from automax_ros.rack.names import NameFault, check_task_name
+from automax_ros.rack.task_source import read_task_source
+
+TASK_SUFFIX = ".BLK"
+_MILLISECONDS = re.compile(r"[0-9]{1,6}(\.[0-9]{0,6})?|\.[0-9]{1,6}")
+"""Bounded: an exponent of many digits would take for ever to become an exact number."""
+_OTHER_TASKS = {".BAS": "BASIC tasks", ".PC": "ladder tasks", ".CNF": "configuration tasks", ".INC": "include files"}
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a task given by itself runs: the kind of Processor and its tick in ns."""
+
+    processor: Processor
+    tick_ns: int
+
+
+def add_target_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--target`` and ``--tick-ms``."""
+    parser.add_argument(
+        "--target",
+        choices=[item.value for item in Processor],
+        default=Processor.AUTOMAX.value,
+        help="the Processor that runs the task (default: automax)",
+    )
+    parser.add_argument(
+        "--tick-ms", metavar="MS", help="its tick: 0.5 to 10 ms in steps of 0.5 (default: 5.5; a UDC's is always 0.5)"
+    )
+
+
+def target_of(arguments: argparse.Namespace) -> Target:
+    """Return what ``--target`` and ``--tick-ms`` ask for.
+
+    Raises:
+        UsageError: not a tick that this Processor can have.
+    """
+    processor = Processor(arguments.target)
+    is_udc = processor is Processor.UDC
+    if arguments.tick_ms is None:
+        return Target(processor, UDC_TICK_NS if is_udc else DEFAULT_TICK_NS)
+    if not _MILLISECONDS.fullmatch(arguments.tick_ms):
+        raise UsageError(f"--tick-ms {quoted(arguments.tick_ms)} is not a number of milliseconds such as 5.5")
+    try:
+        tick = tick_ns(arguments.tick_ms)
+    except ValueError as error:
+        raise UsageError(f"--tick-ms: {error}") from error
+    if is_udc and tick != UDC_TICK_NS:
+        raise UsageError(f"--tick-ms {arguments.tick_ms}: the tick of a UDC is always 0.5 ms")
+    return Target(processor, tick)
+
+
+def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult]:
+    """Check a task by itself: its own COMMON statements count as the definition of the rack's commons.
+
+    Raises:
+        UsageError: the file cannot be read, or is of a kind that has no checker.
+    """
+    _require_block_task(path)
+    try:
+        source = read_task_source(path)
+    except FileFault as fault:
+        if not fault.too_large:
+            raise UsageError(f"{path} {fault}") from fault
+        too_large = Diagnostic("AMX0001", f"the text {fault}", Span(1, 1, 2), hint="divide the task")
+        return SourceText(str(path), ""), CheckResult(None, [too_large])
+    result = check(
+        source, name=path.stem.upper(), catalogue=CATALOGUE, target=target.processor, tick_ns=target.tick_ns
+    )
+    return source, result
+
+
+def name_warning(path: Path) -> Diagnostic | None:
+    """Return a warning where no task can be named after the file, which is what the Executive does (2.4.1)."""
+    stem = path.stem
+    try:
+        check_task_name(stem.upper() if stem.isascii() else stem)
+    except NameFault as fault:
+        hint = "rename the file; or name the task in a rack file, with file: and this name"
+        return Diagnostic("AMX6900", f"{quoted(stem)} cannot be the task's name: {fault}", Span(1, 1, 2), hint=hint)
+    return None
+
+
+def _require_block_task(path: Path) -> None:
+    suffix = path.suffix.upper()
+    if suffix == TASK_SUFFIX:
+        return
+    if suffix in _OTHER_TASKS:
+        raise UsageError(f"{path}: {_OTHER_TASKS[suffix]} ({suffix}) are not supported yet, only {TASK_SUFFIX} tasks")
+    raise UsageError(f"{path}: a task's source is a {TASK_SUFFIX} file")

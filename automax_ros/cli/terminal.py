@@ -1,0 +1,45 @@
+"""What the person sees: colours where they are welcome, diagnostics, numbers of things."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from typing import TextIO
+
+from automax_ros.core.diagnostics import Diagnostic, SourceText, in_order, render
+from automax_ros.core.problems import Severity
+
+_COLOURS = {Severity.ERROR: "1;31", Severity.WARNING: "1;33"}
+_HINT = "  hint:"
+
+
+def wants_colour(stream: TextIO) -> bool:
+    """Whether a stream is a terminal that shows colours, and the person has not set NO_COLOR."""
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, stream: TextIO) -> None:
+    """Print diagnostics of one text in the order of their places, in colour if the stream wants it."""
+    colour = wants_colour(stream)
+    for item in in_order(diagnostics):
+        text = render(item, source)
+        stream.write((_painted(item, text) if colour else text) + "\n")
+
+
+def count_of(number: int, thing: str) -> str:
+    """Return a number with its noun: ``1 error``, ``2 errors``."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def painted(text: str, colour: str) -> str:
+    """Return a text in a colour, which is the number of a terminal's SGR sequence such as ``1;31``."""
+    return f"\x1b[{colour}m{text}\x1b[0m"
+
+
+def _painted(item: Diagnostic, text: str) -> str:
+    head = f"{item.severity.value}[{item.code}]"
+    text = text.replace(head, painted(head, _COLOURS[item.severity]), 1)
+    if item.hint:
+        before, _, after = text.rpartition(_HINT)
+        text = before + painted(_HINT, "36") + after
+    return text

@@ -1,0 +1,174 @@
+"""Run a task (.BLK) without a rack, one scan a row of a CSV table, and print its variables after each scan.
+
+The header of IN.csv names variables with their type character: REF%, RUN@, GAIN, TABLE%(3). A cell sets its variable
+before the scan latches; an empty cell leaves it as it is. Commons, locals and tunables can be set. What stands before
+SCAN_LOOP runs once before the first row. The task's own COMMON statements define the common memory, all 0 at first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TextIO
+
+from automax_ros.cli.lone_task import LoneTask, LoneVariable, UnknownVariableError
+from automax_ros.cli.progress import ProgressBar
+from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
+from automax_ros.cli.terminal import count_of, print_diagnostics
+from automax_ros.cli.trace_input import CsvFault, InputTable
+from automax_ros.cli.usage import UsageError
+from automax_ros.cli.watch import add_watch_argument, watch_list
+from automax_ros.core.decimal_text import real_text, seconds_text
+from automax_ros.core.diagnostics import printable
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.types import DataType
+from automax_ros.runtime.error_log import LogEntry
+from automax_ros.runtime.task import ScanRecord, Status
+
+_ROWS_A_LOOK = 256
+"""Rows between two looks at the clock for the progress bar."""
+
+_FORMATS: dict[DataType, Callable[..., str]] = {
+    DataType.INTEGER: str,
+    DataType.DOUBLE: str,
+    DataType.REAL: real_text,
+    DataType.BOOLEAN: lambda value: "1" if value else "0",
+    DataType.STRING: printable,
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax trace``."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="a task (.BLK)")
+    parser.add_argument("--input", type=Path, required=True, metavar="IN.csv", help="what to set before each scan")
+    parser.add_argument("--output", type=Path, metavar="OUT.csv", help="where to write (default: standard output)")
+    parser.add_argument("--errors", type=Path, metavar="ERR.csv", help="where to write the run-time errors of each scan")
+    add_target_arguments(parser)
+    add_watch_argument(parser, "every simple variable")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Trace the task; 1 if it has errors, stops or faults, 2 if the table or an option is at fault."""
+    target = target_of(arguments)
+    source, result = check_task_file(arguments.file, target)
+    if result.program is None:
+        print_diagnostics(result.diagnostics, source, sys.stderr)
+        return 1
+    lone = LoneTask(result.program)
+    watched = _watched(lone, watch_list(arguments.watch))
+    _require_different_files(arguments)
+    try:
+        with ExitStack() as files:
+            table = files.enter_context(InputTable(arguments.input, lone))
+            output = files.enter_context(_output(arguments.output))
+            errors = files.enter_context(_output(arguments.errors)) if arguments.errors else None
+            bar = files.enter_context(ProgressBar("trace", table.size, wanted=arguments.output is not None))
+            _Trace(lone, watched, output, errors).run(table, bar)
+    except CsvFault as fault:
+        print(fault.render(arguments.input), file=sys.stderr)
+        return 2
+    return _conclusion(lone, all_told=errors is not None)
+
+
+class _Trace:
+    """One run of a task over a table."""
+
+    def __init__(self, lone: LoneTask, watched: Sequence[LoneVariable], output: TextIO, errors: TextIO | None) -> None:
+        """Write the headers and put the task into RUN."""
+        self._lone = lone
+        self._cells = [(item.read, _FORMATS[item.symbol.type]) for item in watched]
+        self._output = csv.writer(output, lineterminator="\n")
+        self._output.writerow(["scan", "time_s", *(item.label for item in watched)])
+        self._errors = csv.writer(errors, lineterminator="\n") if errors is not None else None
+        if self._errors is not None:
+            self._errors.writerow(["scan", "line", "code", "message"])
+            lone.task.record_scans()
+
+    def run(self, table: InputTable, bar: ProgressBar) -> None:
+        """Scan once for each row, until the table or the task ends."""
+        task, period = self._lone.task, self._lone.task.period_ns
+        self._write_errors(task.run())
+        if task.status is not Status.RUNNING:
+            return
+        for number, _ in enumerate(table.rows()):
+            time_ns = number * period
+            self._write_errors(task.scan(time_ns))
+            cells = [text_of(read()) for read, text_of in self._cells]
+            self._output.writerow([str(number + 1), seconds_text(time_ns), *cells])
+            if task.status is not Status.RUNNING:
+                return
+            if number % _ROWS_A_LOOK == 0:
+                bar.show(table.position)
+
+    def _write_errors(self, record: ScanRecord | None) -> None:
+        if self._errors is None or record is None:
+            return
+        for line, code in record.errors:
+            entry = LogEntry(line, code, record.scan)
+            self._errors.writerow([str(entry.scan), str(entry.line), entry.problem, PROBLEMS[entry.problem].title])
+
+
+def _watched(lone: LoneTask, names: list[str] | None) -> list[LoneVariable]:
+    if names is None:
+        return lone.simple_variables()
+    try:
+        found = [lone.variable(name) for name in names]
+    except UnknownVariableError as fault:
+        raise UsageError(f"--watch: {fault}", fault.hint) from fault
+    return list({item.label: item for item in found}.values())
+
+
+def _require_different_files(arguments: argparse.Namespace) -> None:
+    """Refuse to write over what is read, or twice to one file."""
+    read = {"FILE": arguments.file, "--input": arguments.input}
+    written = {key: path for key, path in {"--output": arguments.output, "--errors": arguments.errors}.items() if path}
+    for key, path in written.items():
+        for other, its_path in {**read, **written}.items():
+            if key != other and _is_same_file(path, its_path):
+                raise UsageError(f"{key} and {other} are the same file, {path}")
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one regular file, or would if it existed; two times /dev/null does no harm."""
+    try:
+        if one.exists() and other.exists():
+            return one.is_file() and one.samefile(other)
+        return one.resolve() == other.resolve()
+    except (OSError, ValueError, RuntimeError):
+        return False
+
+
+@contextmanager
+def _output(path: Path | None) -> Iterator[TextIO]:
+    """Open a table for writing, standard output without a path.
+
+    Raises:
+        UsageError: it cannot be written.
+    """
+    if path is None:
+        yield sys.stdout
+        return
+    try:
+        stream = path.open("w", encoding="utf-8", newline="")
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
+    with stream:
+        yield stream
+
+
+def _conclusion(lone: LoneTask, *, all_told: bool) -> int:
+    """Say on standard error what the table does not show, and return the exit code."""
+    task, log = lone.task, lone.task.errors
+    if log.first is not None and not all_told:
+        first = f"the first: {log.first.describe()}" if log.count > 1 else log.first.describe()
+        print(f"{task.name}: {count_of(log.count, 'run-time error')}; {first}", file=sys.stderr)
+    place = f"in scan {task.scan_number}" if task.scan_number else "before the first scan"
+    if task.status is Status.ENDED:
+        print(f"{task.name}: ended by STOP {place}", file=sys.stderr)
+    elif task.status is Status.FAULTED and log.last is not None:
+        print(f"{task.name}: faulted {place}: {log.last.describe()}", file=sys.stderr)
+    return 0 if task.status is Status.RUNNING else 1

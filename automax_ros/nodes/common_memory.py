@@ -1,0 +1,80 @@
+"""The node ``common_memory``: the rack's common variables as topics.
+
+Publishes: ``variables`` (automax_msgs/VariableTable, latched), ``backplane`` (automax_msgs/CommonWrite),
+``backplane/snapshot`` (automax_msgs/CommonImage, latched), ``common/NAME`` (std_msgs, latched) for each variable with
+``ros: out`` or ``ros: in``.
+
+Subscribes: ``common/NAME/set`` (std_msgs, reliable) for each variable with ``ros: in``, and for no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+from automax_ros.bags.rack_stream import RackStream, Topic
+from automax_ros.core.types import Value
+from automax_ros.nodes.topics import COMMAND_QOS, message_class, publisher
+from automax_ros.rack.config import CommonVariable, Direction
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.ros_names import set_topic
+from automax_ros.rack.writers import ROS_WRITER
+from automax_ros.runtime.memory import MemoryValueError
+
+REFUSAL_INTERVAL_S = 1.0
+"""A variable's refused writes are reported at most this often."""
+
+
+class CommonMemoryNode(Node):  # type: ignore[misc]
+    """Serves the topics of common memory; its callbacks run between scans, on the thread that scans."""
+
+    def __init__(self, rack: Rack, stream: RackStream, context: Context) -> None:
+        """Create publishers and subscriptions; messages flow once the stream begins."""
+        super().__init__("common_memory", namespace=f"/{rack.config.namespace}", context=context)
+        self._rack = rack
+        own = [topic for topic in stream.topics if topic not in stream.module_topics]
+        self._publishers_by_name: dict[str, Publisher[Any]] = {topic.name: publisher(self, topic) for topic in own}
+        for view, variable in enumerate(rack.config.variables):
+            topic = stream.value_topic(variable)
+            if variable.direction is Direction.IN and topic is not None:
+                self._subscribe(view, variable, topic)
+        stream.add_sink(self._publish)
+
+    def _publish(self, topic: Topic, _: int, payload: bytes) -> None:
+        found = self._publishers_by_name.get(topic.name)
+        if found is not None:
+            found.publish(payload)
+
+    def _subscribe(self, view: int, variable: CommonVariable, topic: Topic) -> None:
+        self.create_subscription(
+            message_class(topic.type_name), set_topic(topic.name), self._writer(view, variable), COMMAND_QOS
+        )
+
+    def _writer(self, view: int, variable: CommonVariable) -> Callable[[Any], None]:
+        """Return the callback that writes a variable."""
+
+        def write(message: Any) -> None:
+            try:
+                self._rack.write_view(view, _elements(variable, message), ROS_WRITER)
+            except MemoryValueError as error:
+                self.get_logger().warning(f"write refused: {error}", throttle_duration_sec=REFUSAL_INTERVAL_S)
+
+        return write
+
+
+def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:
+    """Return what a message writes: (element, value) of the whole variable.
+
+    Raises:
+        MemoryValueError: an array message of another length than the variable's.
+    """
+    if not variable.is_array:
+        return [(0, message.data)]
+    data = list(message.data)
+    if len(data) != variable.elements:
+        raise MemoryValueError(f"{variable.name} has {variable.elements} elements, the message has {len(data)}")
+    return list(enumerate(data))

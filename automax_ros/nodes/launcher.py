@@ -1,0 +1,102 @@
+"""One process that composes all nodes of a rack over one memory image, on the wall clock.
+
+The loop stands on absolute deadlines: it serves ROS until the next instant of the rack's scheduler, then carries out what
+is due. No ROS timer is in the way (they skip ticks on a busy host); a deadline that the host made the loop miss is
+skipped and counted, and the next scan stays on the grid. Messages are served on the same thread, so a write from outside
+always falls between two scans.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from rclpy.context import Context
+
+from automax_ros.bags.rack_stream import RackStream
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.types import Value
+from automax_ros.nodes.common_memory import CommonMemoryNode
+from automax_ros.nodes.executor import make_executor
+from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.rack.rack import Rack
+
+LONGEST_WAIT_NS = 50 * NS_PER_MS
+"""The loop wakes at least this often, so that a signal is answered at once."""
+CHORE_PERIOD_NS = 100 * NS_PER_MS
+"""How often the loop calls ``on_idle``."""
+_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
+
+
+@dataclass
+class LiveRack:
+    """A rack with its nodes in this process.
+
+    Make it, ``start`` it, then ``run``; ``close`` in any case. ``stopping`` may be set from a signal handler.
+    """
+
+    rack: Rack
+    stream: RackStream = field(init=False)
+    epoch_ns: int = field(init=False)
+    stopping: bool = False
+    _context: Context = field(init=False)
+    _executor: Any = field(init=False, default=None)
+    _nodes: list[Any] = field(init=False, default_factory=list)
+    _zero_ns: int = field(init=False, default=0)
+    _begun: bool = field(init=False, default=False)
+
+    def __post_init__(self) -> None:
+        """Initialise ROS for this process and create all nodes."""
+        self._context = Context()
+        self._context.init(args=_NO_CONSOLE)
+        self.epoch_ns = time.time_ns()
+        run_id = int.from_bytes(os.urandom(8), "big") >> 1
+        self.stream = RackStream(self.rack, run_id, self.epoch_ns)
+        self._executor = make_executor(self._context)
+        self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context))
+        for processor in self.rack.processors:
+            self._nodes.append(ProcessorNode(self.rack, processor, self.stream, self._context))
+        for node in self._nodes:
+            self._executor.add_node(node)
+
+    def start(self, settings: list[tuple[str, Value]]) -> None:
+        """Begin the stream and put the rack into RUN; rack time starts now."""
+        self.stream.begin()
+        self._begun = True
+        self._zero_ns = time.monotonic_ns()
+        self.rack.start(settings)
+
+    def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:
+        """Let the rack live until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
+        next_chore = 0
+        scheduler = self.rack.scheduler
+        while not self.stopping:
+            now = time.monotonic_ns() - self._zero_ns
+            if duration_ns is not None and now >= duration_ns:
+                scheduler.run_due(duration_ns - 1)
+                break
+            scheduler.run_due(now)
+            if now >= next_chore:
+                next_chore = now + CHORE_PERIOD_NS
+                on_idle(now)
+            due = scheduler.next_ns
+            wake = now + LONGEST_WAIT_NS if due is None else min(due, now + LONGEST_WAIT_NS)
+            if duration_ns is not None:
+                wake = min(wake, duration_ns)
+            wait = max(0, wake - (time.monotonic_ns() - self._zero_ns))
+            self._executor.spin_once(timeout_sec=wait / NS_PER_S)
+
+    def close(self) -> None:
+        """Stop the tasks, send what is still to be sent, destroy the nodes and end ROS in this process."""
+        self.rack.stop()
+        if self._begun:
+            self.stream.end()
+        if self._executor is not None:
+            self._executor.shutdown()
+        for node in self._nodes:
+            node.destroy_node()
+        self._context.try_shutdown()
+

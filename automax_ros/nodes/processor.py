@@ -1,0 +1,129 @@
+"""The node ``processor_SLOT``: a Processor module with its tasks.
+
+Publishes: ``/RACK/scans`` (automax_msgs/Scan) and ``/RACK/states`` (automax_msgs/TaskState) of its tasks,
+``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once a second and when a task's state changes.
+
+Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the task.
+
+Its tasks' run-time errors and PRINT lines go to /rosout.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+
+from automax_ros.bags.rack_stream import RackStream, Topic
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.nodes.topics import publisher
+from automax_ros.nodes.tunables import Tunable, tunables_of
+from automax_ros.rack.rack import Processor, Rack
+from automax_ros.runtime.error_log import LogEntry
+from automax_ros.runtime.memory import Write
+from automax_ros.runtime.scheduler import EventClass, EventKey
+from automax_ros.runtime.task import ScanRecord, Status, Task
+
+DIAGNOSTICS_PERIOD_NS = NS_PER_S
+
+
+class ProcessorNode(Node):  # type: ignore[misc]
+    """Serves one Processor; the scheduler of the rack scans its tasks."""
+
+    def __init__(self, rack: Rack, processor: Processor, stream: RackStream, context: Context) -> None:
+        """Create publishers and parameters, and observe the rack."""
+        super().__init__(f"processor_{processor.slot}", namespace=f"/{rack.config.namespace}", context=context)
+        self._rack, self._processor = rack, processor
+        own = [topic for topic in stream.module_topics if topic.slot == processor.slot]
+        self._publishers_by_topic: dict[Topic, Publisher[Any]] = {topic: publisher(self, topic) for topic in own}
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(processor.tasks)}
+        for tunable in self._tunables.values():
+            self.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor())
+        self.add_on_set_parameters_callback(self._tune)
+        self._skipped_reported = dict.fromkeys((task.name for task in processor.tasks), 0)
+        stream.add_sink(self._publish)
+        rack.observe(self)
+        key = EventKey(EventClass.OBSERVE, 0, self.get_name())
+        rack.scheduler.every(DIAGNOSTICS_PERIOD_NS, rack.now_ns, key, lambda now, _: self._publish_diagnostics(now))
+
+    # RackObserver
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+        """Report errors and printed lines of the Processor's own tasks."""
+        if task.slot != self._processor.slot:
+            return
+        for line, code in record.errors:
+            entry = LogEntry(line, code, record.scan)
+            self.get_logger().warning(f"{task.name}: {entry.describe()}", throttle_duration_sec=1.0)
+        while task.printed:
+            self.get_logger().info(f"{task.name}: {task.printed.popleft()}")
+
+    def written(self, writes: list[Write]) -> None:
+        """Writes from outside are no matter of a Processor."""
+
+    def all_stopped(self, reason: str, now_ns: int) -> None:
+        """Report a STOP ALL."""
+        self.get_logger().error(f"STOP ALL: {reason}")
+        self._publish_diagnostics(now_ns)
+
+    def _publish(self, topic: Topic, _: int, payload: bytes) -> None:
+        found = self._publishers_by_topic.get(topic)
+        if found is not None:
+            found.publish(payload)
+
+    def _tune(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
+        """Tune tasks; parameters that are no tunables pass."""
+        for parameter in parameters:
+            tunable = self._tunables.get(parameter.name)
+            if tunable is None:
+                continue
+            try:
+                tunable.task.tune(tunable.variable, parameter.value)
+            except (ValueError, KeyError) as error:
+                return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _publish_diagnostics(self, now_ns: int) -> None:
+        statuses = [self._status(task, now_ns) for task in self._processor.tasks]
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _status(self, task: Task, now_ns: int) -> DiagnosticStatus:
+        """Return a task's health: ERROR when faulted, WARN when stopped, erring or newly late, else OK (REP-107)."""
+        statistics = self._rack.statistics[task.name]
+        newly_skipped = statistics.skipped - self._skipped_reported[task.name]
+        self._skipped_reported[task.name] = statistics.skipped
+        level, text = DiagnosticStatus.OK, task.status.value
+        if task.status is Status.FAULTED:
+            level, text = DiagnosticStatus.ERROR, self._rack.stop_reason or text
+        elif task.status is not Status.RUNNING:
+            level = DiagnosticStatus.WARN
+        elif newly_skipped:
+            level, text = DiagnosticStatus.WARN, f"{newly_skipped} deadlines missed since the last report"
+        elif task.errors.last is not None:
+            level, text = DiagnosticStatus.WARN, task.errors.last.describe()
+        mean_ns = statistics.total_ns / statistics.scans if statistics.scans else 0.0
+        values = {
+            "period_ms": task.period_ns / NS_PER_MS,
+            "priority": task.priority,
+            "scans": statistics.scans,
+            "skipped": statistics.skipped,
+            "errors": task.errors.count,
+            "load_percent": 100.0 * statistics.total_ns / now_ns if now_ns else 0.0,
+            "mean_us": mean_ns / 1000,
+            "longest_us": statistics.longest_ns / 1000,
+        }
+        return DiagnosticStatus(
+            level=level,
+            name=f"{self.get_name()}: {task.name}",
+            message=text,
+            hardware_id=f"{self._rack.config.name} slot {task.slot}",
+            values=[KeyValue(key=key, value=f"{value:g}") for key, value in values.items()],
+        )

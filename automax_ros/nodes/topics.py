@@ -1,0 +1,44 @@
+"""Topics of a rack's stream as rclpy publishers."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from automax_ros.bags.qos import QosProfile
+from automax_ros.bags.rack_stream import Topic
+
+COMMAND_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=10,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)
+"""What ``/set`` topics are subscribed with."""
+
+
+def message_class(type_name: str) -> Any:
+    """Return the Python class of a message type such as ``std_msgs/msg/Int16``."""
+    package, kind, name = type_name.split("/")
+    return getattr(importlib.import_module(f"{package}.{kind}"), name)
+
+
+def ros_qos(profile: QosProfile) -> QoSProfile:
+    """Return a stream's quality of service for rclpy."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=profile.depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL
+        if profile.durability == "transient_local"
+        else DurabilityPolicy.VOLATILE,
+    )
+
+
+def publisher(node: Node, topic: Topic) -> Publisher[Any]:
+    """Return a node's publisher of a topic; it takes the message as CDR bytes."""
+    return node.create_publisher(message_class(topic.type_name), topic.name, ros_qos(topic.qos))
