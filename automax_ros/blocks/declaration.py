@@ -23,6 +23,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import floor
 from typing import Protocol
 
 from automax_ros.core.numbers import clamp16, clamp32, round_count, sign_extended, truncated_quotient
@@ -33,6 +34,7 @@ HELPERS: dict[str, Callable[..., object]] = {
     "clamp16": clamp16,
     "clamp32": clamp32,
     "float": float,
+    "floor": floor,
     "int": int,
     "max": max,
     "min": min,

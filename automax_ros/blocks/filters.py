@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from math import floor
 
 from automax_ros.blocks.coefficients import (
     TWO_TO_MINUS_18,
@@ -36,7 +37,7 @@ def lag_step(
             y1 = span
         elif y1 < -span:
             y1 = -span
-        output = int(y1 + 0.5) if y1 >= 0.0 else int(y1 - 0.5)
+        output = floor(y1 + 0.5) if y1 >= 0.0 else -floor(0.5 - y1)
     x1 = input
     return output, x1, y1
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from math import floor
 
 from automax_ros.blocks.coefficients import (
     TWO_TO_MINUS_18,
@@ -58,7 +59,7 @@ def integrate_step(
         if y > high:
             y = high
         y1 = y
-        output = int(y1 + 0.5) if y1 >= 0.0 else int(y1 - 0.5)
+        output = floor(y1 + 0.5) if y1 >= 0.0 else -floor(0.5 - y1)
     x1 = input
     saturated_plus = output >= limit_plus
     saturated_minus = output <= limit_minus
@@ -148,7 +149,7 @@ def prop_int_step(
             moved = high
         integrator = moved
         total = integrator + proportional * input
-        output = int(total + 0.5) if total >= 0.0 else int(total - 0.5)
+        output = floor(total + 0.5) if total >= 0.0 else -floor(0.5 - total)
         if output < limit_minus:
             output = limit_minus
         if output > limit_plus:

@@ -15,7 +15,9 @@ from automax_ros.rack.findings import did_you_mean, quoted
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax blocks``."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="a block, such as PROP_INT")
-    parser.add_argument("--template", action="store_true", help="print only the CALL to paste, of NAME or of all blocks")
+    parser.add_argument(
+        "--template", action="store_true", help="print only the CALL to paste, of NAME or of all blocks"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

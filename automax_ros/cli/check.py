@@ -22,12 +22,14 @@ from automax_ros.core.problems import Severity
 
 _RACK_SUFFIXES = (".YAML", ".YML")
 _CANNOT_BE_READ = "AMX6000"
+_NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
+"""A rack file that is too large or not UTF-8 counts as unreadable, although there is something to show of it."""
 _LINE_NUMBER = re.compile(r"\s*([0-9]{1,6})")
 
 
 @dataclass(frozen=True)
 class _Findings:
-    """What was found in one text; ``unconfirmed`` are the forms of a task that no source confirms, with their places."""
+    """What was found in one text; ``unconfirmed`` are the places of forms that no source confirms."""
 
     source: SourceText
     diagnostics: list[Diagnostic]
@@ -36,8 +38,13 @@ class _Findings:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax check``."""
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="a task (.BLK) or a rack file (.yaml, .yml)")
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="a task (.BLK) or a rack file (.yaml, .yml)"
+    )
     add_target_arguments(parser)
+    parser.add_argument(
+        "--allow-outside", action="store_true", help="let a rack file name task sources outside its own folder"
+    )
     parser.add_argument("--json", action="store_true", help="print one list of problems for programs to read")
 
 
@@ -48,7 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
     unusable = 0
     for path in arguments.files:
         try:
-            findings += _rack_file(path) if path.suffix.upper() in _RACK_SUFFIXES else _task_file(path, target)
+            if path.suffix.upper() in _RACK_SUFFIXES:
+                findings += _rack_file(path, allow_outside=arguments.allow_outside)
+            else:
+                findings += _task_file(path, target)
         except UsageError as error:
             print(f"automax check: error: {error}", file=sys.stderr)
             unusable += 1
@@ -57,9 +67,10 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps([record for item in findings for record in _records(item)], indent=2))
     else:
         _print(findings, len(arguments.files) - unusable)
-    if unusable:
+    diagnostics = [item for one in findings for item in one.diagnostics]
+    if unusable or any(item.code in _NOT_A_TEXT for item in diagnostics):
         return 2
-    return 1 if any(has_errors(item.diagnostics) for item in findings) else 0
+    return 1 if has_errors(diagnostics) else 0
 
 
 def _task_file(path: Path, target: Target) -> list[_Findings]:
@@ -68,7 +79,7 @@ def _task_file(path: Path, target: Target) -> list[_Findings]:
     return [_Findings(source, [*([warning] if warning else []), *result.diagnostics], result.unconfirmed)]
 
 
-def _rack_file(path: Path) -> list[_Findings]:
+def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
     """Return what is wrong with the rack file, then with each of its tasks.
 
     Raises:
@@ -77,7 +88,7 @@ def _rack_file(path: Path) -> list[_Findings]:
     from automax_ros.rack.loader import load
     from automax_ros.rack.tasks_check import check_tasks
 
-    rack = load(path)
+    rack = load(path, allow_outside=allow_outside)
     for item in rack.diagnostics:
         if item.code == _CANNOT_BE_READ:
             raise UsageError(f"{path}: {item.message}")

@@ -56,7 +56,7 @@ def _near(asked: str, number: int | None) -> str:
         nearest = [item for item in PROBLEMS.values() if len(asked) > 1 and asked in item.title.upper()][:_NEAR]
     if not nearest:
         return "`automax explain` lists them all"
-    return "near it: " + "; ".join(_line(item) for item in sorted(nearest, key=lambda item: item.number))
+    return "; ".join(f"{item.code} is: {item.title}" for item in sorted(nearest, key=lambda item: item.number))
 
 
 def _line(problem: Problem) -> str:
@@ -66,7 +66,9 @@ def _line(problem: Problem) -> str:
 
 def _page(problem: Problem, *, colour: bool) -> str:
     """Return a page without its marks: headings as plain lines, fenced texts indented."""
-    text = resources.files("automax_ros.core").joinpath("pages", f"{problem.code}.md").read_text(encoding="utf-8")
+    text = (
+        resources.files("automax_ros.core").joinpath("pages").joinpath(f"{problem.code}.md").read_text(encoding="utf-8")
+    )
     lines: list[str] = []
     fenced = False
     for line in text.splitlines():

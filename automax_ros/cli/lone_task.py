@@ -16,7 +16,9 @@ from automax_ros.runtime.compiler import CompiledTask, compile_program
 from automax_ros.runtime.memory import CommonMemory, ViewSpec, fitting
 from automax_ros.runtime.task import Task
 
-_NAME = re.compile(r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>[0-9]{1,6}(?:,[0-9]{1,6}){0,3})[)\]])?")
+_NAME = re.compile(
+    r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>[0-9]{1,6}(?:,[0-9]{1,6}){0,3})[)\]])?"
+)
 _TASK, _OUTSIDE = 1, 2
 """Writers of the memory: the task, and whoever sets variables between scans."""
 
@@ -69,7 +71,9 @@ class LoneTask:
         symbol = symbols.get(match["name"]) if match else None
         if match is None or symbol is None:
             name = match["name"] if match else plain[:80].upper()
-            raise UnknownVariableError("AMX6911", f"the task has no variable {quoted(text)}", _suggestion(name, symbols))
+            raise UnknownVariableError(
+                "AMX6911", f"the task has no variable {quoted(text)}", _suggestion(name, symbols)
+            )
         subscripts = tuple(map(int, match["subscripts"].split(","))) if match["subscripts"] else ()
         return self._variable(symbol, _label(symbol, subscripts), _element(symbol, subscripts, text))
 
@@ -147,5 +151,3 @@ def _suggestion(name: str, symbols: dict[str, Symbol]) -> str | None:
     if ";" in name or "\t" in name:
         return "columns are separated by commas"
     return Suggester().hint(name, symbols)
-
-

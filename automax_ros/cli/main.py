@@ -23,7 +23,7 @@ SUBCOMMANDS: dict[str, str] = {
     "blocks": "describe the control blocks",
     "explain": "say what a problem code means and how to cure it",
 }
-"""Every subcommand and its line of help; its module in this folder has the same name and is imported when it is asked for."""
+"""Every subcommand and its line of help; the module of that name in this folder is imported when it is asked for."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""

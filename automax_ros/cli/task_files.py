@@ -80,9 +80,7 @@ def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult
             raise UsageError(f"{path} {fault}") from fault
         too_large = Diagnostic("AMX0001", f"the text {fault}", Span(1, 1, 2), hint="divide the task")
         return SourceText(str(path), ""), CheckResult(None, [too_large])
-    result = check(
-        source, name=path.stem.upper(), catalogue=CATALOGUE, target=target.processor, tick_ns=target.tick_ns
-    )
+    result = check(source, name=path.stem.upper(), catalogue=CATALOGUE, target=target.processor, tick_ns=target.tick_ns)
     return source, result
 
 

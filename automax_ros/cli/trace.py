@@ -46,7 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="a task (.BLK)")
     parser.add_argument("--input", type=Path, required=True, metavar="IN.csv", help="what to set before each scan")
     parser.add_argument("--output", type=Path, metavar="OUT.csv", help="where to write (default: standard output)")
-    parser.add_argument("--errors", type=Path, metavar="ERR.csv", help="where to write the run-time errors of each scan")
+    parser.add_argument(
+        "--errors", type=Path, metavar="ERR.csv", help="where to write the run-time errors of each scan"
+    )
     add_target_arguments(parser)
     add_watch_argument(parser, "every simple variable")
 
@@ -92,17 +94,20 @@ class _Trace:
         """Scan once for each row, until the table or the task ends."""
         task, period = self._lone.task, self._lone.task.period_ns
         self._write_errors(task.run())
-        if task.status is not Status.RUNNING:
+        if not self._runs():
             return
         for number, _ in enumerate(table.rows()):
             time_ns = number * period
             self._write_errors(task.scan(time_ns))
             cells = [text_of(read()) for read, text_of in self._cells]
             self._output.writerow([str(number + 1), seconds_text(time_ns), *cells])
-            if task.status is not Status.RUNNING:
+            if not self._runs():
                 return
             if number % _ROWS_A_LOOK == 0:
                 bar.show(table.position)
+
+    def _runs(self) -> bool:
+        return self._lone.task.status is Status.RUNNING
 
     def _write_errors(self, record: ScanRecord | None) -> None:
         if self._errors is None or record is None:

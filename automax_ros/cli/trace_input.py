@@ -33,7 +33,7 @@ _TRUTH = {"0": False, "FALSE": False, "OFF": False, "0.0": False, "1": True, "TR
 
 
 class CsvFault(Exception):
-    """Something is wrong with a table: ``code`` AMX6910 to AMX6916, the line from 1, and what to do where that is known."""
+    """Something is wrong with a table: ``code`` AMX6910 to AMX6916, the line from 1, and what to do if known."""
 
     def __init__(self, code: str, line: int, message: str, hint: str | None = None) -> None:
         super().__init__(message)
@@ -107,7 +107,9 @@ class InputTable(AbstractContextManager["InputTable"]):
     def _empty_rows(self, lines: range) -> range:
         """Return the empty lines between two rows, as rows."""
         if lines and len(self.columns) > 1:
-            raise CsvFault("AMX6914", lines[0], "the line is empty, and rows follow", "write the commas of an empty row")
+            raise CsvFault(
+                "AMX6914", lines[0], "the line is empty, and rows follow", "write the commas of an empty row"
+            )
         return lines
 
     def _set(self, cells: list[str]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class UsageError(Exception):
-    """The command cannot do what it was told: wrong arguments, or a file that cannot be read or written; exit code 2."""
+    """The command cannot do what it was told: wrong arguments, or an unreadable file; exit code 2."""
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)

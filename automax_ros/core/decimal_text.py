@@ -18,7 +18,7 @@ def seconds_text(time_ns: int) -> str:
 
 
 def real_text(value: float) -> str:
-    """Return the shortest text that gives the same single-precision value, in Python's form: ``0.1``, ``2.0``, ``1e-20``.
+    """Return the shortest text that gives the same single-precision value, as Python writes it: ``0.1``, ``2.0``.
 
     A number that is no single is written as it is.
     """

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from automax_ros.blocks.declaration import Block, Input, Output, Processor
 from automax_ros.blocks.rules import Contiguous
-from automax_ros.core.diagnostics import Note
+from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.ticks import MAX_TICKS, UDC_MAX_TICKS
 from automax_ros.language.check_context import Context
 from automax_ros.language.coefficients_check import check_coefficients
@@ -25,11 +25,12 @@ def check_call(context: Context, call: Call) -> None:
     block = context.catalogue.get(call.block)
     if block is None:
         hint = context.suggest.hint(call.block, context.catalogue)
-        context.report("AMX4070", f"there is no block {call.block}", call.span, hint)
+        context.report("AMX4070", f"there is no block {call.block}", context.place_of(call.block, call.span), hint)
         return
     before = len(context.diagnostics)
     if context.target not in block.runs_on:
-        context.report("AMX4071", f"{block.name} cannot be used in a {context.target.value.upper()} task", call.span)
+        message = f"{block.name} cannot be used in a {context.target.value.upper()} task"
+        context.report("AMX4071", message, context.place_of(call.block, call.span))
     given = _arguments_by_keyword(context, block, call)
     values: dict[str, Expression] = {}
     for keyword, (parameter, argument) in given.items():
@@ -71,8 +72,8 @@ def _arguments_by_keyword(context: Context, block: Block, call: Call) -> Given:
     for argument in call.arguments:
         parameter = block.parameter(argument.keyword)
         if argument.keyword in given:
-            note = (Note("it is first given here", given[argument.keyword][1].span),)
-            context.report("AMX4073", f"{argument.keyword} is given twice", argument.span, notes=note)
+            note = (Note("it is first given here", _keyword(context, given[argument.keyword][1])),)
+            context.report("AMX4073", f"{argument.keyword} is given twice", _keyword(context, argument), notes=note)
         elif parameter is not None:
             given[argument.keyword] = (parameter, argument)
     return given
@@ -87,15 +88,21 @@ def _check_keywords(context: Context, block: Block, call: Call, given: Collectio
     for argument in strangers:
         name = context.suggest.nearest(argument.keyword, free)
         hint = f"did you mean {name}?" if name else f"its parameters: {', '.join(p.name for p in block.parameters)}"
-        context.report("AMX4072", f"{block.name} has no parameter {argument.keyword}", argument.span, hint)
+        message = f"{block.name} has no parameter {argument.keyword}"
+        context.report("AMX4072", message, _keyword(context, argument), hint)
         meant.add(name)
         for variable in variables_in(argument.value):
             if isinstance(variable, Variable) and variable.name not in context.events:
                 check_variable(context, variable)
     for name in missing:
         if name not in meant:
-            context.report("AMX4074", f"{block.name} needs {name}", call.span, _missing_hint(block, name))
+            place = context.place_of(call.block, call.span)
+            context.report("AMX4074", f"{block.name} needs {name}", place, _missing_hint(block, name))
     return not missing and not strangers
+
+
+def _keyword(context: Context, argument: Argument) -> Span:
+    return context.place_of(argument.keyword, argument.span)
 
 
 def _missing_hint(block: Block, name: str) -> str | None:
@@ -106,8 +113,9 @@ def _missing_hint(block: Block, name: str) -> str | None:
 
 
 def _check_rules(context: Context, block: Block, call: Call, given: Given) -> None:
+    block_name = context.place_of(call.block, call.span)
     for rule in block.rules:
         for fault in rule.faults({keyword: argument.value for keyword, (_, argument) in given.items()}):
-            span = given[fault.keyword][1].span if fault.keyword in given else call.span
+            at_fault = given[fault.keyword][1].span if fault.keyword in given else None
             code = "AMX4081" if isinstance(rule, Contiguous) else "AMX4082"
-            context.report(code, f"{block.name}: {fault.message}", span, rule.text)
+            context.report(code, f"{block.name}: {fault.message}", at_fault or block_name, rule.text)

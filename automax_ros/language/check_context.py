@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from automax_ros.blocks.declaration import Block, Processor
@@ -16,12 +17,16 @@ from automax_ros.language.tree import Data, Event
 
 @dataclass
 class Context:
-    """One check of one task. ``line`` is the BASIC line number in force, None before the first."""
+    """One check of one task.
+
+    ``lines`` are the physical lines of its text; ``line`` is the BASIC line number in force, None before the first.
+    """
 
     target: Processor
     tick_ns: int
     catalogue: Mapping[str, Block]
     commons: Mapping[str, CommonSpec] | None = None
+    lines: Sequence[str] = ()
     broken: BrokenLines = field(default_factory=BrokenLines)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     symbols: dict[str, Symbol] = field(default_factory=dict)
@@ -43,6 +48,14 @@ class Context:
         if len(self.diagnostics) >= DIAGNOSTIC_LIMIT:
             raise TooManyProblemsError
         self.diagnostics.append(Diagnostic(code, message, span, self.line, hint, notes))
+
+    def place_of(self, word: str, span: Span) -> Span:
+        """Return where a word stands in a stretch of the text, the stretch itself where it is not on its first line."""
+        if not 1 <= span.line <= len(self.lines):
+            return span
+        pattern = re.compile(rf"(?<![A-Z0-9_]){re.escape(word)}(?![A-Z0-9_])", re.IGNORECASE)
+        found = pattern.search(self.lines[span.line - 1], span.column - 1, span.end_column - 1)
+        return span if found is None else Span(span.line, found.start() + 1, found.end() + 1)
 
     @property
     def period_s(self) -> float | None:

@@ -61,7 +61,9 @@ def check(
     module, found = parse(source)
     if any(item.code in _NOT_READ for item in found):
         return CheckResult(None, in_order(found))
-    context = Context(target, tick_ns, catalogue, commons, broken_lines(source, found), list(found))
+    context = Context(
+        target, tick_ns, catalogue, commons, source.lines, broken_lines(source, found), diagnostics=list(found)
+    )
     layout = None
     try:
         layout = _check_module(context, module)
@@ -112,6 +114,7 @@ def _program(context: Context, layout: TaskLayout, name: str, source: SourceText
         data_lines=data_lines,
         events=tuple(context.events.values()),
         event=event_name(layout.scan_loop),
+        scan_loop_line=layout.scan_loop_line or 0,
         target=context.target.value,
         source_hash=hashlib.sha256(source.text.encode("utf-8", "surrogatepass")).hexdigest(),
     )

@@ -46,10 +46,10 @@ class StatementReader:
     def recover(self, cursor: Cursor, start: int) -> None:
         """Step behind a statement that could not be read, and open or close the block that it meant."""
         first = cursor.tokens[start]
-        cursor.position = start
+        failed, cursor.position = cursor.position, start
         word = first.text if first.kind is Kind.WORD else ""
         if word == "IF":
-            self._recover_if(cursor, first)
+            self._recover_if(cursor, first, failed)
             return
         following = cursor.following
         assigns = following.kind is Kind.OPERATOR
@@ -61,19 +61,23 @@ class StatementReader:
         elif word in _ELSE_IF or (word == "ELSE" and not following.kind.ends_statement):
             self._frames.close_quietly("ELSE", first.span)
             cursor.skip_line()
+        elif word == "NEXT":
+            self._frames.close_quietly("NEXT", first.span)
         elif word and not assigns:
             for end in ("ELSE", "END_IF", "NEXT"):
                 if _meant(word, end):
                     self._frames.close_quietly(end, first.span)
 
-    def _recover_if(self, cursor: Cursor, first: Token) -> None:
+    def _recover_if(self, cursor: Cursor, first: Token, failed: int) -> None:
+        """Tell by what stands on its line whether a wrong IF began a block."""
+        assigns = cursor.tokens[failed].is_name and cursor.tokens[min(failed + 1, len(cursor.tokens) - 1)].text == "="
         texts = []
         while not cursor.at_end():
             texts.append(cursor.advance().text)
         if texts[-1] == "THEN":
-            self._frames.open_wrong("IF", first.span, doubtful=False)
+            self._frames.open_wrong("IF", first.span, doubtful=texts.count("THEN") > 1)
             return
-        if "THEN" not in texts:
+        if "THEN" not in texts and not assigns and STATEMENT_WORDS.isdisjoint(texts[1:]):
             self._frames.open_wrong("IF", first.span, doubtful=True)
         cursor.skip_line()
 

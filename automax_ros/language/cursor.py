@@ -9,7 +9,7 @@ from typing import NoReturn
 from automax_ros.core.diagnostics import Note, Span, printable
 from automax_ros.core.types import NAME_LIMIT, bare_name
 from automax_ros.language.reporter import Reporter, SyntaxFaultError
-from automax_ros.language.tokens import Fault, Kind, Token
+from automax_ros.language.tokens import RESERVED_WORDS, Fault, Kind, Token
 
 _LONGEST_SUGGESTED = 30
 
@@ -111,7 +111,7 @@ class Cursor:
             hint = "statements on one line are separated by `\\`, a remark begins with `!`"
         elif token.text == "REM":
             hint = "put `\\` before REM"
-        elif token.is_name and self.previous.is_name:
+        elif token.is_name and self.previous.is_name and self.previous.text not in RESERVED_WORDS:
             hint = "names have no blanks; statements on one line are separated by `\\`"
         self.fail("AMX0036", f"{self.found()} is not expected here", hint)
 

@@ -73,7 +73,7 @@ def constant(cursor: Cursor, what: str) -> Expression:
     token = cursor.current
     boolean = token.kind is Kind.WORD and token.text in BOOLEAN_WORDS
     if not (token.kind in (Kind.INTEGER, Kind.REAL) or (sign is None and (token.kind is Kind.STRING or boolean))):
-        hint = "a string stands in quotes" if token.is_name else None
+        hint = "a string stands in quotes" if token.is_name and not boolean else None
         cursor.fail("AMX0073", f"{what} needs a constant, not {cursor.found()}", hint)
     value, _ = _literal(cursor, sign is not None and sign.text == "-")
     return value if sign is None else Unary(sign.text, value, span=sign.span.to(value.span))

@@ -191,7 +191,8 @@ def _check_subscripts(context: Context, element: Element, symbol: Symbol) -> Non
         context.report("AMX4021", f"{element.name} is a simple variable and has no subscripts", element.span)
         return
     if len(element.subscripts) != len(symbol.dimensions):
-        message = f"{element.name} has {len(symbol.dimensions)} subscripts, {len(element.subscripts)} given"
+        plural = "" if len(symbol.dimensions) == 1 else "s"
+        message = f"{element.name} has {len(symbol.dimensions)} subscript{plural}, {len(element.subscripts)} given"
         context.report("AMX4022", message, element.span)
         return
     for subscript, size in zip(element.subscripts, symbol.dimensions, strict=True):

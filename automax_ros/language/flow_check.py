@@ -114,7 +114,7 @@ def _targets(statement: Statement) -> list[tuple[int, str]]:
 
 
 def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:
-    span = jump.place.statement.span
+    span = context.place_of(str(jump.line), jump.place.statement.span)
     place = places.get(jump.line)
     if place is None:
         if jump.line not in context.broken.numbers:

@@ -150,12 +150,16 @@ class FrameStack:
         self._pop()
 
     def close_quietly(self, word: str, span: Span) -> None:
-        """Take a misspelt ELSE, END_IF or NEXT for what it should be, if it fits."""
+        """Take a wrong ELSE, END_IF or NEXT for what it should be, if it fits."""
         frame = self._top
         if frame.word == "IF" and word == "ELSE" and frame.otherwise is None:
             self._label(span)
             _turn_to_else(frame)
-        elif (frame.word, word) in (("IF", "END_IF"), ("FOR", "NEXT")):
+        elif (frame.word, word) == ("IF", "END_IF"):
+            self._pop()
+            self._label(span)
+        elif (frame.word, word) == ("FOR", "NEXT"):
+            self._label(span)
             self._pop()
 
     def _label(self, span: Span) -> None:
@@ -192,12 +196,13 @@ class FrameStack:
         cursor.position -= 1
         if frame.word == "IF":
             cursor.fail("AMX0051", "a second ELSE in one IF", None, (Note("the IF stands here", frame.span),))
-        cursor.fail("AMX0051", "ELSE without IF", self._one_line_hint())
+        hint = self._one_line_hint()
+        self.open_wrong("IF", cursor.here(), doubtful=True)
+        _turn_to_else(self._top)
+        cursor.fail("AMX0051", "ELSE without IF", hint)
 
     def _refuse_next(self, cursor: Cursor, variable: Variable) -> None:
         frame = self._top
-        self._label(variable.span)
-        self._pop()
         assert isinstance(frame.node, For)
         cursor.position -= 1
         note = Note("the innermost FOR stands here", frame.span)

@@ -124,14 +124,15 @@ class LineReader:
                 tokens.extend(found)
                 if tokens and tokens[-1].kind is Kind.REMARK:
                     remark.append(str(tokens[-1].value))
-            offset += len(text) + 1
             start = 0
-            end = Span(row, len(text.rstrip(BLANKS)) + 1, len(text.rstrip(BLANKS)) + 2)
+            written = len(text.rstrip(BLANKS))
+            end = Span(row, written + 1, written + 2)
             if not self._goes_on(line, remark, nesting, end):
                 break
+            offset += len(text) + 1
         if remark:
             tokens[-1] = tokens[-1]._replace(value="\n".join(remark))
-        tokens.append(Token(Kind.END, "", end.line, end.column, end.end_column, offset))
+        tokens.append(Token(Kind.END, "", end.line, end.column, end.end_column, offset + written))
 
     def _goes_on(self, line: LogicalLine, remark: list[str], nesting: _Nesting, end: Span) -> bool:
         last = line.tokens[-1] if line.tokens else None

@@ -82,10 +82,11 @@ class BoundCall:
 class Program:
     """A task without errors.
 
-    ``startup`` are the statements before SCAN_LOOP, which run once when the task goes into RUN; ``scan`` those behind it
-    up to END. ``calls`` maps a Call node (by identity of its span) to what the checker bound it to; ``data`` is the
-    pool of DATA values, ``data_lines`` the index in it at which each DATA line begins. ``events`` are declared by EVENT;
-    ``event`` is the one that starts the scan, None where the clock does.
+    ``startup`` are the statements before SCAN_LOOP, which run once when the task goes into RUN; ``scan`` those behind
+    it up to END; neither holds declarations or SCAN_LOOP. ``calls`` maps a Call node (by identity of its span) to what
+    the checker bound it to, SCAN_LOOP included; ``data`` is the pool of DATA values, ``data_lines`` the line number of
+    each DATA line and the index in the pool at which it begins. ``events`` are declared by EVENT; ``event`` is the one
+    that starts the scan, None where the clock does. ``scan_loop_line`` is the BASIC line of SCAN_LOOP.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Program:
     data_lines: tuple[tuple[int, int], ...] = ()
     events: tuple[Event, ...] = ()
     event: str | None = None
+    scan_loop_line: int = 0
     target: str = "automax"
     source_hash: str = ""
 

@@ -52,6 +52,8 @@ def _line_numbers(cursor: Cursor, word: str) -> tuple[int, ...]:
     lines = [line_number(cursor, word)]
     while cursor.accept(","):
         lines.append(line_number(cursor, word))
+    if cursor.current.kind is Kind.INTEGER:
+        cursor.fail("AMX0071", f"a comma is missing before {cursor.found()}")
     return tuple(lines)
 
 

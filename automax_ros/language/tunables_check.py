@@ -32,7 +32,7 @@ def tuning_limits(context: Context, scope: Scope, declared: Declared) -> TuningL
         context.report("AMX4013", f"the tunable {declared.name} has no CURRENT value", tuning.span)
     if step is not None and step <= 0:
         place = tuning.step.span if tuning.step is not None else tuning.span
-        context.report("AMX4015", f"STEP = {step} of {declared.name} is not above 0", place)
+        context.report("AMX4015", f"STEP = {_text(step)} of {declared.name} is not above 0", place)
     if current is None or len(context.diagnostics) > before:
         return None
     limits = TuningLimits(
@@ -43,10 +43,15 @@ def tuning_limits(context: Context, scope: Scope, declared: Declared) -> TuningL
     )
     if not limits.low <= current <= limits.high:  # type: ignore[operator]
         place = tuning.current.span if tuning.current is not None else tuning.span
-        message = f"CURRENT = {current} of {declared.name} is not inside LOW = {limits.low} to HIGH = {limits.high}"
+        low_text, high_text = _text(limits.low), _text(limits.high)
+        message = f"CURRENT = {_text(current)} of {declared.name} is not inside LOW = {low_text} to HIGH = {high_text}"
         context.report("AMX4014", message, place)
         return None
     return limits
+
+
+def _text(value: Value) -> str:
+    return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
 def _value(context: Context, declared: Declared, key: str, expression: Expression | None) -> int | float | None:

@@ -39,12 +39,10 @@ def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
 def check_tasks(config: RackConfig) -> list[CheckedTask]:
     """Check all tasks of a rack, Processors in the order of slots, tasks in the order of the file.
 
-    A source that could be read when the rack file was loaded, but cannot be any more, is an error of its task (AMX6306).
+    A source that could be read when the rack file was loaded but cannot be any more is an error of its task (AMX6306).
     """
     commons = commons_of(config)
-    return [
-        _checked(processor, task, commons, config) for processor in config.processors for task in processor.tasks
-    ]
+    return [_checked(processor, task, commons, config) for processor in config.processors for task in processor.tasks]
 
 
 def _checked(

@@ -134,7 +134,11 @@ def set_item(base: str, index: ast.expr, value: ast.expr) -> ast.Assign:
 def function(identifier: str, parameters: Sequence[str], body: list[ast.stmt]) -> ast.FunctionDef:
     """Return a function definition."""
     arguments = ast.arguments(
-        posonlyargs=[], args=[ast.arg(parameter) for parameter in parameters], kwonlyargs=[], kw_defaults=[], defaults=[]
+        posonlyargs=[],
+        args=[ast.arg(parameter) for parameter in parameters],
+        kwonlyargs=[],
+        kw_defaults=[],
+        defaults=[],
     )
     made = ast.parse("def f(): pass").body[0]
     assert isinstance(made, ast.FunctionDef)

@@ -31,6 +31,7 @@ from automax_ros.runtime.expressions import SUBSCRIPT, lower_element, lower_inde
 from automax_ros.runtime.inline import inline
 from automax_ros.runtime.layout import Field, Role
 from automax_ros.runtime.pynames import variable_name
+from automax_ros.runtime.simplify import log_in_place
 
 COEFFICIENT_LIMIT = 7004
 
@@ -73,8 +74,16 @@ def instance_of(bound: BoundCall, prefix: str, occurrence: int) -> BlockInstance
 
 def lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     """Emit one block."""
+    emitter.in_block = True
+    _lower_block(emitter, instance)
+    emitter.in_block = False
+
+
+def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     bound, block = instance.bound, instance.bound.block
-    bindings = {item.variable: _input(emitter, bound, item.name) for item in block.inputs if _is_bound(bound, item.name)}
+    bindings = {
+        item.variable: _input(emitter, bound, item.name) for item in block.inputs if _is_bound(bound, item.name)
+    }
     bindings["period"] = build.constant(emitter.program.period_ns / NS_PER_S)
     _bind_coefficients(emitter, instance, bindings)
     held: dict[str, ast.expr] = {}
@@ -87,9 +96,8 @@ def lower_block(emitter: Emitter, instance: BlockInstance) -> None:
         if output.name in bound.arguments
     }
     inlined = inline(block, instance.prefix, bindings, wanted, _free(bindings, wanted, held))
-    emitter.emit(*inlined.body)
-    if inlined.error is not None:
-        emitter.emit(build.when(inlined.error, [emitter.log_call(inlined.error)]))
+    body = inlined.body
+    emitter.emit(*(log_in_place(body, inlined.error, emitter.log_call) if inlined.error is not None else body))
     for output in block.outputs:
         if output.name in wanted:
             _store_output(emitter, output, bound.arguments[output.name], inlined.outputs[output.name], held)
@@ -118,8 +126,6 @@ def _block_value(emitter: Emitter, given: Expression) -> ast.expr:
     if isinstance(given, Element):
         return lower_element(emitter, given).node
     assert isinstance(given, Variable)
-    if emitter.symbol(given.name).latched:
-        return build.name(variable_name(given.name))
     return emitter.read(given.name)
 
 
@@ -191,9 +197,7 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, bindings: dict
         return
     period_s = emitter.program.period_ns / NS_PER_S
     literals = {
-        name: given.value
-        for name in declared.parameters
-        if isinstance(given := bound.arguments.get(name), RealLiteral)
+        name: given.value for name in declared.parameters if isinstance(given := bound.arguments.get(name), RealLiteral)
     }
     if not instance.variable_coefficients:
         values, _ = evaluate(bound.block, period_s, literals)
@@ -203,7 +207,9 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, bindings: dict
     now = [emitter.keep(_block_value(emitter, bound.arguments[name])) for name in instance.variable_coefficients]
     seen = [f"{prefix}seen_{name.lower()}" for name in instance.variable_coefficients]
     function = f"{prefix}coefficients"
-    emitter.extra_globals[function] = coefficient_function(bound.block, period_s, literals, instance.variable_coefficients)
+    emitter.extra_globals[function] = coefficient_function(
+        bound.block, period_s, literals, instance.variable_coefficients
+    )
     was, targets = f"{prefix}was_limited", [prefix + name for name in declared.names]
     changed = [build.compare(build.name(old), "<>", new) for old, new in zip(seen, now, strict=True)]
     news = build.both(build.name(f"{prefix}limited"), build.inverse(build.name(was)))
@@ -227,5 +233,3 @@ def coefficient_function(
         return (*results, limited)
 
     return coefficients
-
-

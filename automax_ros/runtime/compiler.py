@@ -52,7 +52,7 @@ class ScanIo(Protocol):
         ...
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Write back what blocks changed: pairs of view and value."""
+        """Write back what blocks changed: pairs of view and value; called only if something changed."""
         ...
 
     def read_now(self, view: int, element: int = 0) -> Value:
@@ -105,9 +105,7 @@ class CompiledTask:
     source: str
 
 
-def compile_program(
-    program: Program, views: Mapping[str, int], cost_model: CostModel | None = None
-) -> CompiledTask:
+def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:
     """Compile a checked program against a rack's views (full name -> view) of all commons it declares."""
     return _Compilation(program, views, cost_model or CostModel()).result()
 
@@ -115,9 +113,7 @@ def compile_program(
 class _Compilation:
     def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel) -> None:
         self._program = program
-        self._views = {
-            name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON
-        }
+        self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
         self._cost = cost_model
         self._instances = _instances(program)
         self._latched = tuple(symbol.name for symbol in program.symbols.values() if symbol.latched)
@@ -157,6 +153,7 @@ class _Compilation:
         emitter = Emitter(self._program, self._views, modeled, self._cost)
         lowering = StatementLowering(emitter, dict(self._instances.items()))
         if scans:
+            emitter.line = self._program.scan_loop_line
             emitter.add_cost(self._cost.scan_loop_ns(self._program))
             self._latch(emitter)
         lowering.lower_all(statements)
@@ -197,14 +194,17 @@ class _Compilation:
         emitter.add_cost(self._cost.end_ns(self._program))
         written = self._written()
         emitter.checkpoint()
-        emitter.emit(build.assign("changes", ast.List([], ast.Load())))
+        if written:
+            emitter.emit(build.assign("changes", ast.List([], ast.Load())))
         for name in self._latched:
             if name in written:
                 pair = ast.Tuple([build.constant(self._views[name]), build.name(variable_name(name))], ast.Load())
                 append = build.do(build.call(build.attribute("changes", "append"), pair))
                 changed = build.compare(build.name(variable_name(name)), "<>", build.name(latched_name(name)))
                 emitter.emit(build.when(changed, [append]))
-        emitter.emit(build.do(build.call(emitter.member("commit"), build.name("changes"))))
+        if written:
+            commit = build.do(build.call(emitter.member("commit"), build.name("changes")))
+            emitter.emit(build.when(build.name("changes"), [commit]))
         body, emitter.body = emitter.body, outer
         return body
 
@@ -212,7 +212,7 @@ class _Compilation:
         self, name: str, body: list[ast.stmt], emitter: Emitter, lowering: StatementLowering
     ) -> ast.FunctionDef:
         """Return the whole function: load the state, bind what is used, the body, store the state."""
-        opening: list[ast.stmt] = [build.assign(member, build.attribute("io", member)) for member in sorted(emitter.members)]
+        opening: list[ast.stmt] = []
         store: list[ast.stmt] = []
         if self._fields:
             names = list(self._fields)
@@ -260,6 +260,7 @@ def _local_field(symbol: Symbol) -> Field:
         symbol.elements,
         is_array=bool(symbol.dimensions),
         dimensions=symbol.dimensions,
+        length=symbol.length,
     )
 
 
@@ -284,4 +285,3 @@ def _calls(statements: tuple[Statement, ...]) -> list[Call]:
         elif isinstance(statement, For):
             found += _calls(statement.body)
     return found
-

@@ -26,7 +26,8 @@ class Emitter:
     """Collects the body of one generated function.
 
     ``modeled`` makes the generator form, which yields the modeled cost in ns before each access to actual memory.
-    ``views`` maps the full names of commons to their views.
+    ``views`` maps the full names of commons to their views. ``in_block`` is set inside a block statement, subscripts
+    included: there a latched common is the value of the latch.
     """
 
     program: Program
@@ -35,10 +36,10 @@ class Emitter:
     cost_model: CostModel
     body: list[ast.stmt] = field(default_factory=list)
     line: int = 0
-    members: set[str] = field(default_factory=set)
     calls: set[str] = field(default_factory=set)
     extra_globals: dict[str, object] = field(default_factory=dict)
     pending_ns: int = 0
+    in_block: bool = False
     _temporaries: int = 0
     _statement_start: tuple[list[ast.stmt], int] | None = None
     _overflows: bool = False
@@ -81,10 +82,9 @@ class Emitter:
         self.emit(build.assign(name, value))
         return build.name(name)
 
-    def member(self, name: str) -> str:
-        """Note that the function uses a member of ``io`` and return the local it is bound to."""
-        self.members.add(name)
-        return name
+    def member(self, name: str) -> ast.Attribute:
+        """Return a member of ``io``."""
+        return build.attribute("io", name)
 
     def operation(self, name: str, *arguments: ast.expr) -> ast.Call:
         """Return a call of an operation of ``runtime.functions`` or of a Python builtin."""
@@ -95,10 +95,10 @@ class Emitter:
         """Return the statement that logs a problem at the current BASIC line."""
         return build.do(build.call(self.member("log"), build.constant(self.line), code))
 
-    def note_overflow(self, code: int) -> list[ast.stmt]:
+    def note_overflow(self, code: ast.expr) -> list[ast.stmt]:
         """Return statements that remember an overflow if it is the statement's first one."""
         self._overflows = True
-        return [build.assign(OVER, build.either(build.name(OVER), build.constant(code)))]
+        return [build.assign(OVER, build.either(build.name(OVER), code))]
 
     def fallible(self, call: ast.expr) -> ast.expr:
         """Emit a call that returns a result and a problem; log the problem, return the result."""
@@ -107,15 +107,26 @@ class Emitter:
         self.emit(build.when(build.name(problem), [self.log_call(build.name(problem))]))
         return build.name(result)
 
+    def noting(self, call: ast.expr, *overflows: int) -> ast.expr:
+        """Emit a call that returns a result and a problem; the problems ``overflows`` count as the statement's overflow."""
+        result, problem = self.temporary(), build.name(self.temporary())
+        self.emit(build.assign_all([result, problem.id], call))
+        tests = [build.compare(problem, "=", build.constant(code)) for code in overflows]
+        other: list[ast.stmt] = [build.when(problem, [self.log_call(problem)])]
+        self.emit(build.when(tests[0] if len(tests) == 1 else build.either(*tests), self.note_overflow(problem), other))
+        return build.name(result)
+
     def symbol(self, name: str) -> Symbol:
         """Return the declaration of a variable."""
         return self.program.symbols[name]
 
     def read(self, name: str, element: ast.expr | None = None) -> ast.expr:
-        """Return the present value of a variable for a BASIC statement; a common is read from actual memory now."""
+        """Return the present value of a variable; a common is read from actual memory, by a block from the latch (3.3)."""
         symbol = self.symbol(name)
         if symbol.scope is Scope.LOCAL:
             return build.name(variable_name(name)) if element is None else build.item(variable_name(name), element)
+        if self.in_block and symbol.latched:
+            return build.name(variable_name(name))
         self.checkpoint()
         arguments: list[ast.expr] = [build.constant(self.views[name])]
         if element is not None:

@@ -118,8 +118,8 @@ def clamped(emitter: Emitter, value: Lowered, kind: DataType, code: int) -> Lowe
         return Lowered(value.node, kind, value.low, value.high)
     name = emitter.temporary()
     emitter.emit(build.assign(name, value.node))
-    above = [build.assign(name, build.constant(high)), *emitter.note_overflow(code)]
-    below = [build.assign(name, build.constant(low)), *emitter.note_overflow(code)]
+    above = [build.assign(name, build.constant(high)), *emitter.note_overflow(build.constant(code))]
+    below = [build.assign(name, build.constant(low)), *emitter.note_overflow(build.constant(code))]
     branches: list[ast.stmt] = []
     if value.low < low:
         branches = [build.when(build.compare(build.name(name), "<", build.constant(low)), below)]
@@ -130,19 +130,23 @@ def clamped(emitter: Emitter, value: Lowered, kind: DataType, code: int) -> Lowe
 
 
 def _lower_unary(emitter: Emitter, expression: Unary) -> Lowered:
+    if expression.operator == "-" and isinstance(expression.operand, IntegerLiteral):
+        # the sign belongs to the constant: -2147483648 is one, 2147483648 is none
+        value = clamp32(-expression.operand.value)
+        return Lowered(build.constant(value), DataType.DOUBLE, value, value)
     operand = lower(emitter, expression.operand)
+    return _shallow(emitter, _signed(emitter, expression, operand), operand)
+
+
+def _signed(emitter: Emitter, expression: Unary, operand: Lowered) -> Lowered:
     if expression.operator == "NOT":
         if operand.type is DataType.BOOLEAN:
             return of_type(build.inverse(operand.node), DataType.BOOLEAN)
         return Lowered(ast.UnaryOp(ast.Invert(), operand.node), DataType.DOUBLE, ~operand.high, ~operand.low)
-    if operand.type is DataType.BOOLEAN and expression.operator == "-":
-        return of_type(build.inverse(operand.node), DataType.BOOLEAN)
     if expression.operator == "+":
         return operand
     if operand.type is DataType.REAL:
         return Lowered(build.negative(operand.node), DataType.REAL)
-    if isinstance(operand.node, ast.Constant):
-        return Lowered(build.constant(-operand.low), DataType.DOUBLE, -operand.low, -operand.low)
     value = Lowered(build.negative(operand.node), DataType.DOUBLE, -operand.high, -operand.low)
     return clamped(emitter, value, DataType.DOUBLE, OVERFLOW)
 
@@ -152,11 +156,18 @@ def _lower_chain(emitter: Emitter, expression: Binary) -> Lowered:
     result = lower(emitter, first)
     for operation in operations:
         right = lower(emitter, operation.right)
-        depth = max(result.depth, right.depth) + 1
-        result = replace(_OPERATIONS[operation.operator](emitter, operation.operator, result, right), depth=depth)
-        if depth >= DEPTH_LIMIT:
-            result = replace(result, node=emitter.keep(result.node), depth=0)
+        result = _shallow(
+            emitter, _OPERATIONS[operation.operator](emitter, operation.operator, result, right), result, right
+        )
     return result
+
+
+def _shallow(emitter: Emitter, result: Lowered, *operands: Lowered) -> Lowered:
+    """Return the result of an operation with the depth that its operands give it; a deep one goes into a temporary."""
+    depth = 0 if build.is_simple(result.node) else 1 + max((operand.depth for operand in operands), default=0)
+    if depth < DEPTH_LIMIT:
+        return replace(result, depth=depth)
+    return replace(result, node=emitter.keep(result.node), depth=0)
 
 
 def _lower_sum(emitter: Emitter, operator: str, left: Lowered, right: Lowered) -> Lowered:
@@ -180,27 +191,17 @@ def _lower_quotient(emitter: Emitter, _: str, left: Lowered, right: Lowered) -> 
     if DataType.REAL in (left.type, right.type):
         return Lowered(emitter.fallible(emitter.operation("real_quotient", left.node, right.node)), DataType.REAL)
     node = emitter.fallible(emitter.operation("integer_quotient", left.node, right.node))
-    # -2147483648 / -1 and a numerator of 0 / 0 stay within one count of 32 bits
+    # -2147483648 / -1 is the only quotient beyond 32 bits
     value = Lowered(node, DataType.DOUBLE, INT32_MIN, INT32_MAX + 1)
     return clamped(emitter, value, DataType.DOUBLE, OVERFLOW)
 
 
 def _lower_power(emitter: Emitter, _: str, left: Lowered, right: Lowered) -> Lowered:
     name = "real_power" if DataType.REAL in (left.type, right.type) else "integer_power"
-    node = _noting(emitter, emitter.operation(name, left.node, right.node))
+    node = emitter.noting(emitter.operation(name, left.node, right.node), OVERFLOW)
     if name == "real_power":
         return Lowered(node, DataType.REAL)
     return Lowered(node, DataType.DOUBLE, INT32_MIN, INT32_MAX)
-
-
-def _noting(emitter: Emitter, call: ast.expr) -> ast.expr:
-    """Emit a fallible call whose overflow counts as the statement's overflow; other problems are logged at once."""
-    result, problem = emitter.temporary(), emitter.temporary()
-    emitter.emit(build.assign_all([result, problem], call))
-    overflow = build.compare(build.name(problem), "=", build.constant(OVERFLOW))
-    other = [build.when(build.name(problem), [emitter.log_call(build.name(problem))])]
-    emitter.emit(build.when(overflow, emitter.note_overflow(OVERFLOW), list[ast.stmt](other)))
-    return build.name(result)
 
 
 def _lower_relation(_: Emitter, operator: str, left: Lowered, right: Lowered) -> Lowered:
@@ -227,15 +228,17 @@ _OPERATIONS: dict[str, Callable[[Emitter, str, Lowered, Lowered], Lowered]] = {
 
 def _lower_call(emitter: Emitter, call: FunctionCall) -> Lowered:
     arguments = [lower(emitter, argument) for argument in call.arguments]
-    nodes = [argument.node for argument in arguments]
     kind = FUNCTIONS[call.name].result.of(tuple(argument.type for argument in arguments))
-    special = _SPECIAL.get(call.name)
-    if special is not None:
-        return special(emitter, kind, arguments)
-    builtin = BUILTINS[call.name]
-    node: ast.expr = emitter.operation(builtin.carry_out.__name__, *nodes)
+    carry_out = _SPECIAL.get(call.name)
+    result = carry_out(emitter, kind, arguments) if carry_out else _lower_builtin(emitter, call.name, kind, arguments)
+    return _shallow(emitter, result, *arguments)
+
+
+def _lower_builtin(emitter: Emitter, name: str, kind: DataType, arguments: list[Lowered]) -> Lowered:
+    builtin = BUILTINS[name]
+    node: ast.expr = emitter.operation(builtin.carry_out.__name__, *(argument.node for argument in arguments))
     if builtin.fallible:
-        node = _noting(emitter, node)
+        node = emitter.noting(node, OVERFLOW)
     if kind is DataType.REAL or kind is DataType.STRING:
         return Lowered(node, kind)
     if kind is DataType.BOOLEAN:
@@ -252,13 +255,11 @@ def _lower_abs(emitter: Emitter, kind: DataType, arguments: list[Lowered]) -> Lo
     return clamped(emitter, bounds, DataType.DOUBLE, OVERFLOW)
 
 
-def _lower_int(emitter: Emitter, kind: DataType, arguments: list[Lowered]) -> Lowered:
+def _lower_int(emitter: Emitter, _: DataType, arguments: list[Lowered]) -> Lowered:
     value = arguments[0]
     if value.type is not DataType.REAL:
         return value
     node = emitter.operation("whole", value.node)
-    if kind is DataType.REAL:
-        return Lowered(build.binary(node, "+", build.constant(0.0)), kind)
     return clamped(emitter, Lowered(node, DataType.DOUBLE, -(10**18), 10**18), DataType.DOUBLE, OVERFLOW)
 
 

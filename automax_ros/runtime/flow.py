@@ -1,7 +1,8 @@
 """The flow of control of a task with jumps: basic blocks in one ``while`` on an integer ``pc``.
 
 Blocks stand in the order of the source, so that a jump forward and the fall to the next block cost one comparison each;
-only a jump back takes another turn of the loop.
+only a jump back takes another turn of the loop. Many blocks stand in groups, so that a turn finds its block with few
+comparisons, however long the task is.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from automax_ros.runtime import build
 JUMPS = (Goto, Gosub, Return, OnJump, Stop, End)
 PC = "pc"
 STEPS = "steps"
+GROUP = 16
+"""Most blocks, or groups of blocks, that are tested one after the other."""
 
 
 def jump_targets(statements: tuple[Statement, ...]) -> frozenset[int]:
@@ -72,6 +75,7 @@ class Flow:
 
     blocks: list[list[ast.stmt]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
+    counts: list[int] = field(default_factory=list)
     labels: dict[int, int] = field(default_factory=dict)
     _to_lines: list[tuple[ast.Constant, int]] = field(default_factory=list)
     _to_end: list[ast.Constant] = field(default_factory=list)
@@ -80,12 +84,17 @@ class Flow:
         """Begin a block and return its suite."""
         self.blocks.append([])
         self.lines.append(line)
+        self.counts.append(0)
         return self.blocks[-1]
 
     @property
     def current(self) -> int:
         """Number of the block under construction."""
         return len(self.blocks) - 1
+
+    def count(self) -> None:
+        """Count one more statement that the block under construction executes."""
+        self.counts[-1] += 1
 
     def to_block(self, number: int) -> ast.stmt:
         """Return the statement that goes to a block."""
@@ -97,9 +106,13 @@ class Flow:
 
     def to_line(self, line: int) -> ast.stmt:
         """Return the statement that goes to a BASIC line, known or still to come."""
+        return build.assign(PC, self.block_of(line))
+
+    def block_of(self, line: int) -> ast.Constant:
+        """Return the number of the block of a BASIC line, known or still to come."""
         place = ast.Constant(0)
         self._to_lines.append((place, line))
-        return build.assign(PC, place)
+        return place
 
     def to_end(self) -> ast.stmt:
         """Return the statement that ends the function."""
@@ -124,12 +137,44 @@ class Flow:
             place.value = len(self.blocks)
         too_long = ast.Raise(build.call("ScanTooLong", build.item("block_lines", build.name(PC))), None)
         turns: list[ast.stmt] = [build.when(build.compare(build.name(STEPS), ">", build.constant(limit)), [too_long])]
-        turns += [
-            build.when(build.compare(build.name(PC), "=", build.constant(number)), block)
-            for number, block in enumerate(self.blocks)
-        ]
+        turns += _dispatched([self._whole(number) for number in range(len(self.blocks))], 0)
         end = build.constant(len(self.blocks))
         return [
             build.assign(PC, build.constant(0)),
             build.loop(build.compare(build.name(PC), "<>", end), turns),
         ]
+
+    def _whole(self, number: int) -> list[ast.stmt]:
+        """Return a block that counts its statements and takes another turn where it jumps back."""
+        counted = [build.add_to(STEPS, build.constant(self.counts[number]))] if self.counts[number] else []
+        return [*counted, *_turning(self.blocks[number], number)]
+
+
+def _dispatched(blocks: list[list[ast.stmt]], first: int) -> list[ast.stmt]:
+    """Return the tests that lead to blocks, the first of which has the number ``first``."""
+    pc = build.name(PC)
+    if len(blocks) <= GROUP:
+        return [
+            build.when(build.compare(pc, "=", build.constant(number)), block)
+            for number, block in enumerate(blocks, first)
+        ]
+    size = GROUP
+    while size * GROUP < len(blocks):
+        size *= GROUP
+    return [
+        build.when(
+            build.compare(pc, "<", build.constant(first + start + size)),
+            _dispatched(blocks[start : start + size], first + start),
+        )
+        for start in range(0, len(blocks), size)
+    ]
+
+
+def _turning(suite: list[ast.stmt], number: int) -> list[ast.stmt]:
+    """Return the end of block ``number`` with ``continue`` behind each jump that does not surely lead forward."""
+    last = suite[-1]
+    if isinstance(last, ast.If):
+        return [*suite[:-1], ast.If(last.test, _turning(last.body, number), _turning(last.orelse, number))]
+    assert isinstance(last, ast.Assign)
+    forward = isinstance(last.value, ast.Constant) and isinstance(last.value.value, int) and last.value.value > number
+    return suite if forward else [*suite, ast.Continue()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import operator
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -57,6 +58,10 @@ class Fold(ast.NodeTransformer):
             return ast.Name(bound.id, ast.Store())
         return bound
 
+    def visit_Tuple(self, node: ast.Tuple) -> ast.expr:  # noqa: N802
+        """Make a new tuple: the given one belongs to all calls of the block."""
+        return ast.Tuple([self.visit(item) for item in node.elts], node.ctx)
+
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:  # noqa: N802
         """Fold NOT and the sign of constants."""
         node = ast.UnaryOp(node.op, self.visit(node.operand))
@@ -77,6 +82,8 @@ class Fold(ast.NodeTransformer):
         fold = _BINARY.get(type(node.op))
         if fold is not None and left is not None and right is not None:
             return build.constant(fold(left, right))
+        if right == 0 and type(right) is int and isinstance(node.op, (ast.Add, ast.Sub)):
+            return node.left
         return node
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:  # noqa: N802
@@ -115,13 +122,14 @@ class Fold(ast.NodeTransformer):
         return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
 
     def visit_Call(self, node: ast.Call) -> ast.expr:  # noqa: N802
-        """Carry out a helper whose arguments are all constant."""
+        """Carry out a helper whose arguments are all constant; one that fails stays: a test may stand before it."""
         arguments = [self.visit(argument) for argument in node.args]
         values = [value_of(argument) for argument in arguments]
         if isinstance(node.func, ast.Name) and node.func.id in self._helpers and None not in values:
-            result = self._helpers[node.func.id](*values)
-            if isinstance(result, (int, float, bool)):
-                return build.constant(result)
+            with contextlib.suppress(ArithmeticError, ValueError):
+                result = self._helpers[node.func.id](*values)
+                if isinstance(result, (int, float, bool)):
+                    return build.constant(result)
         return ast.Call(node.func, arguments, [])
 
 

@@ -16,6 +16,7 @@ from automax_ros.core.numbers import (
     REAL_MAX,
     clamp16,
     clamp32,
+    sign_extended,
     stored_real,
     truncated_quotient,
 )
@@ -25,6 +26,9 @@ OVERFLOW = 7023
 DIVISION_BY_ZERO = 7024
 BAD_ARGUMENT = 7025
 WRONG_DATA = 7032
+INTEGER_CLAMPED, DOUBLE_CLAMPED, REAL_CLAMPED = 7020, 7021, 7022
+WORD = 16
+"""Bits of the word that the bit functions, shifts and rotations work on (decision)."""
 TEMPORARY_STRING = 132
 """Longest string that an expression works with (J-3675 p. 5-4)."""
 
@@ -50,9 +54,9 @@ def integer_power(base: int, exponent: int) -> tuple[int, int]:
     if exponent < 0:
         if base == 0:
             return INT32_MAX, DIVISION_BY_ZERO
-        return (1 if exponent % 2 == 0 else base) if abs(base) == 1 else 0, 0
+        return (1 if exponent % 2 == 0 else int(base)) if abs(base) == 1 else 0, 0
     if base in (0, 1) or exponent == 0:
-        return 1 if exponent == 0 else base, 0
+        return 1 if exponent == 0 else int(base), 0
     if base == -1:
         return 1 if exponent % 2 == 0 else -1, 0
     if exponent > 31:
@@ -69,8 +73,11 @@ def real_power(base: float, exponent: float) -> Fallible:
     except ZeroDivisionError:
         return REAL_MAX, DIVISION_BY_ZERO
     except OverflowError:
-        odd = math.isfinite(exponent) and exponent == int(exponent) and int(exponent) % 2 == 1
-        return -REAL_MAX if base < 0 and odd else REAL_MAX, OVERFLOW
+        if base >= 0:
+            return REAL_MAX, OVERFLOW
+        if exponent != int(exponent):
+            return 0.0, BAD_ARGUMENT
+        return -REAL_MAX if int(exponent) % 2 else REAL_MAX, OVERFLOW
     if isinstance(power, complex):
         return 0.0, BAD_ARGUMENT
     return power, 0
@@ -148,7 +155,7 @@ def character(code: float) -> tuple[str, int]:
 
 def real_text(value: float) -> str:
     """Return a REAL as PRINT and STR$ show it: eight significant digits, no needless zeros."""
-    text = f"{value:.8G}"
+    text = f"{value + 0.0:.8G}"
     if "E" in text:
         mantissa, _, exponent = text.partition("E")
         return f"{mantissa}E{int(exponent):+03d}"
@@ -201,47 +208,42 @@ def joined(left: str, right: str) -> str:
     return (left + right)[:TEMPORARY_STRING]
 
 
-def _signed(pattern: int) -> int:
-    pattern &= 0xFFFFFFFF
-    return pattern - 0x100000000 if pattern & 0x80000000 else pattern
-
-
 def bit_set(value: int, bit: int) -> tuple[int, int]:
-    """BIT_SET%: the value with a bit (0 to 31) set."""
-    return (_signed(value | 1 << bit), 0) if 0 <= bit <= 31 else (value, BAD_ARGUMENT)
+    """BIT_SET%: the low 16 bits of the value, sign-extended, with a bit (0 to 15) set."""
+    return (sign_extended(value | 1 << bit, WORD), 0) if 0 <= bit < WORD else (value, BAD_ARGUMENT)
 
 
 def bit_clear(value: int, bit: int) -> tuple[int, int]:
-    """BIT_CLR%: the value with a bit (0 to 31) cleared."""
-    return (_signed(value & ~(1 << bit)), 0) if 0 <= bit <= 31 else (value, BAD_ARGUMENT)
+    """BIT_CLR%: the low 16 bits of the value, sign-extended, with a bit (0 to 15) cleared."""
+    return (sign_extended(value & ~(1 << bit), WORD), 0) if 0 <= bit < WORD else (value, BAD_ARGUMENT)
 
 
 def bit_test(value: int, bit: int) -> tuple[bool, int]:
-    """BIT_TST@: whether a bit (0 to 31) is set."""
+    """BIT_TST@: whether a bit (0 to 31) of the 32-bit value is set."""
     return (bool(value >> bit & 1), 0) if 0 <= bit <= 31 else (False, BAD_ARGUMENT)
 
 
 def shift_left(value: int, count: int) -> tuple[int, int]:
-    """SHIFTL%: shift 32 bits left, zeros come in."""
-    return (_signed(value << count), 0) if 0 <= count <= 31 else (value, BAD_ARGUMENT)
+    """SHIFTL%: the low 16 bits of the value shifted left by 0 to 15 places, zeros come in."""
+    return (sign_extended(value << count, WORD), 0) if 0 <= count < WORD else (value, BAD_ARGUMENT)
 
 
 def shift_right(value: int, count: int) -> tuple[int, int]:
-    """SHIFTR%: shift 32 bits right, zeros come in."""
-    return (_signed((value & 0xFFFFFFFF) >> count), 0) if 0 <= count <= 31 else (value, BAD_ARGUMENT)
+    """SHIFTR%: the low 16 bits of the value shifted right by 0 to 15 places, zeros come in."""
+    return (sign_extended((value & 0xFFFF) >> count, WORD), 0) if 0 <= count < WORD else (value, BAD_ARGUMENT)
 
 
 def rotate_left(value: int, count: int) -> tuple[int, int]:
-    """ROTATEL%: rotate 32 bits left."""
-    if not 0 <= count <= 31:
+    """ROTATEL%: the low 16 bits of the value rotated left by 0 to 15 places."""
+    if not 0 <= count < WORD:
         return value, BAD_ARGUMENT
-    pattern = value & 0xFFFFFFFF
-    return _signed(pattern << count % 32 | pattern >> (32 - count % 32)), 0
+    pattern = value & 0xFFFF
+    return sign_extended(pattern << count | pattern >> (WORD - count), WORD), 0
 
 
 def rotate_right(value: int, count: int) -> tuple[int, int]:
-    """ROTATER%: rotate 32 bits right."""
-    return rotate_left(value, (32 - count) % 32) if 0 <= count <= 31 else (value, BAD_ARGUMENT)
+    """ROTATER%: the low 16 bits of the value rotated right by 0 to 15 places."""
+    return rotate_left(value, -count % WORD) if 0 <= count < WORD else (value, BAD_ARGUMENT)
 
 
 def data_value(value: Value, suffix: str, limit: int) -> tuple[Value, int]:
@@ -258,10 +260,10 @@ def data_value(value: Value, suffix: str, limit: int) -> tuple[Value, int]:
         return kind.zero, WRONG_DATA
     if kind is DataType.REAL:
         single, overflowed = stored_real(float(value))
-        return single, 7022 if overflowed else 0
+        return single, REAL_CLAMPED if overflowed else 0
     number = whole(value)
     stored = clamp16(number) if kind is DataType.INTEGER else clamp32(number)
-    return stored, 0 if stored == number else 7020 if kind is DataType.INTEGER else 7021
+    return stored, 0 if stored == number else INTEGER_CLAMPED if kind is DataType.INTEGER else DOUBLE_CLAMPED
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from automax_ros.blocks.declaration import HELPERS, Block
 from automax_ros.runtime import build
 from automax_ros.runtime.folding import Fold, fold_body, value_of, without_dead_stores
+from automax_ros.runtime.simplify import carry_on
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,10 @@ def step_tree(block: Block) -> StepTree:
     body = [_Constants(constants).visit(statement) for statement in body]
     results = tuple(_Constants(constants).visit(result) for result in results)
     assigned = {
-        node.id for part in body for node in ast.walk(part) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        node.id
+        for part in body
+        for node in ast.walk(part)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     }
     return StepTree(tuple(argument.arg for argument in parsed.args.args), tuple(body), results, frozenset(assigned))
 
@@ -133,12 +137,29 @@ def inline(
     body = opening + fold_body(tree.body, fold)
     outputs = {output.name: fold.visit(results[output.variable]) for output in block.outputs if output.name in wanted}
     state_results = tree.results[len(block.outputs) : len(block.outputs) + len(block.states)]
+    fleeting = _fleeting(block, tree, several_outputs=len(wanted) > 1)
+    for output in block.outputs:
+        result = results[output.variable]
+        if output.name in wanted and isinstance(result, ast.Name) and result.id in fleeting:
+            copy = f"{prefix}out_{output.variable}"
+            body.append(build.assign(copy, outputs[output.name]))
+            outputs[output.name] = build.name(copy)
     body.extend(_store_states(block, prefix, [fold.visit(result) for result in state_results]))
     error = fold.visit(tree.results[-1]) if _can_log_in_step(block) else None
     if error is not None and value_of(error) == 0:
         error = None
+    own = frozenset(prefix + local for local in tree.assigned - set(tree.parameters))
+    results_now = {**outputs, **({"": error} if error is not None else {})}
+    body, results_now = carry_on(body, results_now, own - {prefix + state.name for state in block.states})
+    error = results_now.pop("", None)
+    outputs = results_now
     needed = {prefix + state.name for state in block.states}
-    needed |= {node.id for part in [*outputs.values(), *([error] if error else [])] for node in ast.walk(part) if isinstance(node, ast.Name)}
+    needed |= {
+        node.id
+        for part in [*outputs.values(), *([error] if error else [])]
+        for node in ast.walk(part)
+        if isinstance(node, ast.Name)
+    }
     return Inlined(without_dead_stores(body, needed), outputs, error)
 
 
@@ -151,6 +172,22 @@ def _direct_target(
         if target and target in free and isinstance(result, ast.Name) and result.id == local:
             return target
     return None
+
+
+def _fleeting(block: Block, tree: StepTree, *, several_outputs: bool) -> set[str]:
+    """Return the names that may have changed when the outputs are stored.
+
+    Those are states that get a new value, and inputs, whose variable another output may be stored in.
+    """
+    states = [state.name for state in block.states]
+    new = tree.results[len(block.outputs) : len(block.outputs) + len(states)]
+    changing = {
+        name
+        for name, result in zip(states, new, strict=True)
+        if not (isinstance(result, ast.Name) and result.id == name)
+    }
+    inputs = set(tree.parameters) - set(states) - tree.assigned if several_outputs else set()
+    return changing | inputs
 
 
 def _store_states(block: Block, prefix: str, results: Sequence[ast.expr]) -> list[ast.stmt]:

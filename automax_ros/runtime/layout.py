@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Union
 
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN
 from automax_ros.core.types import DataType, Value
 
 StateValue = Union[Value, list[Value]]
@@ -29,11 +30,19 @@ class Role(enum.Enum):
     LOG = "log"
 
 
+_VARIABLES = (Role.LOCAL, Role.TUNABLE)
+
+
+def _in_range(kind: DataType, value: float) -> bool:
+    return INT16_MIN <= value <= INT16_MAX if kind is DataType.INTEGER else INT32_MIN <= value <= INT32_MAX
+
+
 @dataclass(frozen=True)
 class Field:
     """One field: ``name`` is the variable's full name, or line, block and state as in ``1030 LAG.y1``.
 
-    ``initial`` is the value at installation (locals), or at the block's first execution since RUN.
+    ``initial`` is the value at installation (locals), or at the block's first execution since RUN; ``dimensions`` are
+    an array's, ``length`` is the longest text of a string.
     """
 
     name: str
@@ -43,10 +52,28 @@ class Field:
     size: int = 1
     is_array: bool = False
     dimensions: tuple[int, ...] = ()
+    length: int = 0
 
     def fresh(self) -> StateValue:
         """Return the field's value at installation."""
         return [self.initial] * self.size if self.is_array else self.initial
+
+    def typed(self, value: Value) -> Value:
+        """Return a value from a snapshot in the field's own type.
+
+        Raises:
+            ValueError: the field cannot hold it.
+        """
+        if isinstance(value, str) or self.type is DataType.STRING:
+            if isinstance(value, str) and self.type is DataType.STRING and len(value) <= self.length:
+                return value
+        elif self.type is DataType.BOOLEAN:
+            return bool(value)
+        elif self.type is DataType.REAL:
+            return float(value)
+        elif math.isfinite(value) and (self.role not in _VARIABLES or _in_range(self.type, value)):
+            return int(value)
+        raise ValueError(f"{self.name} cannot be {value!r}: it is {self.type.word}")
 
 
 @dataclass(frozen=True)
@@ -57,8 +84,11 @@ class Layout:
 
     @property
     def hash(self) -> str:
-        """SHA-256 over names, types and sizes."""
-        text = "\n".join(f"{field.name}:{field.type.word}:{field.size}:{field.role.value}" for field in self.fields)
+        """SHA-256 over names, types, sizes and roles."""
+        text = "\n".join(
+            f"{field.name}:{field.type.word}:{field.dimensions or field.size}:{field.length}:{field.role.value}"
+            for field in self.fields
+        )
         return hashlib.sha256(text.encode()).hexdigest()
 
     def index(self, name: str) -> int:
@@ -96,7 +126,7 @@ class Layout:
         """Return the state from flat values, each brought back to its field's type.
 
         Raises:
-            ValueError: the number of values is not the layout's.
+            ValueError: the number of values is not the layout's, or a field cannot hold its value.
         """
         expected = sum(field.size for field in self.fields)
         if len(values) != expected:
@@ -104,21 +134,7 @@ class Layout:
         state: list[StateValue] = []
         position = 0
         for field in self.fields:
-            part = [_typed(field.type, value) for value in values[position : position + field.size]]
+            part = [field.typed(value) for value in values[position : position + field.size]]
             state.append(part if field.is_array else part[0])
             position += field.size
         return state
-
-
-def _typed(kind: DataType, value: Value) -> Value:
-    if kind is DataType.STRING:
-        return str(value)
-    if isinstance(value, str):
-        raise ValueError(f"text {value!r} where a {kind.word} is stored")
-    if kind is DataType.BOOLEAN:
-        return bool(value)
-    if kind is DataType.REAL:
-        return float(value)
-    if not math.isfinite(value):
-        raise ValueError(f"{value} where a {kind.word} is stored")
-    return int(value)

@@ -34,10 +34,13 @@ STEP_IS_ZERO = 7027
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop that has begun: its limit and step are literals or locals named after the line."""
+    """A loop that has begun: its limit and step are literals or locals named after ``place``, its line.
+
+    A second loop of one line has ``.2`` behind the line, and so on.
+    """
 
     statement: For
-    line: int
+    place: str
     stop: ast.expr
     step: ast.expr
     stop_type: DataType
@@ -51,20 +54,21 @@ class Loop:
         return value_of(self.step) is None
 
 
-def begin_loop(emitter: Emitter, statement: For) -> Loop:
+def begin_loop(emitter: Emitter, statement: For, place: str) -> Loop:
     """Emit the start of a loop: the variable gets its first value, limit and step are evaluated once."""
+    prefix = f"for{place.replace('.', '_')}"
     start = lower(emitter, statement.start)
     start = Lowered(emitter.keep(start.node), start.type, start.low, start.high)
     stop = lower(emitter, statement.stop)
     step = Lowered(build.constant(1), DataType.DOUBLE, 1, 1)
     if statement.step is not None:
         step = lower(emitter, statement.step)
-    stop_node = _kept(emitter, f"for{emitter.line}_stop", stop.node)
-    step_node = _kept(emitter, f"for{emitter.line}_step", step.node)
+    stop_node = _kept(emitter, f"{prefix}_stop", stop.node)
+    step_node = _kept(emitter, f"{prefix}_step", step.node)
     store(emitter, statement.variable, start)
     loop = Loop(
         statement,
-        emitter.line,
+        place,
         stop_node,
         step_node,
         stop.type,
@@ -91,7 +95,7 @@ def loop_fields(loop: Loop) -> dict[str, Field]:
     for word, node, kind in (("stop", loop.stop, loop.stop_type), ("step", loop.step, loop.step_type)):
         if isinstance(node, ast.Name):
             stored = DataType.REAL if kind is DataType.REAL else DataType.DOUBLE
-            fields[node.id] = Field(f"{loop.line} FOR.{word}", stored, Role.STACK, stored.zero)
+            fields[node.id] = Field(f"{loop.place} FOR.{word}", stored, Role.STACK, stored.zero)
     return fields
 
 
@@ -102,9 +106,7 @@ def loop_test(emitter: Emitter, loop: Loop) -> ast.expr:
     if isinstance(step, (int, float)):
         return build.compare(variable, "<=" if step >= 0 else ">=", loop.stop)
     rising = build.compare(loop.step, ">=", build.constant(0))
-    return build.choose(
-        rising, build.compare(variable, "<=", loop.stop), build.compare(variable, ">=", loop.stop)
-    )
+    return build.choose(rising, build.compare(variable, "<=", loop.stop), build.compare(variable, ">=", loop.stop))
 
 
 def end_turn(emitter: Emitter, loop: Loop) -> ast.expr | None:

@@ -12,6 +12,7 @@ the write log, if anybody has asked for the log.
 
 from __future__ import annotations
 
+import contextlib
 import enum
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -134,15 +135,15 @@ class CommonMemory:
             raise MemoryValueError(f"{spec.name} has no element {element}: it has {spec.elements}")
         self._store(view, element, fitting(spec, value), writer, WriteKind.OUTSIDE)
 
-    def force(self, view: int, value: Value, element: int = 0) -> None:
-        """Hold a value against every write until it is released.
+    def force(self, view: int, value: Value, element: int = 0, writer: int = 0) -> None:
+        """Hold a value against every write until it is released; the force itself is a write from outside.
 
         Raises:
             MemoryValueError: the value does not fit the variable's type.
         """
         fit = fitting(self.specs[view], value)
         self._forced.discard((view, element))
-        self._put(view, element, fit)
+        self._store(view, element, fit, writer, WriteKind.OUTSIDE)
         self._forced.add((view, element))
 
     def release(self, view: int, element: int = 0) -> None:
@@ -217,9 +218,10 @@ def fitting(spec: ViewSpec, value: Value) -> Value:
             return value
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
         if kind is DataType.REAL:
-            single, clamped = stored_real(float(value))
-            if not clamped:
-                return single
+            with contextlib.suppress(OverflowError):
+                single, clamped = stored_real(float(value))
+                if not clamped:
+                    return single
         else:
             low, high = (INT16_MIN, INT16_MAX) if kind is DataType.INTEGER else (INT32_MIN, INT32_MAX)
             if low <= value <= high and value == int(value):

@@ -111,16 +111,17 @@ class Scheduler:
         A periodic event that is late by whole periods happens once, at the last of its instants that have passed;
         the others are skipped and counted. What becomes due while events are carried out waits for the next call.
         """
-        due: list[tuple[int, int, Event]] = []
+        late: list[tuple[_Queued, int]] = []
         while self._queue and self._queue[0][0] <= now_ns:
-            instant, event = self._queue[0][0], self._queue[0][5]
-            heapq.heappop(self._queue)
+            instant, order, priority, name, serial, event = heapq.heappop(self._queue)
             skipped = (now_ns - instant) // event.period_ns if event.period_ns else 0
-            due.append((instant + skipped * event.period_ns, skipped, event))
-        for instant, _, event in due:
+            last = instant + skipped * event.period_ns
+            late.append(((last, order, priority, name, serial, event), skipped))
+        late.sort()
+        for (instant, _, _, _, _, event), _ in late:
             if event.period_ns and not event.cancelled:
                 heapq.heappush(self._queue, self._queued(instant + event.period_ns, event))
-        for instant, skipped, event in due:
+        for (instant, _, _, _, _, event), skipped in late:
             if not event.cancelled:
                 self.now_ns = max(self.now_ns, instant)
                 event.action(instant, skipped)

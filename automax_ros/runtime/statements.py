@@ -33,8 +33,9 @@ from automax_ros.runtime import build
 from automax_ros.runtime.calls import BlockInstance, lower_block
 from automax_ros.runtime.emitter import Emitter
 from automax_ros.runtime.expressions import lower, of_type
-from automax_ros.runtime.flow import STEPS, Flow, count_statements, is_jumping, jump_targets
+from automax_ros.runtime.flow import PC, STEPS, Flow, count_statements, is_jumping, jump_targets
 from automax_ros.runtime.folding import value_of
+from automax_ros.runtime.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
 from automax_ros.runtime.layout import Field, Role
 from automax_ros.runtime.loops import Loop, begin_loop, end_turn, loop_fields, loop_test
 from automax_ros.runtime.stores import store
@@ -56,11 +57,11 @@ class StatementLowering:
     counts_steps: bool = False
     can_stop: bool = False
     _targets: frozenset[int] = frozenset()
+    _loops: dict[int, int] = field(default_factory=dict)
 
     def lower_all(self, statements: tuple[Statement, ...]) -> None:
-        """Emit the statements; END as the last one is left to the caller."""
-        if statements and isinstance(statements[-1], End) and statements[-1].number not in jump_targets(statements):
-            statements = statements[:-1]
+        """Emit the statements; END behind them is left to the caller."""
+        statements = _before_end(statements)
         self._targets = jump_targets(statements)
         if any(is_jumping(statement, self._targets) for statement in statements):
             self._lower_blocks(statements)
@@ -99,7 +100,7 @@ class StatementLowering:
                 emitter.emit(build.when(build.inverse(test), [ast.Break()]))
             emitter.emit(*self._count(count_statements(statement.body) + 1, line))
             self._lower_straight(statement.body)
-            with emitter.statement(line):
+            with emitter.statement(emitter.line):
                 overflowed = end_turn(emitter, loop)
             if overflowed is not None:
                 emitter.book_cost()
@@ -113,7 +114,9 @@ class StatementLowering:
         line = self.emitter.line
         with self.emitter.statement(line):
             self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
-            loop = begin_loop(self.emitter, statement)
+            self._loops[line] = self._loops.get(line, 0) + 1
+            place = f"{line}" if self._loops[line] == 1 else f"{line}.{self._loops[line]}"
+            loop = begin_loop(self.emitter, statement, place)
         self.fields.update(loop_fields(loop))
         return loop
 
@@ -151,13 +154,13 @@ class StatementLowering:
             if statement.number in self._targets and statement.number is not None:
                 self._next_block(flow)
                 flow.labels[statement.number] = flow.current
-            if not is_jumping(statement, self._targets) or isinstance(statement, Label):
-                if not isinstance(statement, Label):
-                    self.emitter.emit(build.add_to(STEPS, build.constant(1)))
-                self._lower_straight((statement,))
+            if isinstance(statement, Label):
                 continue
-            self.emitter.emit(build.add_to(STEPS, build.constant(1)))
-            self._flow_one(flow, statement)
+            flow.count()
+            if is_jumping(statement, self._targets):
+                self._flow_one(flow, statement)
+            else:
+                self._lower_straight((statement,))
 
     def _flow_one(self, flow: Flow, statement: Statement) -> None:
         self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement) if not isinstance(statement, For) else 0)
@@ -184,13 +187,13 @@ class StatementLowering:
     def _flow_if(self, flow: Flow, statement: If) -> None:
         condition = self._condition(statement.condition, statement, costed=True)
         otherwise_at, end_at = flow.later(), flow.later()
-        jump = build.when(condition, [flow.to_next()], [build.assign("pc", otherwise_at)])
+        jump = build.when(condition, [flow.to_next()], [build.assign(PC, otherwise_at)])
         if len(statement.then) == 1 and isinstance(statement.then[0], Goto) and not statement.otherwise:
             self._next_block(flow, build.when(condition, [flow.to_line(statement.then[0].line)], [flow.to_next()]))
             return
         self._next_block(flow, jump)
         self._flow_all(flow, statement.then)
-        self._next_block(flow, build.assign("pc", end_at))
+        self._next_block(flow, build.assign(PC, end_at))
         flow.here(otherwise_at)
         if statement.otherwise:
             self._flow_all(flow, statement.otherwise)
@@ -208,6 +211,7 @@ class StatementLowering:
         else:
             self._next_block(flow)
         top = flow.current
+        flow.count()
         with emitter.statement(line):
             test = loop_test(emitter, loop)
             emitter.book_cost()
@@ -215,7 +219,7 @@ class StatementLowering:
         self._begin_block(flow)
         self._flow_all(flow, statement.body)
         emitter.book_cost()
-        with emitter.statement(line):
+        with emitter.statement(emitter.line):
             overflowed = end_turn(emitter, loop)
         again = flow.to_block(top)
         self._next_block(flow, again if overflowed is None else build.when(overflowed, [leave], [again]))
@@ -224,12 +228,12 @@ class StatementLowering:
     def _flow_on(self, flow: Flow, statement: OnJump) -> None:
         with self.emitter.statement(self.emitter.line):
             selector = self.emitter.keep(lower(self.emitter, statement.selector).node)
-        choice: list[ast.stmt] = [flow.to_next()]
-        for number, line in reversed(list(enumerate(statement.lines, 1))):
-            jump = flow.to_line(line)
-            taken = self._gosub(flow, jump) if statement.gosub else [jump]
-            choice = [build.when(build.compare(selector, "=", build.constant(number)), taken, choice)]
-        self._next_block(flow, *choice)
+        blocks = ast.Tuple([flow.block_of(line) for line in statement.lines], ast.Load())
+        jump = build.assign(PC, ast.Subscript(blocks, build.binary(selector, "-", build.constant(1)), ast.Load()))
+        taken = self._gosub(flow, jump) if statement.gosub else [jump]
+        count = build.constant(len(statement.lines))
+        in_list = ast.Compare(build.constant(1), [ast.LtE(), ast.LtE()], [selector, count])
+        self._next_block(flow, build.when(in_list, taken, [flow.to_next()]))
 
     def _gosub(self, flow: Flow, jump: ast.stmt) -> list[ast.stmt]:
         self.fields["gosub_lines"] = Field("GOSUB.blocks", DataType.DOUBLE, Role.STACK, 0, GOSUB_DEPTH, is_array=True)
@@ -249,7 +253,7 @@ class StatementLowering:
         depth = build.name("gosub_depth")
         back = [
             build.add_to("gosub_depth", build.constant(-1)),
-            build.assign("pc", build.item("gosub_lines", depth)),
+            build.assign(PC, build.item("gosub_lines", depth)),
         ]
         go_on = [self.emitter.log_call(build.constant(RETURN_WITHOUT_GOSUB)), flow.to_next()]
         return [build.when(depth, list[ast.stmt](back), go_on)]
@@ -297,7 +301,7 @@ class StatementLowering:
         for target in statement.targets:
             kind, emitter = target.type, self.emitter
             length = emitter.symbol(target.name).length
-            value = emitter.temporary()
+            emitter.book_cost()
             with emitter.suite() as present:
                 call = emitter.operation(
                     "data_value",
@@ -305,12 +309,13 @@ class StatementLowering:
                     build.constant(kind.value),
                     build.constant(length),
                 )
-                emitter.emit(build.assign(value, emitter.fallible(call)))
+                value = emitter.noting(call, INTEGER_CLAMPED, DOUBLE_CLAMPED, REAL_CLAMPED)
                 emitter.emit(build.add_to("data_pointer", build.constant(1)))
-                store(emitter, target, of_type(build.name(value), kind))
-            size = build.constant(len(emitter.program.data))
+                store(emitter, target, of_type(value, kind))
+            limits = [build.name("data_pointer"), build.constant(len(emitter.program.data))]
+            there = ast.Compare(build.constant(0), [ast.LtE(), ast.Lt()], limits)
             missing = [emitter.log_call(build.constant(OUT_OF_DATA))]
-            emitter.emit(build.when(build.compare(build.name("data_pointer"), "<", size), present, missing))
+            emitter.emit(build.when(there, present, missing))
 
     def _restore(self, statement: Restore) -> None:
         self._use_data()
@@ -339,6 +344,16 @@ class StatementLowering:
         """A remark does nothing; its time is added by the frame of every statement."""
 
 
+def _before_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Return the statements before the task's END, behind which only remarks stand; all if something jumps to those."""
+    targets = jump_targets(statements)
+    for position, statement in enumerate(statements):
+        if isinstance(statement, End):
+            jumped_to = any(item.number in targets for item in statements[position:])
+            return statements if jumped_to else statements[:position]
+    return statements
+
+
 def _printable(emitter: Emitter, item: Expression) -> ast.expr:
     value = lower(emitter, item)
     if type_of(item) is DataType.REAL and isinstance(literal := value_of(value.node), int):
@@ -357,4 +372,3 @@ _SIMPLE: dict[type, _Carry] = {
     ClearErrorLog: StatementLowering._clear_log,  # type: ignore[dict-item]
     Remark: StatementLowering._remark,  # type: ignore[dict-item]
 }
-

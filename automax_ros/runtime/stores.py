@@ -12,8 +12,8 @@ from automax_ros.runtime.calls import write_element
 from automax_ros.runtime.emitter import Emitter
 from automax_ros.runtime.expressions import Lowered, clamped
 from automax_ros.runtime.folding import value_of
+from automax_ros.runtime.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
 
-INTEGER_CLAMPED, DOUBLE_CLAMPED, REAL_CLAMPED = 7020, 7021, 7022
 _EXACT_IN_REAL = 2**24
 
 
@@ -53,5 +53,5 @@ def _as_real(emitter: Emitter, value: Lowered) -> ast.expr:
         return build.binary(value.node, "+", build.constant(0.0))
     result, flag = emitter.temporary(), emitter.temporary()
     emitter.emit(build.assign_all([result, flag], emitter.operation("store_real", value.node)))
-    emitter.emit(build.when(build.name(flag), emitter.note_overflow(REAL_CLAMPED)))
+    emitter.emit(build.when(build.name(flag), emitter.note_overflow(build.constant(REAL_CLAMPED))))
     return build.name(result)

@@ -189,16 +189,29 @@ class Task:
         self.scan_number += 1
         return self._execute(self.compiled.scan, now_ns, skipped)
 
-    def scan_modeled(self, now_ns: int) -> Generator[int, int, None]:
-        """Execute one scan in steps: yields the ns that pass before the next memory access, is sent the time then."""
+    def scan_modeled(self, now_ns: int, skipped: int = 0) -> Generator[int, int | None, ScanRecord | None]:
+        """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
+
+        Yields the ns that pass before the next memory access and is sent the time then, None for the time it is. The
+        state is whole again when the generator has ended.
+        """
+        if self.status is not Status.RUNNING:
+            return None
         self.scan_number += 1
+        record = self._begin_record(now_ns, skipped)
         self.memory.now_ns = now_ns
         steps = self.compiled.scan_steps(self.state, self._io)
         try:
-            for cost in steps:
-                self.memory.now_ns = (yield cost) or self.memory.now_ns
+            while True:
+                later = yield next(steps)
+                if later is not None:
+                    self.memory.now_ns = later
+        except StopIteration as end:
+            if end.value:
+                self.status = Status.ENDED
         except ScanTooLong as error:
             self._too_long(error)
+        return record
 
     def stop(self) -> None:
         """Stop the task; its locals keep their values."""
@@ -216,8 +229,9 @@ class Task:
             ValueError: it does not fit the layout.
         """
         state, log = values[:-LOG_NUMBERS], values[-LOG_NUMBERS:]
-        self.state[:] = self.compiled.layout.restore(state)
+        restored = self.compiled.layout.restore(state)
         self.errors.restore([int(number) for number in log])
+        self.state[:] = restored
 
     def value(self, name: str) -> Value | list[Value]:
         """Return a local, a tunable or a block's state by its name in the layout.
@@ -246,17 +260,20 @@ class Task:
         self.state[self.compiled.layout.index(name)] = stored
 
     def _execute(self, part: Callable[..., bool], now_ns: int, skipped: int) -> ScanRecord | None:
-        io = self._io
+        record = self._begin_record(now_ns, skipped)
         self.memory.now_ns = now_ns
-        record = None
-        if isinstance(io, RecordingIo):
-            record = io.record = ScanRecord(now_ns, self.scan_number, skipped=skipped)
         try:
-            if part(self.state, io):
+            if part(self.state, self._io):
                 self.status = Status.ENDED
         except ScanTooLong as error:
             self._too_long(error)
         return record
+
+    def _begin_record(self, now_ns: int, skipped: int) -> ScanRecord | None:
+        if not isinstance(self._io, RecordingIo):
+            return None
+        self._io.record = ScanRecord(now_ns, self.scan_number, skipped=skipped)
+        return self._io.record
 
     def _too_long(self, error: ScanTooLong) -> None:
         self._io.log(error.line, SCAN_TOO_LONG)

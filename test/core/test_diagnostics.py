@@ -15,7 +15,9 @@ from automax_ros.core.diagnostics import (
 from automax_ros.core.problems import PROBLEMS, Severity
 
 SOURCE = SourceText("task.blk", "10 LOCAL A%\r\n\t20 B% = 1\n30 END")
-FAULT = Diagnostic("AMX4001", "B% is not declared", Span(2, 5, 7), 20, "did you mean A%?", (Note("here", Span(1, 10, 12)),))
+FAULT = Diagnostic(
+    "AMX4001", "B% is not declared", Span(2, 5, 7), 20, "did you mean A%?", (Note("here", Span(1, 10, 12)),)
+)
 WARNING = Diagnostic("AMX4054", "this statement is never reached", Span(1, 1, 3), 10)
 
 

@@ -3,7 +3,6 @@
 import dataclasses
 
 import pytest
-from core.problem_pages import PAGES, Fence, read_page
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Block, Processor
@@ -13,12 +12,14 @@ from automax_ros.language.checker import CheckResult, check
 from automax_ros.language.parser import SOURCE_LIMIT
 from automax_ros.language.reporter import DIAGNOSTIC_LIMIT
 
+from .problem_pages import PAGES, Fence, read_page
+
 COMPILED = [code for code in PROBLEMS if code[3] in "024"]
 """Codes that the compiler reports: their examples are whole tasks."""
 
 
 def blocks() -> dict[str, Block]:
-    """The catalogue, with a BIT_SELECT (section 9, AutoMax only) as long as it lacks one: some page needs such a block."""
+    """The catalogue, with a BIT_SELECT (section 9, AutoMax only) as long as it lacks one: a page needs such a block."""
     rack_only = frozenset({Processor.AUTOMAX, Processor.PC3000})
     stand_in = dataclasses.replace(
         CATALOGUE["TRANSITION"],
@@ -81,5 +82,3 @@ def test_cure_compiles_without_a_word(code: str) -> None:
     result = checked(read_page(code).cure)
     assert result.diagnostics == []
     assert result.program is not None
-
-

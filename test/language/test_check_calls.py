@@ -3,7 +3,6 @@
 import math
 
 import pytest
-from language.check_support import codes, one, problems, program, task
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Processor
@@ -11,6 +10,8 @@ from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import stored_real
 from automax_ros.language.program import BoundCall
 from automax_ros.language.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Unary, Variable
+
+from .check_support import codes, one, problems, program, task
 
 DECLARE = "LOCAL A%, B%, C%, D!, R, X@, Y@, S$, T%(10), Z@(3), Q(2)"
 
@@ -95,7 +96,9 @@ def test_right_calls(text: str) -> None:
 
 
 def test_caret_and_hint_stand_at_the_fault() -> None:
-    found = one("10 LOCAL A%, B%\n20 CALL SCAN_LOOP(TICKS=4)\n30 CALL DIFFERENCE(INPUT1=A%, &\n   INPUT2=C%, OUTPUT=B%)\n40 END")
+    found = one(
+        "10 LOCAL A%, B%\n20 CALL SCAN_LOOP(TICKS=4)\n30 CALL DIFFERENCE(INPUT1=A%, &\n   INPUT2=C%, OUTPUT=B%)\n40 END"
+    )
     assert (found.span, found.statement) == (Span(4, 11, 13), 30)
     assert one(call("DIFERENCE(INPUT1=A%, INPUT2=B%, OUTPUT=C%)")).hint == "did you mean DIFFERENCE?"
     assert one(call("LAG(INPT=A%, WLG=1.0, OUTPUT=B%)")).hint == "did you mean INPUT?"

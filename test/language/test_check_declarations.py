@@ -1,7 +1,6 @@
 """LOCAL, COMMON, tunables and EVENT: names, sizes, limits, agreement with the rack (2.4)."""
 
 import pytest
-from language.check_support import codes, one, problems, program, task
 
 from automax_ros.blocks.declaration import Processor
 from automax_ros.core.diagnostics import Span
@@ -9,6 +8,8 @@ from automax_ros.core.numbers import INT16_MAX, INT16_MIN, REAL_MAX, stored_real
 from automax_ros.core.types import DataType
 from automax_ros.language.program import CommonSpec, TuningLimits
 from automax_ros.language.tree import Scope
+
+from .check_support import codes, one, problems, program, task
 
 
 def declared(text: str) -> str:
@@ -81,7 +82,9 @@ def test_data_of_a_task_is_bounded() -> None:
 
 
 def test_tuning_limits_in_their_own_type() -> None:
-    symbols = program(declared("LOCAL G [LOW=0, CURRENT=1.1, STEP=0.1, HIGH=10.0], N% [CURRENT=-5], P! [CURRENT=0AH]")).symbols
+    symbols = program(
+        declared("LOCAL G [LOW=0, CURRENT=1.1, STEP=0.1, HIGH=10.0], N% [CURRENT=-5], P! [CURRENT=0AH]")
+    ).symbols
     assert symbols["G"].tuning == TuningLimits(stored_real(1.1)[0], 0.0, 10.0, stored_real(0.1)[0])
     assert symbols["N%"].tuning == TuningLimits(-5, INT16_MIN, INT16_MAX, 1)
     assert symbols["P!"].tuning == TuningLimits(10, -(2**31), 2**31 - 1, 1)

@@ -1,11 +1,12 @@
 """The order of a task: SCAN_LOOP, END, jumps, what is reached (sections 3 and 4)."""
 
 import pytest
-from language.check_support import check_text, codes, one, problems, program, task
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.problems import Severity
 from automax_ros.language.tree import Assignment, Call, Data, Declaration, End, Remark
+
+from .check_support import check_text, codes, one, problems, program, task
 
 LOOP = "CALL SCAN_LOOP(TICKS=4)"
 

@@ -3,13 +3,14 @@
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from language.check_support import check_text
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Form, Input, Processor
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType
+
+from .check_support import check_text
 
 SETTINGS = settings(
     max_examples=150, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
@@ -75,7 +76,9 @@ def calls(draw: st.DrawFn) -> str:
         kind = parameter.type if isinstance(parameter.type, DataType) else DataType.INTEGER
         pool = DECLARED[kind]
         if isinstance(parameter, Input):
-            pool = {Form.ANY: pool + CONSTANTS[kind], Form.VARIABLE: pool, Form.LITERAL: CONSTANTS[kind]}[parameter.form]
+            pool = {Form.ANY: pool + CONSTANTS[kind], Form.VARIABLE: pool, Form.LITERAL: CONSTANTS[kind]}[
+                parameter.form
+            ]
         arguments.append(f"{parameter.name}={draw(st.sampled_from(pool))}")
     return f"CALL {block.name}({', '.join(arguments)})"
 
@@ -96,7 +99,9 @@ def statements(draw: st.DrawFn, depth: int = 2) -> list[str]:
         name = draw(st.sampled_from(["A%", "D!", "R"]))
         return [f"FOR {name} = 1 TO {draw(typed(DataType.INTEGER, 1))}", *draw(bodies(depth - 1)), f"NEXT {name}"]
     if kind == "other":
-        return [draw(st.sampled_from(["READ A%", "DATA 1, -2.5, 'A'", "RETURN", "STOP", "CLR_ERRLOG", "! TEXT", "REM"]))]
+        return [
+            draw(st.sampled_from(["READ A%", "DATA 1, -2.5, 'A'", "RETURN", "STOP", "CLR_ERRLOG", "! TEXT", "REM"]))
+        ]
     return [draw(assignments())]
 
 
@@ -135,7 +140,9 @@ def test_random_tasks(text: str) -> None:
 @given(tasks(), st.data())
 def test_random_tasks_with_a_wrong_stroke(text: str, data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(text) - 1))
-    stroke = data.draw(st.sampled_from(["", "(", ")", "%", "@", "&", "\\", "'", "=", "-", " ", "\n", "9", "NOT ", "END\n"]))
+    stroke = data.draw(
+        st.sampled_from(["", "(", ")", "%", "@", "&", "\\", "'", "=", "-", " ", "\n", "9", "NOT ", "END\n"])
+    )
     assert_checked(text[:at] + stroke + text[at + 1 :])
 
 

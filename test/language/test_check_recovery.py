@@ -3,10 +3,11 @@
 import time
 
 import pytest
-from language.check_support import check_text, codes, one, problems, program, task
 
 from automax_ros.core.diagnostics import in_order
 from automax_ros.language.reporter import DIAGNOSTIC_LIMIT
+
+from .check_support import check_text, codes, one, problems, program, task
 
 LOOP = "CALL SCAN_LOOP(TICKS=4)"
 
@@ -42,14 +43,14 @@ def test_names_on_the_continuation_of_a_broken_declaration() -> None:
 @pytest.mark.parametrize(
     "broken",
     [
-        f"10 CALL SCAN_LOOP(TICKS=4\n20 END\n",
+        "10 CALL SCAN_LOOP(TICKS=4\n20 END\n",
         f"10 {LOOP}\n20 END END\n",
         f"10 {LOOP}\n20 GOTO 30\n30 % = 5\n40 END\n",
         f"10 LOCAL A%\n20 {LOOP}\n30 READ A%\n40 DATA 1 2\n50 END\n",
         f"10 {LOOP}\n20 RETURN\n30 GOSUB\n40 END\n",
         f"10 LOCAL X@\n20 {LOOP}\n30 IF X@ THEN\n40 END\n",
         f"10 LOCAL X@\n20 IF X@ THEN\n30 {LOOP}\n40 END\n",
-        f"10 EVENT NAME GO, INTERRUPT_STATUS=ISCR%, TIMEOUT=6\n20 CALL SCAN_LOOP(TICKS=4, EVENT=GO)\n30 END\n",
+        "10 EVENT NAME GO, INTERRUPT_STATUS=ISCR%, TIMEOUT=6\n20 CALL SCAN_LOOP(TICKS=4, EVENT=GO)\n30 END\n",
     ],
 )
 def test_a_broken_line_has_no_consequences(broken: str) -> None:

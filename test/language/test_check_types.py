@@ -1,9 +1,10 @@
 """Problems of types: what goes with what, and where the caret stands."""
 
 import pytest
-from language.check_support import codes, one, program, task
 
 from automax_ros.core.diagnostics import Span
+
+from .check_support import codes, one, program, task
 
 
 @pytest.mark.parametrize(

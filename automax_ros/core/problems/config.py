@@ -71,4 +71,13 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6822", "more than one run in the recording"),
     Problem("AMX6823", "gap in the write log"),
     Problem("AMX6824", "CSV file cannot be written"),
+    # the command line: files and the tables of `automax trace`
+    Problem("AMX6900", "file that no task can be named after", Severity.WARNING),
+    Problem("AMX6910", "not a CSV table"),
+    Problem("AMX6911", "column of an unknown variable"),
+    Problem("AMX6912", "two columns of one variable"),
+    Problem("AMX6913", "subscripts of a column"),
+    Problem("AMX6914", "row of another length than the header"),
+    Problem("AMX6915", "value that the variable cannot hold"),
+    Problem("AMX6916", "value outside of the tuning limits"),
 )

@@ -1,0 +1,194 @@
+"""Time of each block in a compiled scan, beside the 7010 Processor's (J-3676-5, Table 4). Prints ratios, fails on none.
+
+Each block is programmed with every parameter: inputs are variables that change from scan to scan where the block allows
+it, all outputs are wired. The cost of the empty scan is taken off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from harness import scan_ns, task_of
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Block, Form, Input, Time
+from automax_ros.blocks.scan_loop import END_TIMES
+from automax_ros.core.types import DataType
+
+COPIES = 20
+COEFFICIENTS = {"KP": "0.5", "KI": "0.5", "WLD": "2.0", "WLG": "10.0", "WM": "20.0"}
+LITERALS = {"WORD_SIZE": "12", "ABS_RAMP": "TRUE", "SCALE": "100"}
+VALUES = (0, 1200, -700, 4095, 90, -4095, 2000, 3)
+
+
+def literal_of(item: Input) -> str:
+    """Return a sensible literal for an input that must or should be one."""
+    if item.name in COEFFICIENTS:
+        return COEFFICIENTS[item.name]
+    return LITERALS.get(item.name, "FALSE" if item.type is DataType.BOOLEAN else "1")
+
+
+def call_text(block: Block, number: int) -> tuple[str, list[str]]:
+    """Return one CALL with every parameter, and the variables it needs."""
+    parts, variables = [], []
+    for item in block.inputs:
+        if item.form is Form.LITERAL or item.type is DataType.REAL:
+            parts.append(f"{item.name}={literal_of(item)}")
+            continue
+        suffix = "@" if item.type is DataType.BOOLEAN else "%"
+        name = "IN_B@" if suffix == "@" else f"{'LOW' if 'MIN' in item.name else 'IN'}_W%"
+        if item.name in ("RESET", "HOLD", "HOLD_PLUS", "HOLD_MINUS"):
+            name = "OFF_B@"
+        if item.name in ("LIMIT_PLUS", "INPUT_MAX", "OUTPUT_IMAX", "ACCEL_RATE", "DECEL_RATE", "MULTIPLIER"):
+            name = "HIGH_W%"
+        parts.append(f"{item.name}={name}")
+    for output in block.outputs:
+        name = f"O{number}_{len(variables)}{output.type.value}"
+        variables.append(name)
+        parts.append(f"{output.name}={name}")
+    return f"CALL {block.name}({', '.join(parts)})", variables
+
+
+def block_ns(block: Block) -> float:
+    """Return the time of one call in ns."""
+    calls, names = [], ["IN_W%", "LOW_W%", "HIGH_W%", "IN_B@", "OFF_B@"]
+    for number in range(COPIES):
+        text, outputs = call_text(block, number)
+        calls.append(text)
+        names += outputs
+    lines = [f"{100 + n} LOCAL {name}" for n, name in enumerate(names)]
+    lines += ["1000 CALL SCAN_LOOP(TICKS=2)"]
+    empty, _ = task_of("\n".join([*lines, "9999 END"]))
+    full, _ = task_of("\n".join([*lines, *(f"{1001 + n} {call}" for n, call in enumerate(calls)), "9999 END"]))
+    return (scan_ns(full, varier(full)) - scan_ns(empty, varier(empty))) / COPIES
+
+
+def varier(task: object) -> Callable[[int], None]:
+    """Return what changes the inputs between scans."""
+    layout, state = task.compiled.layout, task.state  # type: ignore[attr-defined]
+    word, flag = layout.index("IN_W%"), layout.index("IN_B@")
+    state[layout.index("LOW_W%")], state[layout.index("HIGH_W%")] = -4000, 4000
+
+    def vary(number: int) -> None:
+        state[word] = VALUES[number & 7]
+        state[flag] = number & 3 == 1
+
+    return vary
+
+
+def manual_us(block: Block) -> float:
+    """Return the 7010's time of the block as it is programmed here."""
+    time = block.times.model_7010
+    assert time is not None
+    return time.base + time.n * len(block.outputs) + time.j * len(block.inputs)
+
+
+def commons_ns(number: int) -> float:
+    """Return the time of a scan that latches INTEGER commons and has no block."""
+    lines = [f"{10 + n} COMMON C{n}%" for n in range(number)]
+    task, memory = task_of("\n".join([*lines, "1000 CALL SCAN_LOOP(TICKS=2)", "9999 END"]))
+    return scan_ns(task)
+
+
+def commons_manual_us(number: int) -> float:
+    """Return SCAN_LOOP + END of Table 4 for a number of INTEGER commons."""
+    total = 0.0
+    for time in (CATALOGUE["SCAN_LOOP"].times.model_7010, END_TIMES.model_7010):
+        assert isinstance(time, Time)
+        total += time.base + number * (time.t + time.i)
+    return total
+
+
+PROGRAM = """
+100 COMMON LINE_SP%, TRIM%, START@, STOP@, READY@, JOG@, FDBK%, COUNT%
+101 COMMON SPEED_REF%, CUR_REF%, RUN@, ALARM@, LENGTH%
+110 LOCAL A%, B%, C%, D%, E%, F%, G%, H%, I%, J%, K%, L%, M%, N%, O%, P%, Q%, R%, S%, T%, U%, V%, W%, X%, Y%, Z%
+120 LOCAL B0@, B1@, B2@, B3@, B4@, B5@, B6@, B7@, B8@, S0@, S1@
+200 CALL SCAN_LOOP(TICKS=2)
+210 CALL AND(INPUT1=START@, INPUT2=READY@, INPUT3=-STOP@, OUTPUT=B0@)
+211 CALL OR(INPUT1=STOP@, INPUT2=-READY@, OUTPUT=B1@)
+212 CALL LATCH(SET=B0@, RESET=B1@, OUTPUT=RUN@)
+213 CALL TRANSITION(INPUT=RUN@, OUTPUT=B2@)
+214 CALL AND(INPUT1=RUN@, INPUT2=-JOG@, OUTPUT=B3@)
+215 CALL OR(INPUT1=B3@, INPUT2=JOG@, OUTPUT=B4@)
+216 CALL AND(INPUT1=B4@, INPUT2=READY@, OUTPUT=B5@)
+217 CALL OR(INPUT1=B2@, INPUT2=B1@, OUTPUT=B6@)
+218 CALL LATCH(SET=B6@, RESET=B5@, OUTPUT=B7@)
+219 CALL AND(INPUT1=B7@, INPUT2=START@, OUTPUT=ALARM@)
+220 CALL SWITCH(INPUT1=LINE_SP%, INPUT2=200, SELECT=B3@, OUTPUT=A%)
+221 CALL SWITCH(INPUT1=A%, INPUT2=0, SELECT=B4@, OUTPUT=B%)
+222 CALL SWITCH(INPUT1=TRIM%, INPUT2=0, SELECT=RUN@, OUTPUT=C%)
+230 CALL RAMP(INPUT=B%, RESET=B1@, ACCEL_RATE=200, DECEL_RATE=300, SCALE=91, OUTPUT=D%)
+231 CALL RAMP(INPUT=C%, ACCEL_RATE=50, DECEL_RATE=50, SCALE=91, ABS_RAMP=FALSE, OUTPUT=E%)
+240 CALL SCALE(INPUT=D%, INPUT_MAX=4095, INPUT_MIN=0, OUTPUT_IMAX=4000, OUTPUT_IMIN=0, OUTPUT=F%)
+241 CALL SCALE(INPUT=E%, INPUT_MAX=1000, INPUT_MIN=-1000, OUTPUT_IMAX=200, OUTPUT_IMIN=-200, OUTPUT=G%)
+242 CALL SCALE(INPUT=FDBK%, INPUT_MAX=4095, INPUT_MIN=0, OUTPUT_IMAX=4000, OUTPUT_IMIN=0, CLAMP=TRUE, OUTPUT=H%)
+243 CALL SCALE(INPUT=H%, INPUT_MAX=4000, INPUT_MIN=0, OUTPUT_IMAX=1000, OUTPUT_IMIN=0, OUTPUT=I%)
+250 CALL SUMMER(INPUT1=F%, INPUT2=G%, OUTPUT=SPEED_REF%)
+251 CALL DIFFERENCE(INPUT1=SPEED_REF%, INPUT2=H%, OUTPUT=J%)
+252 CALL SUMMER(INPUT1=J%, INPUT2=I%, OUTPUT=K%)
+253 CALL DIFFERENCE(INPUT1=K%, INPUT2=I%, OUTPUT=L%)
+254 CALL SUMMER(INPUT1=L%, INPUT2=10, OUTPUT=M%)
+255 CALL DIFFERENCE(INPUT1=M%, INPUT2=10, OUTPUT=N%)
+256 CALL SUMMER(INPUT1=N%, INPUT2=A%, OUTPUT=O%)
+257 CALL DIFFERENCE(INPUT1=O%, INPUT2=A%, OUTPUT=P%)
+260 CALL PROP_INT(INPUT=P%, KP=0.8, WLD=1.5, RESET=-RUN@, LIMIT_PLUS=4095, LIMIT_MINUS=-4095, OUTPUT=Q%)
+261 CALL PROP_INT(INPUT=J%, KP=0.4, WLD=3.0, RESET=-RUN@, OUTPUT=R%)
+262 CALL PROP_INT(INPUT=L%, KP=0.2, WLD=3.0, OUTPUT=S%, SATURATED_PLUS=S0@)
+263 CALL PROP_INT(INPUT=N%, KP=0.2, WLD=1.0, OUTPUT=T%)
+270 CALL LAG(INPUT=Q%, WLG=10.0, OUTPUT=U%)
+271 CALL LAG(INPUT=R%, WLG=20.0, OUTPUT=V%)
+272 CALL LAG(INPUT=S%, WLG=5.0, RESET=B1@, OUTPUT=W%)
+273 CALL LAG(INPUT=FDBK%, WLG=30.0, OUTPUT=X%)
+280 CALL LIMIT(INPUT=U%, LIMIT_PLUS=4095, LIMIT_MINUS=-4095, OUTPUT=CUR_REF%)
+281 CALL LIMIT(INPUT=V%, LIMIT_PLUS=2000, LIMIT_MINUS=-2000, SATURATED_PLUS=S1@, OUTPUT=Y%)
+282 CALL PULSE_MULT(INPUT=COUNT%, WORD_SIZE=12, MULTIPLIER=8192, OUTPUT=LENGTH%)
+283 CALL INTEGRATE(INPUT=W%, KI=0.5, LIMIT_PLUS=1000, LIMIT_MINUS=-1000, OUTPUT=Z%)
+284 CALL TRANSITION(INPUT=B7@, OUTPUT=B8@)
+9999 END
+"""
+PROGRAM_BLOCKS = 40
+
+
+def program_ns() -> float:
+    """Return the time of one scan of the program of 40 blocks, latch and write-back included."""
+    task, memory = task_of(PROGRAM)
+    views = [memory.view(name) for name in ("LINE_SP%", "FDBK%", "COUNT%", "START@", "READY@")]
+    memory.write_from_outside(views[0], 3000, 1)
+    memory.write_from_outside(views[3], True, 1)
+    memory.write_from_outside(views[4], True, 1)
+
+    def vary(number: int) -> None:
+        memory.write_now(views[1], number & 2047, 1)
+        memory.write_now(views[2], number * 7 & 4095, 1)
+
+    return scan_ns(task, vary)
+
+
+def main() -> None:
+    """Print all figures."""
+    print(f"{'block':14}{'ns':>9}{'7010 us':>10}{'ratio':>9}")
+    worst = min(((manual_us(block) * 1000 / report(block)), block.name) for block in timed_blocks())
+    print(f"lowest ratio {worst[0]:.0f} ({worst[1]}); wanted: at least 50\n")
+    print(f"{'commons':>8}{'scan ns':>10}{'7010 us':>10}{'ratio':>9}   SCAN_LOOP + END")
+    for number in (0, 10, 100):
+        taken, manual = commons_ns(number), commons_manual_us(number)
+        print(f"{number:>8}{taken:>10.0f}{manual:>10.1f}{manual * 1000 / taken:>9.0f}")
+    whole = program_ns()
+    print(f"\nprogram of {PROGRAM_BLOCKS} blocks: {whole:.0f} ns a scan, {whole / PROGRAM_BLOCKS:.1f} ns a block; wanted: at most 80")
+
+
+def timed_blocks() -> list[Block]:
+    """Return the blocks that a scan executes."""
+    return [block for block in CATALOGUE.values() if block.step is not None and block.times.model_7010 is not None]
+
+
+def report(block: Block) -> float:
+    """Print one block's line and return its time in ns."""
+    taken, manual = block_ns(block), manual_us(block)
+    print(f"{block.name:14}{taken:>9.1f}{manual:>10.2f}{manual * 1000 / taken:>9.0f}")
+    return taken
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""What the benchmarks share: a task made from text, and the time of one of its scans."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.core.diagnostics import SourceText, render_all
+from automax_ros.core.types import DataType
+from automax_ros.language.checker import check
+from automax_ros.language.tree import Scope
+from automax_ros.runtime.compiler import compile_program
+from automax_ros.runtime.memory import CommonMemory, ViewSpec
+from automax_ros.runtime.task import Task
+
+REPEATS = 60
+"""Short runs of which the fastest counts, so that other work on the machine disturbs little."""
+
+
+def task_of(text: str) -> tuple[Task, CommonMemory]:
+    """Return a task in RUN with a common memory of just the variables that it declares."""
+    source = SourceText("BENCH.BLK", text)
+    result = check(source, name="BENCH", catalogue=CATALOGUE)
+    if result.program is None:
+        raise SystemExit(render_all(result.diagnostics, source))
+    commons = [symbol for symbol in result.program.symbols.values() if symbol.scope is Scope.COMMON]
+    memory = CommonMemory([ViewSpec(symbol.name, symbol.type) for symbol in commons])
+    views = {symbol.name: view for view, symbol in enumerate(commons)}
+    task = Task(compile_program(result.program, views), memory)
+    task.run()
+    return task, memory
+
+
+def scan_ns(task: Task, vary: Callable[[int], None] = lambda _: None, scans: int = 300) -> float:
+    """Return the time of one scan in ns: the best of several runs; ``vary`` changes inputs and is not counted."""
+    best = float("inf")
+    for _ in range(REPEATS):
+        best = min(best, _run_ns(lambda number: (vary(number), task.scan(0)), scans) - _run_ns(vary, scans))
+    return best
+
+
+def _run_ns(action: Callable[[int], object], count: int) -> float:
+    gc.collect()
+    gc.disable()
+    began = time.perf_counter_ns()
+    for number in range(count):
+        action(number)
+    taken = time.perf_counter_ns() - began
+    gc.enable()
+    return taken / count
+
+
+def zero_text(kind: DataType) -> str:
+    """Return a literal of a type."""
+    return {DataType.BOOLEAN: "FALSE", DataType.REAL: "1.0"}.get(kind, "0")

@@ -1,0 +1,170 @@
+"""The input table of `automax trace`: everything that can be wrong with it is told with its line."""
+
+import re
+
+import pytest
+from core.problem_pages import read_page
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from automax_ros.blocks.declaration import Processor
+from automax_ros.cli.lone_task import LoneTask
+from automax_ros.cli.task_files import Target, check_task_file
+from automax_ros.cli.trace_input import MAX_LINE, CsvFault, InputTable
+from automax_ros.core.problems import PROBLEMS
+
+from .support import TASK
+
+FAULTS = [code for code in PROBLEMS if "AMX6910" <= code < "AMX6950"]
+
+
+@pytest.mark.parametrize(
+    ("table", "place", "message"),
+    [
+        ("REV%\n", "1: error[AMX6911]", "no variable 'REV%'\n  hint: did you mean REF%?"),
+        ("REF\n", "1: error[AMX6911]", "did you mean REF%?"),
+        ("REF%;RUN@\n", "1: error[AMX6911]", "columns are separated by commas"),
+        ("GRID%(1,2)\n", "1: error[AMX6911]", 'needs quotes in a CSV table: "TABLE%(1,2)"'),
+        ("REF%,\n", "1: error[AMX6911]", "no variable ''"),
+        ("REF%,RUN@,ref%\n", "1: error[AMX6912]", "two columns for REF%"),
+        ("TABLE%(1),TABLE%[01]\n", "1: error[AMX6912]", "two columns for TABLE%(1)"),
+        ("TABLE%(11)\n", "1: error[AMX6913]", "subscript 11 is not 0 to 10"),
+        ('"GRID%(3,0)"\n', "1: error[AMX6913]", "subscript 3 is not 0 to 2"),
+        ("TABLE%\n", "1: error[AMX6913]", "the last is TABLE%(10)"),
+        ("REF%(0)\n", "1: error[AMX6913]", "write REF%"),
+        ("TABLE%(-1)\n", "1: error[AMX6911]", "no variable"),
+        ("REF%,RUN@\n1,1\n1\n", "3: error[AMX6914]", "1 cells, the header 2"),
+        ("REF%,RUN@\n1,1,1\n", "2: error[AMX6914]", "3 cells, the header 2"),
+        ("REF%,RUN@\n1,1\n\n1,1\n", "3: error[AMX6914]", "the line is empty"),
+        ("REF%\n1\n32768\n", "3: error[AMX6915]", "REF% = 32768, it must be a whole number from -32768 to 32767"),
+        ("REF%\n1.5\n", "2: error[AMX6915]", "whole number"),
+        ("REF%\nNaN\n", "2: error[AMX6915]", "whole number"),
+        ("REF%\n1e3\n", "2: error[AMX6915]", "whole number"),
+        ("REF%\n" + "9" * 50 + "\n", "2: error[AMX6915]", "whole number"),
+        ("REF%\n١\n", "2: error[AMX6915]", "whole number"),
+        ("COUNT!\n2147483648\n", "2: error[AMX6915]", "from -2147483648 to 2147483647"),
+        ("RUN@\n2\n", "2: error[AMX6915]", "0 or 1"),
+        ("SCALED\n1e19\n", "2: error[AMX6915]", "a number from -9.2233717E18"),
+        ("SCALED\ninf\n", "2: error[AMX6915]", "a number"),
+        ("SCALED\n1_0\n", "2: error[AMX6915]", "a number"),
+        ("TEXT$\nabcdef\n", "2: error[AMX6915]", "at most 5 characters"),
+        ("TABLE%(2)\nx\n", "2: error[AMX6915]", "TABLE%(2) = x"),
+        ("GAIN\n10.1\n", "2: error[AMX6916]", "inside its tuning limits, 0.0 to 10.0"),
+        ("STEPS%\n10\n", "2: error[AMX6916]", "inside its tuning limits, -32768 to 9"),
+        ("GAIN\n1e999\n", "2: error[AMX6916]", "tuning limits"),
+        ("GAIN\nfast\n", "2: error[AMX6915]", "a number"),
+        ("", "1: error[AMX6910]", "the first line must name the variables"),
+        ("\nREF%\n", "1: error[AMX6910]", "the first line must name the variables"),
+        ('"REF%\n', "1: error[AMX6910]", "not CSV"),
+        ('REF%\n"1\n', "2: error[AMX6910]", "not CSV"),
+        ('REF%\n"1"2\n', "2: error[AMX6910]", "not CSV"),
+        ("REF%\n1\r2\n", "2: error[AMX6910]", "not CSV"),
+        ("REF%\n1\x002\n", "2: error[AMX6910]", "not CSV"),
+        (b"REF%\n\xff\n", "2: error[AMX6910]", "not UTF-8: here is a byte 0xff"),
+        ("REF%\n" + "1" * MAX_LINE + "\n", "2: error[AMX6910]", f"more than {MAX_LINE} bytes"),
+        ("A" * 200_000 + "\n", "1: error[AMX6910]", "not CSV"),
+        ("\x1b[2J\n", "1: error[AMX6911]", "no variable"),
+    ],
+)  # fmt: skip
+def test_fault_is_told_with_file_line_code_and_cure(automax, table, place, message):
+    result = automax.trace(table)
+    assert result.code == 2
+    assert result.err.startswith(f"IN.csv:{place}: ")
+    assert message in result.err
+    assert "\x1b" not in result.err
+    assert len(result.err) < 400
+
+
+def test_scans_before_a_fault_are_shown(automax):
+    result = automax.trace("REF%\n1\n2\nx\n4\n", "--watch", "REF%")
+    assert result.code == 2
+    assert result.out == "scan,time_s,REF%\n1,0,1\n2,0.011,2\n"
+
+
+@pytest.mark.parametrize("code", FAULTS)
+def test_page_shows_a_table_with_this_fault_and_its_cure(automax, code):
+    task = TASK
+    page = read_page(code)
+    assert page.example.language == page.cure.language == "csv"
+    result = automax.trace(page.example.text, task=task)
+    assert result.code == 2
+    assert re.findall(r"AMX\d{4}", result.err) == [code]
+    assert automax.trace(page.cure.text, task=task).code == 0
+
+
+def test_page_of_the_file_name(automax):
+    page = read_page("AMX6900")
+    for fence, codes in ((page.example, ["AMX6900"]), (page.cure, [])):
+        name = next(word.removeprefix("file=") for word in fence.words)
+        assert re.findall(r"AMX\d{4}", automax("check", automax.write(name, fence.text)).out) == codes
+
+
+NAMES = [
+    "REF%",
+    "RUN@",
+    "SCALED",
+    "COUNT!",
+    "OUT%",
+    "TABLE%(3)",
+    '"GRID%(1,2)"',
+    "TEXT$",
+    "GAIN",
+    "STEPS%",
+    "NONE%",
+    "",
+]
+CELLS = st.one_of(
+    st.sampled_from(["", "0", "1", "-1", "32767", "40000", "1.5", "1e5", "TRUE", '"', '""', "x", "\r", "\x00", "é"]),
+    st.text(max_size=8),
+)
+ROWS = st.lists(st.lists(CELLS, max_size=4).map(",".join), max_size=6)
+TABLES = st.one_of(
+    st.binary(max_size=200),
+    st.text(max_size=200).map(lambda text: text.encode("utf-8", "surrogatepass")),
+    st.builds(
+        lambda header, rows: "\n".join([",".join(header), *rows]).encode("utf-8", "surrogatepass"),
+        st.lists(st.sampled_from(NAMES), min_size=1, max_size=4),
+        ROWS,
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def lone(tmp_path_factory):
+    """A task to be set, and the path of its table."""
+    folder = tmp_path_factory.mktemp("table")
+    (folder / "TASK.BLK").write_text(TASK)
+    _, result = check_task_file(folder / "TASK.BLK", Target(Processor.AUTOMAX, 5_500_000))
+    assert result.program is not None
+    task = LoneTask(result.program)
+    task.task.run()
+    return task, folder / "IN.csv"
+
+
+@settings(deadline=None, derandomize=True, max_examples=500)
+@given(data=TABLES)
+def test_any_bytes_are_rows_or_a_fault_with_its_line(lone, data):
+    task, path = lone
+    path.write_bytes(data)
+    lines = data.count(b"\n") + 1
+    last = 1
+    try:
+        with InputTable(path, task) as table:
+            for line in table.rows():
+                assert last < line <= lines
+                last = line
+                task.task.scan(0)
+    except CsvFault as fault:
+        assert fault.code in FAULTS
+        assert last <= fault.line <= lines
+
+
+@settings(deadline=None, derandomize=True, max_examples=200)
+@given(values=st.lists(st.tuples(st.integers(-32768, 32767), st.booleans(), st.integers(0, 10)), max_size=20))
+def test_rows_set_exactly_their_cells(lone, values):
+    task, path = lone
+    path.write_text("REF%,RUN@,GAIN\n" + "".join(f"{a},{int(b)},{c}\n" for a, b, c in values))
+    names = ("REF%", "RUN@", "GAIN")
+    with InputTable(path, task) as table:
+        for _, row in zip(table.rows(), values, strict=True):
+            assert tuple(task.variable(name).read() for name in names) == row

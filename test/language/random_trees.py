@@ -1,0 +1,183 @@
+"""Random trees of whole tasks, drawn by a grammar of the nodes: everything the language can say, meaningful or not."""
+
+import dataclasses
+
+from hypothesis import strategies as st
+
+from automax_ros.language.expressions import LEVELS
+from automax_ros.language.functions import FUNCTIONS
+from automax_ros.language.printer import numbered
+from automax_ros.language.tree import (
+    Argument,
+    Assignment,
+    Binary,
+    BooleanLiteral,
+    Call,
+    ClearErrorLog,
+    Data,
+    Declaration,
+    Declared,
+    Element,
+    End,
+    Event,
+    For,
+    FunctionCall,
+    Gosub,
+    Goto,
+    If,
+    IntegerLiteral,
+    IoWrite,
+    Module,
+    OnJump,
+    Print,
+    Read,
+    RealLiteral,
+    Remark,
+    Restore,
+    Return,
+    Scope,
+    Statement,
+    Stop,
+    StringLiteral,
+    Tuning,
+    Unary,
+    Variable,
+)
+
+WORDS = st.sampled_from(["SPEED", "_X", "A1", "STEP_2", "GAIN", "LONGEST_NAME_OK_"])
+NAMES = st.one_of(
+    WORDS,
+    st.tuples(st.one_of(WORDS, st.sampled_from(["STEP", "STOP", "ON", "REM"])), st.sampled_from("%!@$")).map("".join),
+)
+LINES = st.integers(1, 32767)
+DIGITS = st.integers(0, 99_999_999)
+
+
+def real(digits: int, exponent: int) -> RealLiteral:
+    """A REAL constant of up to 8 digits, spelled in one of two ways."""
+    text = f"{digits}E{exponent}" if exponent % 2 else f"{digits / 1000:.3f}"[:9]
+    return RealLiteral(float(text), text if digits % 2 else "")
+
+
+INTEGERS = st.one_of(
+    st.builds(IntegerLiteral, st.integers(0, 2**31)),
+    st.builds(IntegerLiteral, st.integers(-(2**31), 2**31 - 1), st.just(True)),
+)
+STRINGS = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=20).filter(
+    lambda text: not ('"' in text and "'" in text)
+)
+CONSTANTS = st.one_of(
+    INTEGERS,
+    st.builds(real, DIGITS, st.integers(-9, 9)),
+    st.builds(StringLiteral, STRINGS),
+    st.builds(BooleanLiteral, st.booleans()),
+)
+SIGNED = st.one_of(
+    CONSTANTS,
+    st.builds(Unary, st.sampled_from("+-"), st.one_of(INTEGERS, st.builds(real, DIGITS, st.integers(-9, 9)))),
+)
+
+
+def _deeper(inner: st.SearchStrategy) -> st.SearchStrategy:
+    few = st.lists(inner, min_size=1, max_size=3).map(tuple)
+    return st.one_of(
+        st.builds(Binary, st.sampled_from(sorted(LEVELS)), inner, inner),
+        st.builds(Unary, st.sampled_from(["-", "+", "NOT"]), inner),
+        st.builds(Element, NAMES, few),
+        st.builds(FunctionCall, st.sampled_from(sorted(set(FUNCTIONS) - {"TST_ERRLOG@"})), few),
+    )
+
+
+EXPRESSIONS = st.recursive(
+    st.one_of(CONSTANTS, st.builds(Variable, NAMES), st.just(FunctionCall("TST_ERRLOG@"))), _deeper, max_leaves=12
+)
+TARGETS = st.one_of(
+    st.builds(Variable, NAMES), st.builds(Element, NAMES, st.lists(EXPRESSIONS, min_size=1, max_size=2).map(tuple))
+)
+COUNTS = st.integers(0, 100_000)
+DECLARED = st.one_of(
+    st.builds(Declared, NAMES, st.lists(COUNTS, max_size=5).map(tuple)),
+    st.builds(
+        Declared, NAMES, tuning=st.builds(Tuning, SIGNED, st.none() | SIGNED, st.none() | SIGNED, st.none() | SIGNED)
+    ),
+    st.builds(
+        Declared, WORDS.map(lambda word: word + "$"), st.lists(COUNTS, max_size=2).map(tuple), st.integers(0, 300)
+    ),
+)
+BLOCKS = st.sampled_from(["SUMMER", "AND", "OR", "SCAN_LOOP", "UNKNOWN"])
+KEYWORDS = st.sampled_from(["INPUT", "SET", "STEP", "INPUT1", "OUTPUT", "EVENT", "A_LONG_KEYWORD_THAT_BREAKS"])
+ARGUMENTS = st.lists(st.builds(Argument, KEYWORDS, EXPRESSIONS), max_size=8).map(tuple)
+
+
+def _print(items: list[tuple[object, str]], last: str) -> Print:
+    """The last separator may be absent, the others not."""
+    separators = [separator for _, separator in items]
+    return Print(tuple(item for item, _ in items), (*separators[:-1], last) if items else ())  # type: ignore[misc]
+
+
+SIMPLE = st.one_of(
+    st.builds(Declaration, st.sampled_from(Scope), st.lists(DECLARED, min_size=1, max_size=3).map(tuple)),
+    st.builds(Assignment, TARGETS, EXPRESSIONS),
+    st.builds(Gosub, LINES),
+    st.builds(Goto, LINES),
+    st.builds(Return),
+    st.builds(OnJump, EXPRESSIONS, st.lists(LINES, min_size=1, max_size=4).map(tuple), st.booleans()),
+    st.builds(Read, st.lists(TARGETS, min_size=1, max_size=3).map(tuple)),
+    st.builds(Data, st.lists(SIGNED, min_size=1, max_size=4).map(tuple)),
+    st.builds(Restore, st.none() | LINES),
+    st.builds(
+        _print, st.lists(st.tuples(EXPRESSIONS, st.sampled_from(",;")), max_size=3), st.sampled_from(["", ",", ";"])
+    ),
+    st.builds(Stop),
+    st.builds(Event, WORDS, st.none() | st.builds(Variable, NAMES), st.none() | COUNTS),
+    st.builds(Call, BLOCKS, ARGUMENTS),
+    st.builds(IoWrite, EXPRESSIONS, EXPRESSIONS, EXPRESSIONS),
+    st.builds(ClearErrorLog),
+    st.builds(End),
+)
+REMARKS = st.builds(
+    Remark,
+    st.lists(st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=9), max_size=3)
+    .map(" ".join)
+    .filter(lambda text: not text.endswith("&")),
+    st.booleans(),
+)
+
+
+def _ends_in_if(branch: tuple[Statement, ...], inner: If | None) -> tuple[Statement, ...]:
+    return branch if inner is None else (*branch, inner)
+
+
+BRANCHES = st.lists(SIMPLE, min_size=1, max_size=2).map(tuple)
+INNER_IF = st.builds(If, EXPRESSIONS, BRANCHES, BRANCHES, st.just(True))
+ONE_LINE = st.builds(
+    If,
+    EXPRESSIONS,
+    st.builds(_ends_in_if, BRANCHES, st.none() | INNER_IF),
+    st.one_of(st.just(()), st.builds(_ends_in_if, BRANCHES, st.none() | INNER_IF)),
+    st.just(True),
+)
+
+
+def _blocks(inner: st.SearchStrategy) -> st.SearchStrategy:
+    bodies = st.lists(inner, max_size=3).map(tuple)
+    return st.one_of(
+        st.builds(If, EXPRESSIONS, bodies, bodies),
+        st.builds(For, st.builds(Variable, NAMES), EXPRESSIONS, EXPRESSIONS, st.none() | EXPRESSIONS, bodies),
+    )
+
+
+STATEMENTS = st.recursive(st.one_of(SIMPLE, SIMPLE, SIMPLE, REMARKS, ONE_LINE), _blocks, max_leaves=6)
+
+
+@st.composite
+def modules(draw: st.DrawFn) -> Module:
+    """A task: statements with numbers, some of them joined to the line before."""
+    module = numbered(Module(tuple(draw(st.lists(STATEMENTS, max_size=5)))))
+    result: list[Statement] = []
+    for statement in module.statements:
+        before = result[-1] if result else None
+        open_line = isinstance(before, (Assignment, Call, Print, Stop, Data))
+        joins = open_line and not isinstance(statement, (If, For)) and draw(st.booleans())
+        result.append(dataclasses.replace(statement, number=None) if joins else statement)
+    return Module(tuple(result))
