@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from harness import scan_ns, task_of
+from _harness import scan_ns, task_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Block, Form, Input, Time

@@ -118,11 +118,11 @@ class RackMessages:
     wall clock at the start else.
     """
 
-    def __init__(self, rack: Rack, run_id: int, epoch_ns: int) -> None:
+    def __init__(self, rack: Rack, run_id: int) -> None:
         """Begin with the numbering of the write log."""
         self._rack = rack
         self._run_id = run_id
-        self._epoch_ns = epoch_ns
+        self.epoch_ns = 0
         self._sequence = 0
         self._slots = {writer.id: writer.slot for writer in rack.writers}
         self._latched: dict[str, Latched] = {}
@@ -130,7 +130,7 @@ class RackMessages:
 
     def stamp(self, now_ns: int) -> int:
         """Return the stamp of an instant of rack time."""
-        return self._epoch_ns + now_ns
+        return self.epoch_ns + now_ns
 
     def table(self) -> VariableTable:
         """Return the table of variables and writers."""

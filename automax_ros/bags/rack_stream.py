@@ -56,13 +56,13 @@ class _ValueTopic:
 
 
 class RackStream:
-    """Observes a rack and streams it to ``sinks``. ``run_id`` and ``epoch_ns`` are those of ``RackMessages``."""
+    """Observes a rack and streams it to ``sinks``. ``run_id`` is that of ``RackMessages``."""
 
-    def __init__(self, rack: Rack, run_id: int, epoch_ns: int = 0) -> None:
+    def __init__(self, rack: Rack, run_id: int) -> None:
         """Prepare the topics; nothing flows before ``begin``."""
         space = f"/{rack.config.namespace}"
         self._rack = rack
-        self._messages = RackMessages(rack, run_id, epoch_ns)
+        self._messages = RackMessages(rack, run_id)
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
@@ -98,8 +98,12 @@ class RackStream:
         """Hand every message to a further taker."""
         self._sinks.append(sink)
 
-    def begin(self) -> None:
-        """Send the facts that stand at the start, and observe the rack: to be called before ``Rack.start``."""
+    def begin(self, epoch_ns: int = 0) -> None:
+        """Send the facts that stand at the start, and observe the rack: to be called just before ``Rack.start``.
+
+        ``epoch_ns`` is the wall clock at rack time 0; simulated time has none.
+        """
+        self._messages.epoch_ns = epoch_ns
         self._put(self.variables_topic, self._messages.stamp(self._rack.now_ns), self._messages.table())
         self._send_image(self._rack.now_ns)
         self._send_values(self._values, self._rack.now_ns)

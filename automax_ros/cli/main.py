@@ -42,9 +42,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         _discard_output()
         return BROKEN_PIPE
-    except OSError as error:  # a full disk, for example; what is read or opened by name is a UsageError
+    except OSError as error:  # a full disk, for example; for a file that was asked for it is a UsageError
         _discard_output()
-        print(f"automax: error: the output cannot be written: {error.strerror or error}", file=sys.stderr)
+        what = "the output cannot be written" if error.filename is None else error.filename
+        print(f"automax: error: {what}: {error.strerror or error}", file=sys.stderr)
         return 2
     return code
 

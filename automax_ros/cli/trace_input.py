@@ -176,7 +176,7 @@ class InputTable(AbstractContextManager["InputTable"]):
         try:
             if "\0" in text:
                 raise csv.Error("a NUL character")
-            return next(csv.reader((text,), strict=True))
+            return next(csv.reader((text,), strict=True, skipinitialspace=True))
         except csv.Error as error:
             hint = "a cell with quotes begins and ends with them on one line"
             raise CsvFault("AMX6910", self._line, f"not CSV: {printable(str(error))}", hint) from error

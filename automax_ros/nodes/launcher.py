@@ -40,7 +40,6 @@ class LiveRack:
 
     rack: Rack
     stream: RackStream = field(init=False)
-    epoch_ns: int = field(init=False)
     stopping: bool = False
     _context: Context = field(init=False)
     _executor: Any = field(init=False, default=None)
@@ -52,9 +51,8 @@ class LiveRack:
         """Initialise ROS for this process and create all nodes."""
         self._context = Context()
         self._context.init(args=_NO_CONSOLE)
-        self.epoch_ns = time.time_ns()
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
-        self.stream = RackStream(self.rack, run_id, self.epoch_ns)
+        self.stream = RackStream(self.rack, run_id)
         self._executor = make_executor(self._context)
         self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context))
         for processor in self.rack.processors:
@@ -64,9 +62,9 @@ class LiveRack:
 
     def start(self, settings: list[tuple[str, Value]]) -> None:
         """Begin the stream and put the rack into RUN; rack time starts now."""
-        self.stream.begin()
-        self._begun = True
         self._zero_ns = time.monotonic_ns()
+        self.stream.begin(time.time_ns())
+        self._begun = True
         self.rack.start(settings)
 
     def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:

@@ -237,7 +237,7 @@ class _Compilation:
         if "block_lines" in extra:
             lines = extra.pop("block_lines")
             assert isinstance(lines, tuple)
-            opening.append(build.assign("block_lines", ast.Constant(lines)))
+            opening.append(build.assign("block_lines", ast.Tuple([build.constant(line) for line in lines], ast.Load())))
         self._globals.update(extra)
         return build.function(name, ["state", "io"], [*opening, *body, *ending])
 

@@ -230,7 +230,7 @@ class StatementLowering:
             selector = self.emitter.keep(lower(self.emitter, statement.selector).node)
         blocks = ast.Tuple([flow.block_of(line) for line in statement.lines], ast.Load())
         jump = build.assign(PC, ast.Subscript(blocks, build.binary(selector, "-", build.constant(1)), ast.Load()))
-        taken = self._gosub(flow, jump) if statement.gosub else [jump]
+        taken: list[ast.stmt] = self._gosub(flow, jump) if statement.gosub else [jump]
         count = build.constant(len(statement.lines))
         in_list = ast.Compare(build.constant(1), [ast.LtE(), ast.LtE()], [selector, count])
         self._next_block(flow, build.when(in_list, taken, [flow.to_next()]))

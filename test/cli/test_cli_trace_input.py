@@ -1,5 +1,7 @@
 """The input table of `automax trace`: everything that can be wrong with it is told with its line."""
 
+import contextlib
+import io
 import re
 
 import pytest
@@ -9,11 +11,12 @@ from hypothesis import strategies as st
 
 from automax_ros.blocks.declaration import Processor
 from automax_ros.cli.lone_task import LoneTask
+from automax_ros.cli.main import main
 from automax_ros.cli.task_files import Target, check_task_file
 from automax_ros.cli.trace_input import MAX_LINE, CsvFault, InputTable
 from automax_ros.core.problems import PROBLEMS
 
-from .support import TASK
+from .support import TASK, table_of
 
 FAULTS = [code for code in PROBLEMS if "AMX6910" <= code < "AMX6950"]
 
@@ -41,7 +44,7 @@ FAULTS = [code for code in PROBLEMS if "AMX6910" <= code < "AMX6950"]
         ("REF%\nNaN\n", "2: error[AMX6915]", "whole number"),
         ("REF%\n1e3\n", "2: error[AMX6915]", "whole number"),
         ("REF%\n" + "9" * 50 + "\n", "2: error[AMX6915]", "whole number"),
-        ("REF%\n١\n", "2: error[AMX6915]", "whole number"),
+        ("REF%\n\N{ARABIC-INDIC DIGIT ONE}\n", "2: error[AMX6915]", "whole number"),
         ("COUNT!\n2147483648\n", "2: error[AMX6915]", "from -2147483648 to 2147483647"),
         ("RUN@\n2\n", "2: error[AMX6915]", "0 or 1"),
         ("SCALED\n1e19\n", "2: error[AMX6915]", "a number from -9.2233717E18"),
@@ -147,16 +150,45 @@ def test_any_bytes_are_rows_or_a_fault_with_its_line(lone, data):
     task, path = lone
     path.write_bytes(data)
     lines = data.count(b"\n") + 1
-    last = 1
+    last, fault = 1, None
     try:
         with InputTable(path, task) as table:
             for line in table.rows():
                 assert last < line <= lines
                 last = line
                 task.task.scan(0)
-    except CsvFault as fault:
-        assert fault.code in FAULTS
-        assert last <= fault.line <= lines
+    except CsvFault as error:
+        fault = error
+    assert fault is None or (fault.code in FAULTS and last <= fault.line <= lines)
+
+
+def traced(path, data):
+    """Trace the task on a table; return the exit code and what went to standard output and error."""
+    path.write_bytes(data)
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(["trace", str(path.with_name("TASK.BLK")), "--input", str(path)])
+    return code, out.getvalue(), err.getvalue()
+
+
+@settings(deadline=None, derandomize=True, max_examples=150)
+@given(data=TABLES)
+def test_any_bytes_give_a_table_and_an_exit_code(lone, data):
+    _, path = lone
+    code, out, err = traced(path, data)
+    rows = table_of(out)
+    assert all(len(row) == len(rows[0]) for row in rows)
+    assert [row[0] for row in rows[1:]] == [str(number + 1) for number in range(len(rows[1:]))]
+    assert ("error[AMX69" in err) == (code == 2)
+    assert code in {0, 2}
+
+
+@pytest.mark.soak
+@settings(deadline=None, derandomize=True, max_examples=20_000)
+@given(data=TABLES)
+def test_any_bytes_give_an_exit_code_at_length(lone, data):
+    _, path = lone
+    assert traced(path, data)[0] in {0, 2}
 
 
 @settings(deadline=None, derandomize=True, max_examples=200)

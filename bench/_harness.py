@@ -34,11 +34,9 @@ def task_of(text: str) -> tuple[Task, CommonMemory]:
 
 
 def scan_ns(task: Task, vary: Callable[[int], None] = lambda _: None, scans: int = 300) -> float:
-    """Return the time of one scan in ns: the best of several runs; ``vary`` changes inputs and is not counted."""
-    best = float("inf")
-    for _ in range(REPEATS):
-        best = min(best, _run_ns(lambda number: (vary(number), task.scan(0)), scans) - _run_ns(vary, scans))
-    return best
+    """Return the time of one scan in ns: the best of many short runs; ``vary`` changes inputs and is not counted."""
+    whole = min(_run_ns(lambda number: (vary(number), task.scan(0)), scans) for _ in range(REPEATS))
+    return whole - min(_run_ns(vary, scans) for _ in range(REPEATS))
 
 
 def _run_ns(action: Callable[[int], object], count: int) -> float:

@@ -1,0 +1,407 @@
+"""A block inlined into a compiled scan does what its step function does as it stands, however it is programmed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.coefficients import limited
+from automax_ros.blocks.declaration import Block, Form
+from automax_ros.blocks.instance import Instance
+from automax_ros.core.numbers import stored_real
+from automax_ros.core.types import DataType, type_of_name
+
+from .support import OTHER, TICK, logged, ran, repeatable, run_scans, scan_in_steps, task_of
+
+BLOCKS = [block for block in CATALOGUE.values() if block.step is not None]
+TICKS = 4
+SUBSCRIPT = 7026
+SIZE = 4
+EDGES = st.sampled_from([-32768, -32767, -1, 0, 1, 32766, 32767])
+VALUES = {
+    DataType.INTEGER: EDGES | st.integers(-32768, 32767) | st.integers(-50, 50),
+    DataType.BOOLEAN: st.booleans(),
+    DataType.REAL: st.sampled_from([0.0, -1.0, 1e-7, 0.5, 2.0, 3.7, 10.0, 63.0, 200.0, 1e6]).map(
+        lambda value: stored_real(value)[0]
+    ),
+}
+REAL_LITERALS = ("0.5", "2.0", "10.0")
+"""Inside the limits of every coefficient at this scan period."""
+SIMPLE = {
+    DataType.INTEGER: ["L1%", "L2%", "K1%", "K2%"],
+    DataType.BOOLEAN: ["L1@", "L2@", "K1@", "K2@"],
+    DataType.REAL: ["L1", "L2", "K1", "K2"],
+}
+ARRAYS = {
+    DataType.INTEGER: ["LT%", "KT%"],
+    DataType.BOOLEAN: ["LT@", "KT@"],
+    DataType.REAL: ["LT", "KT"],
+}
+INDEXES = ["LJ%", "KJ%", "0", "3"]
+ALL_SIMPLE = [*(name for names in SIMPLE.values() for name in names), "LJ%", "KJ%"]
+ALL_ARRAYS = [name for names in ARRAYS.values() for name in names]
+
+
+def declarations() -> str:
+    names = [*ALL_SIMPLE, *(f"{name}({SIZE - 1})" for name in ALL_ARRAYS)]
+    local = ", ".join(name for name in names if name.startswith("L"))
+    common = ", ".join(name for name in names if name.startswith("K"))
+    return f"10 LOCAL {local}\n11 COMMON {common}\n"
+
+
+@dataclasses.dataclass(frozen=True)
+class Programmed:
+    """A CALL: the text of each parameter by keyword."""
+
+    block: Block
+    parameters: dict[str, str]
+
+    def text(self, line: int) -> str:
+        inside = ", ".join(f"{name}={value}" for name, value in self.parameters.items())
+        return f"{line} CALL {self.block.name}({inside})"
+
+
+def variables(kind: DataType) -> st.SearchStrategy[str]:
+    elements = st.builds(lambda name, index: f"{name}({index})", st.sampled_from(ARRAYS[kind]), st.sampled_from(INDEXES))
+    return st.sampled_from(SIMPLE[kind]) | elements
+
+
+def literals(item) -> st.SearchStrategy[str]:
+    if item.type is DataType.REAL:
+        return st.sampled_from(REAL_LITERALS)
+    if item.type is DataType.BOOLEAN:
+        return st.sampled_from(["TRUE", "FALSE"])
+    low, high = (-32768 if item.low is None else item.low), (32767 if item.high is None else item.high)
+    return (st.integers(low, high) | st.sampled_from([low, high, max(low, min(high, 1))])).map(str)
+
+
+@st.composite
+def calls(draw, block: Block) -> Programmed:
+    parameters = {}
+    everything = draw(st.booleans())
+    for item in block.inputs:
+        if not (item.required or everything or draw(st.booleans())):
+            continue
+        choices = [] if item.form is Form.VARIABLE else [literals(item)]
+        if item.form is not Form.LITERAL:
+            choices.append(variables(item.type))
+            if item.type is DataType.BOOLEAN:
+                choices.append(variables(item.type).map(lambda name: f"-{name}"))
+        parameters[item.name] = draw(st.one_of(choices))
+    if any(rule.faults(parameters) for rule in block.rules):
+        for item in block.inputs:
+            parameters.setdefault(item.name, draw(variables(item.type)))
+    for output in block.outputs:
+        if output.required or everything or draw(st.booleans()):
+            parameters[output.name] = draw(variables(output.type))
+    return Programmed(block, parameters)
+
+
+class Model:
+    """Variables of a task, and a block on them by its step function as it stands."""
+
+    def __init__(self, values: dict[str, object]) -> None:
+        self.values = values
+        self.codes: list[int] = []
+
+    def place(self, text: str) -> tuple[str, int | None]:
+        """Name and flat index of a variable; the index is -1 out of range, None without one."""
+        if "(" not in text:
+            return text, None
+        name, _, index = text[:-1].partition("(")
+        number = int(index) if index.isdigit() else self.values[index]
+        return name, number if 0 <= number < SIZE else -1
+
+    def read(self, text: str):
+        if text in ("TRUE", "FALSE"):
+            return text == "TRUE"
+        if text[0] == "-" and text[1].isalpha():
+            return not self.read(text[1:])
+        if text[0] in "-0123456789":
+            return float(text) if "." in text else int(text)
+        name, index = self.place(text)
+        if index == -1:
+            self.codes.append(SUBSCRIPT)
+            return type_of_name(name).zero
+        return self.values[name] if index is None else self.values[name][index]
+
+    def write(self, text: str, value) -> None:
+        name, index = self.place(text)
+        if index == -1:
+            self.codes.append(SUBSCRIPT)
+        elif index is None:
+            self.values[name] = value
+        else:
+            self.values[name][index] = value
+
+
+class ModelBlock:
+    def __init__(self, call: Programmed) -> None:
+        self.call = call
+        self.inputs = {
+            item.variable: call.parameters[item.name] for item in call.block.inputs if item.name in call.parameters
+        }
+        self.outputs = {
+            item.variable: (call.parameters[item.name], item.holds)
+            for item in call.block.outputs
+            if item.name in call.parameters
+        }
+        fixed = {name: text for name, text in self.inputs.items() if text[0] not in "LK-" or text[1:2].isdigit()}
+        fixed = {name: text for name, text in fixed.items() if text[0] not in "LK"}
+        self.fixed = {name: Model({}).read(text) for name, text in fixed.items()}
+        self.instance = Instance(call.block, TICKS * TICK, **self.fixed)
+        self.was_limited = False
+
+    def scan(self, model: Model) -> None:
+        given_now = {name: model.read(text) for name, text in self.inputs.items() if name not in self.fixed}
+        before = {}
+        for name, (text, holds) in self.outputs.items():
+            if holds:
+                before[name] = self.instance.outputs[name] = model.read(text)
+        results = self.instance.scan(**given_now)
+        self._note_limits(model, given_now)
+        if self.call.block.logs and self.instance.error:
+            model.codes.append(self.instance.error)
+        for name, (text, holds) in self.outputs.items():
+            if not holds or results[name] != before[name]:
+                model.write(text, results[name])
+
+    def _note_limits(self, model: Model, given_now) -> None:
+        declared = self.call.block.coefficients
+        if declared is None:
+            return
+        everything = {**self.fixed, **given_now}
+        reals = {name: everything[name.lower()] for name in declared.parameters if name.lower() in everything}
+        moved = bool(limited(declared, TICKS * TICK / 1e9, reals)[1])
+        if moved and not self.was_limited:
+            model.codes.append(7004)
+        self.was_limited = moved
+
+
+@st.composite
+def scans(draw, names: list[str], count: int):
+    """What is set before each scan: some of the variables."""
+    changes = []
+    for number in range(count):
+        change = {}
+        for name in names:
+            if number == 0 or draw(st.integers(0, 3)) == 0:
+                if name in ("LJ%", "KJ%"):
+                    change[name] = draw(st.integers(-1, SIZE))
+                else:
+                    change[name] = draw(VALUES[type_of_name(name)])
+        changes.append(change)
+    return changes
+
+
+def used(programmed: list[Programmed]) -> list[str]:
+    """The simple variables that the calls name."""
+    text = " ".join(call.text(0) for call in programmed)
+    return [name for name in ALL_SIMPLE if name in text]
+
+
+def compare(programmed: list[Programmed], changes, in_steps: bool) -> None:
+    body = "\n".join(call.text(100 + number) for number, call in enumerate(programmed))
+    task, memory = task_of(f"{declarations()}20 CALL SCAN_LOOP(TICKS={TICKS})\n{body}\n999 END\n")
+    task.record_scans()
+    task.run()
+    model = Model(
+        {
+            **{name: type_of_name(name).zero for name in ALL_SIMPLE},
+            **{name: [type_of_name(name).zero] * SIZE for name in ALL_ARRAYS},
+        }
+    )
+    blocks = [ModelBlock(call) for call in programmed]
+    for now, change in enumerate(changes):
+        for name, value in change.items():
+            model.values[name] = value
+            if name.startswith("K"):
+                memory.write_from_outside(memory.view(name), value, OTHER)
+            else:
+                task.state[task.compiled.layout.index(name)] = value
+        model.codes.clear()
+        for block in blocks:
+            block.scan(model)
+        if in_steps:
+            scan_in_steps(task, now)
+        else:
+            task.scan(now)
+        actual = actual_values(task, memory)
+        assert actual == model.values
+        assert {name: type_of(value) for name, value in actual.items()} == {
+            name: type_of(value) for name, value in model.values.items()
+        }
+        assert Counter(code for _, code in task._io.record.errors) == Counter(model.codes)
+
+
+def actual_values(task, memory) -> dict[str, object]:
+    values = {}
+    for name in [*ALL_SIMPLE, *ALL_ARRAYS]:
+        if name.startswith("L"):
+            values[name] = task.value(name)
+        elif name in ALL_SIMPLE:
+            values[name] = memory.read_now(memory.view(name))
+        else:
+            values[name] = [memory.read_now(memory.view(name), index) for index in range(SIZE)]
+    return values
+
+
+def type_of(value: object) -> object:
+    return [type(item) for item in value] if isinstance(value, list) else type(value)
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
+@given(data=st.data())
+@repeatable(40)
+def test_a_compiled_block_is_its_step_function(block, data):
+    call = data.draw(calls(block))
+    compare([call], data.draw(scans(used([call]), 5)), data.draw(st.booleans()))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
+@given(data=st.data())
+@repeatable(2000)
+def test_a_compiled_block_is_its_step_function_long(block, data):
+    call = data.draw(calls(block))
+    compare([call], data.draw(scans(used([call]), 12)), data.draw(st.booleans()))
+
+
+@given(data=st.data())
+@repeatable(60)
+def test_blocks_one_after_the_other(data):
+    """They share variables, also several of one kind, each with a state of its own."""
+    chosen = data.draw(st.lists(st.sampled_from(BLOCKS), min_size=2, max_size=5))
+    programmed = [data.draw(calls(block)) for block in chosen]
+    compare(programmed, data.draw(scans(used(programmed), 5)), data.draw(st.booleans()))
+
+
+def test_two_outputs_onto_one_variable_leave_the_last_of_the_declaration():
+    task = ran("A% = 50", "CALL LIMIT(INPUT=A%, LIMIT_PLUS=40, SATURATED_PLUS=X@, SATURATED_MINUS=X@, OUTPUT=B%)")
+    assert (task.value("X@"), task.value("B%")) == (False, 40)
+
+
+def test_same_variable_as_input_and_output():
+    task = ran("A% = 50", "CALL DIFFERENCE(INPUT1=A%, INPUT2=A%, OUTPUT=A%)", "B% = 1")
+    assert (task.value("A%"), task.value("B%")) == (0, 1)
+
+
+def test_a_block_that_a_goto_skips_keeps_output_and_state():
+    """State counts from the block's first execution since RUN (architecture)."""
+    skipping = "30 IF N% < 3 THEN 50\n40 CALL RAMP(INPUT=100, ACCEL_RATE=10, OUTPUT=A%)\n50 N% = N% + 1\n60 END\n"
+    task, _ = task_of("10 LOCAL N%, A%\n20 CALL SCAN_LOOP(TICKS=4)\n" + skipping)
+    run_scans(task, 3)
+    assert (task.value("A%"), task.value("40 RAMP.register")) == (0, 0)
+    run_scans(task, 2, first=4)
+    assert task.value("A%") == 20
+    task.state[task.compiled.layout.index("N%")] = -2
+    run_scans(task, 3, first=6)
+    assert task.value("A%") == 20
+    run_scans(task, 9, first=9)
+    assert task.value("A%") == 20 + 40
+
+
+def test_two_calls_of_one_line_have_two_states():
+    task = ran("CALL RAMP(INPUT=100, ACCEL_RATE=10, OUTPUT=A%) \\ CALL RAMP(INPUT=100, ACCEL_RATE=7, OUTPUT=B%)", scans=2)
+    assert (task.value("30 RAMP.register"), task.value("30.2 RAMP.register")) == (20, 14)
+
+
+def test_a_block_in_a_loop_runs_once_a_turn_on_one_state():
+    task = ran("FOR C% = 1 TO 3", "CALL RAMP(INPUT=100, ACCEL_RATE=10, OUTPUT=A%)", "NEXT C%", scans=2)
+    assert task.value("A%") == 60
+
+
+def test_a_coefficient_out_of_its_limits_is_logged_when_it_goes_out():
+    """Semantics, Coefficients: on the scan in which it goes out of range, not on every scan."""
+    text = "10 COMMON GAIN\n11 LOCAL A%, B%\n20 CALL SCAN_LOOP(TICKS=4)\n30 CALL LAG(INPUT=A%, WLG=GAIN, OUTPUT=B%)\n40 END\n"
+    task, memory = task_of(text, GAIN=5.0)
+    task.run()
+    counts = []
+    for gain in (5.0, 1e6, 1e6, 2e6, 5.0, 1e6):
+        memory.write_from_outside(0, gain, OTHER)
+        task.scan(0)
+        counts.append(task.errors.count)
+    assert counts == [0, 1, 1, 1, 1, 2]
+    assert logged(task) == [(30, 7004), (30, 7004)]
+
+
+STEPS = """
+def swap_step(input1, input2):
+    return input1, input2
+
+
+def delay_step(input, last):
+    return last, input
+
+
+def count_step(input, count):
+    first = count
+    count = count + input
+    return count, first, count
+
+
+def guarded_step(input, divisor, select):
+    output = truncated_quotient(input, divisor) if select else 0
+    return (output,)
+
+
+def pair_step(input, a, b):
+    a, b = b + input, a
+    return b, a, b
+"""
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch):
+    """Blocks whose steps return inputs and states as they are, as the declaration allows."""
+    import importlib
+    import sys
+
+    (tmp_path / "made_steps.py").write_text("from automax_ros.core.numbers import truncated_quotient\n" + STEPS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    module = importlib.import_module("made_steps")
+    yield module
+    del sys.modules["made_steps"]
+
+
+def block_like(name, step, inputs, outputs, states=()):
+    from automax_ros.blocks.declaration import Input, Output, State
+
+    return dataclasses.replace(
+        CATALOGUE["SUMMER"],
+        name=name,
+        inputs=tuple(Input(item, DataType.INTEGER, item, item, required=True) for item in inputs),
+        outputs=tuple(Output(item, DataType.INTEGER, item, item) for item in outputs),
+        states=tuple(State(item, DataType.INTEGER, 0) for item in states),
+        logs=(),
+        step=step,
+    )
+
+
+@pytest.mark.parametrize("name", ["swap", "delay", "count", "pair"])
+def test_steps_that_return_inputs_and_states_as_they_are(made, monkeypatch, name):
+    shapes = {
+        "swap": (("INPUT1", "INPUT2"), ("OUTPUT2", "OUTPUT1"), ()),
+        "delay": (("INPUT",), ("OUTPUT",), ("last",)),
+        "count": (("INPUT",), ("OUTPUT", "BEFORE"), ("count",)),
+        "pair": (("INPUT",), ("OUTPUT",), ("a", "b")),
+    }
+    inputs, outputs, states = shapes[name]
+    block = block_like(name.upper(), getattr(made, f"{name}_step"), inputs, outputs, states)
+    monkeypatch.setitem(CATALOGUE, block.name, block)
+    names = dict(zip(inputs, ("L1%", "L2%"), strict=False))
+    call = Programmed(block, {**names, **dict(zip(outputs, ("L2%", "L1%"), strict=False))})
+    again = Programmed(block, {**names, **dict(zip(outputs, ("K1%", "K2%"), strict=False))})
+    compare([call, again], [{"L1%": 3, "L2%": 5}, {"L1%": 7}, {}, {"L2%": 9}], False)
+
+
+def test_a_helper_that_fails_on_literals_stays_behind_its_test(made, monkeypatch):
+    block = block_like("GUARD", made.guarded_step, ("INPUT", "DIVISOR", "SELECT"), ("OUTPUT",))
+    monkeypatch.setitem(CATALOGUE, block.name, block)
+    call = Programmed(block, {"INPUT": "5", "DIVISOR": "0", "SELECT": "L1%", "OUTPUT": "L2%"})
+    compare([call], [{"L1%": 0, "L2%": 1}], False)
