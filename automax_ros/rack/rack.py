@@ -19,7 +19,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.tasks_check import check_tasks
 from automax_ros.runtime.compiler import compile_program
-from automax_ros.runtime.memory import CommonMemory, ViewSpec, Write
+from automax_ros.runtime.memory import CommonMemory, ViewSpec, Write, WriteKind
 from automax_ros.runtime.scheduler import EventClass, EventKey, Scheduler
 from automax_ros.runtime.task import ScanRecord, Status, Task
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
@@ -43,6 +43,10 @@ class RackObserver(Protocol):
 
     def written(self, writes: list[Write]) -> None:
         """Memory was written from outside the tasks."""
+        ...
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """A tunable of a task was set between two scans."""
         ...
 
     def all_stopped(self, reason: str, now_ns: int) -> None:
@@ -133,7 +137,8 @@ class Rack:
             self.memory.write_from_outside(self.memory.view(name), value, OPERATOR_WRITER)
         self._tell_writes()
         for task in sorted(self.tasks, key=lambda task: (task.priority, task.name)):
-            self._start(task, now)
+            if self.stop_reason is None:
+                self._start(task, now)
         for task in self.tasks:
             key = EventKey(EventClass.SCAN, task.priority, task.name)
             self.scheduler.every(task.period_ns, now, key, self._scanner(task))
@@ -155,14 +160,25 @@ class Rack:
         """Write elements of a variable from outside the tasks, between scans.
 
         Raises:
-            MemoryValueError: a value does not fit; those before it are written.
+            MemoryValueError: a value does not fit; nothing is written then.
         """
-        self.memory.now_ns = self.now_ns
-        try:
-            for element, value in values:
-                self.memory.write_from_outside(view, value, writer, element)
-        finally:
-            self._tell_writes()
+        memory = self.memory
+        accepted = [(element, memory.accepted(view, value, element)) for element, value in values]
+        memory.now_ns = self.now_ns
+        for element, value in accepted:
+            memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
+        self._tell_writes()
+
+    def tune(self, task: Task, name: str, value: object) -> None:
+        """Set a tunable of a task, between scans.
+
+        Raises:
+            KeyError: the task has no tunable of that name.
+            ValueError: the value lies outside its limits or is not of its type.
+        """
+        task.tune(name, value)
+        for observer in self._observers:
+            observer.tuned(task, self.now_ns)
 
     def value(self, name: str, element: int = 0) -> Value:
         """Return the present value of a common.

@@ -130,10 +130,18 @@ class CommonMemory:
         Raises:
             MemoryValueError: the value does not fit the variable's type, or the element does not exist.
         """
+        self._store(view, element, self.accepted(view, value, element), writer, WriteKind.OUTSIDE)
+
+    def accepted(self, view: int, value: Value, element: int = 0) -> Value:
+        """Return a value from outside as an element of the variable would hold it; nothing is written.
+
+        Raises:
+            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
+        """
         spec = self.specs[view]
         if not 0 <= element < spec.elements:
             raise MemoryValueError(f"{spec.name} has no element {element}: it has {spec.elements}")
-        self._store(view, element, fitting(spec, value), writer, WriteKind.OUTSIDE)
+        return fitting(spec, value)
 
     def force(self, view: int, value: Value, element: int = 0, writer: int = 0) -> None:
         """Hold a value against every write until it is released; the force itself is a write from outside.

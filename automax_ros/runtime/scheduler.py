@@ -127,6 +127,14 @@ class Scheduler:
                 event.action(instant, skipped)
         self.now_ns = max(self.now_ns, now_ns)
 
+    def pass_until(self, now_ns: int) -> None:
+        """Let time of the wall clock pass, at most to the next event, which is not carried out yet.
+
+        Called before something comes from outside, so that it happens at the present and still before what is due.
+        """
+        due = self.next_ns
+        self.now_ns = max(self.now_ns, now_ns if due is None else min(now_ns, due))
+
     def _queued(self, time_ns: int, event: Event) -> _Queued:
         self._serial += 1
         return time_ns, event.key.event_class, event.key.priority, event.key.name, self._serial, event

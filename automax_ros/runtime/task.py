@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
@@ -241,8 +242,17 @@ class Task:
         """
         return self.state[self.compiled.layout.index(name)]
 
-    def tune(self, name: str, value: Value) -> None:
+    def tune(self, name: str, value: object) -> None:
         """Set a tunable, as the operator does (2.4.5).
+
+        Raises:
+            KeyError: the task has no tunable of that name.
+            ValueError: the value lies outside its limits or is not of its type.
+        """
+        self.state[self.compiled.layout.index(name)] = self.tuning(name, value)
+
+    def tuning(self, name: str, value: object) -> int | float:
+        """Return what a tunable would hold if it were set to a value; nothing is set.
 
         Raises:
             KeyError: the task has no tunable of that name.
@@ -251,13 +261,15 @@ class Task:
         symbol = self.compiled.program.symbols[name]
         if symbol.tuning is None:
             raise KeyError(name)
-        limits = symbol.tuning
-        if isinstance(value, (bool, str)) or isinstance(limits.low, str) or isinstance(limits.high, str):
-            raise ValueError(f"{value!r} is no number")
-        if not limits.low <= value <= limits.high:
-            raise ValueError(f"{name} = {value} lies outside {limits.low} to {limits.high}")
+        low, high = symbol.tuning.low, symbol.tuning.high
+        assert not isinstance(low, str) and not isinstance(high, str)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ValueError(f"{name} cannot be {value!r}: that is no number")
+        # A limit such as 0.1 is held in single precision too, so the stored value is what must lie inside.
         stored = stored_real(float(value))[0] if symbol.type is DataType.REAL else int(value)
-        self.state[self.compiled.layout.index(name)] = stored
+        if not low <= stored <= high:
+            raise ValueError(f"{name} = {value:.8g} lies outside {low:.8g} to {high:.8g}")
+        return stored
 
     def _execute(self, part: Callable[..., bool], now_ns: int, skipped: int) -> ScanRecord | None:
         record = self._begin_record(now_ns, skipped)
