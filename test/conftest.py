@@ -5,6 +5,7 @@ import itertools
 import os
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -23,11 +24,11 @@ LOCKS = Path(tempfile.gettempdir()) / f"automax_ros_domains_{os.getuid()}"
 turns = itertools.count()
 
 
-@pytest.fixture
-def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A ROS domain (1 to 101) that no other test on this machine uses while this one runs, set as ROS_DOMAIN_ID.
+@contextmanager
+def free_domain() -> Iterator[int]:
+    """A ROS domain (1 to 101) that no other test on this machine uses while the block lasts.
 
-    Child processes inherit it. A lock file guards it, so pytest processes side by side do not hear each other.
+    A lock file guards it, so pytest processes side by side do not hear each other.
     """
     LOCKS.mkdir(exist_ok=True)
     start = os.getpid() * 7 + next(turns)
@@ -37,7 +38,22 @@ def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 continue
-            monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
             yield domain
             return
     pytest.fail("all ROS domains are taken by other tests")
+
+
+@pytest.fixture
+def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A ROS domain of the test's own, set as ROS_DOMAIN_ID; child processes inherit it."""
+    with free_domain() as domain:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        yield domain
+
+
+@pytest.fixture(scope="module")
+def module_domain_id() -> Iterator[int]:
+    """The same for all tests of a module together, which may then share a running rack."""
+    with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(domain))
+        yield domain

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import struct
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
@@ -11,11 +10,11 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.messages import CommonImage, CommonWrite, Values, VariableTable, VariableType
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.variables import Watched, WatchError, checked_table, watched_by_default, watched_by_name
+from automax_ros.core.decimal_text import real_text, seconds_text
 from automax_ros.core.diagnostics import printable
 
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "VariableTable"))
 _SECOND = 1_000_000_000
-_SINGLE = struct.Struct("<f")
 _Cell = float | str | None
 
 
@@ -194,16 +193,8 @@ def _whole(value: _Cell) -> str:
 
 
 def _real(value: _Cell) -> str:
-    """The shortest text that gives the same single-precision value."""
     assert isinstance(value, float)
-    for digits in range(1, 10):
-        text = f"{value:.{digits}g}"
-        try:
-            if _SINGLE.unpack(_SINGLE.pack(float(text)))[0] == value:
-                return text
-        except OverflowError:
-            break
-    return repr(value)
+    return real_text(value)
 
 
 def _text(value: _Cell) -> str:
@@ -217,9 +208,3 @@ _FORMATS: dict[VariableType, Callable[[_Cell], str]] = {
     VariableType.BOOLEAN: _whole,
     VariableType.STRING: _text,
 }
-
-
-def seconds_text(time: int) -> str:
-    """Nanoseconds as seconds, exactly and without trailing zeros."""
-    text = f"{time // _SECOND}.{time % _SECOND:09d}"
-    return text.rstrip("0").rstrip(".")

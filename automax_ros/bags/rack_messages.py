@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import groupby
+from operator import itemgetter
+from typing import Any
 
 from automax_ros.bags.messages import (
+    NO_LAYOUT,
+    NO_VALUES,
     Bool,
     CommonImage,
     CommonWrite,
@@ -17,8 +22,6 @@ from automax_ros.bags.messages import (
     Int32MultiArray,
     MultiArrayDimension,
     MultiArrayLayout,
-    NO_LAYOUT,
-    NO_VALUES,
     Scan,
     ScanError,
     String,
@@ -45,58 +48,48 @@ VARIABLE_TYPES = {
     DataType.STRING: VariableType.STRING,
 }
 Message = tuple[object, ...]
-_SCALARS: dict[DataType, Callable[[Value], Message]] = {
-    DataType.INTEGER: lambda value: Int16(value),  # type: ignore[arg-type]
-    DataType.DOUBLE: lambda value: Int32(value),  # type: ignore[arg-type]
-    DataType.REAL: lambda value: Float32(value),  # type: ignore[arg-type]
-    DataType.BOOLEAN: lambda value: Bool(value),  # type: ignore[arg-type]
-    DataType.STRING: lambda value: String(value),  # type: ignore[arg-type]
-}
-_ARRAYS: dict[DataType, type[Message]] = {
-    DataType.INTEGER: Int16MultiArray,
-    DataType.DOUBLE: Int32MultiArray,
-    DataType.REAL: Float32MultiArray,
-    DataType.BOOLEAN: UInt8MultiArray,
-}
-
-
-def values_of(entries: Iterable[tuple[int, int, Value]]) -> Values:
-    """Return (view, element, value) entries as a Values message."""
-    variables: list[int] = []
-    elements: list[int] = []
-    numbers: list[float] = []
-    texts: list[str] = []
-    for view, element, value in entries:
-        variables.append(view)
-        elements.append(element)
-        if isinstance(value, str):
-            texts.append(value)
-            numbers.append(0.0)
-        else:
-            numbers.append(value)
-    return Values(variables, elements, numbers, texts) if variables else NO_VALUES
-
-
-def value_type_name(variable: CommonVariable) -> str | None:
-    """Return the ROS type of a variable's topic, None for arrays of strings, which std_msgs cannot carry."""
-    message = _ARRAYS.get(variable.type) if variable.is_array else _SCALAR_CLASSES[variable.type]
-    return f"std_msgs/msg/{message.__name__}" if message else None
-
-
-_SCALAR_CLASSES: dict[DataType, type[Message]] = {
+_SCALARS: dict[DataType, Any] = {
     DataType.INTEGER: Int16,
     DataType.DOUBLE: Int32,
     DataType.REAL: Float32,
     DataType.BOOLEAN: Bool,
     DataType.STRING: String,
 }
+"""The classes of simple variables' topics: each takes the value."""
+_ARRAYS: dict[DataType, Any] = {
+    DataType.INTEGER: Int16MultiArray,
+    DataType.DOUBLE: Int32MultiArray,
+    DataType.REAL: Float32MultiArray,
+    DataType.BOOLEAN: UInt8MultiArray,
+}
+"""The classes of arrays' topics: each takes the layout and the values. std_msgs has none for strings."""
+_ENTRY = itemgetter(4, 5, 6)
+"""View, element and value of an entry of the write log."""
 
 
-def value_message(variable: CommonVariable, values: Sequence[Value]) -> Message:
-    """Return the message of a variable's topic; an array's layout names its dimensions."""
-    if not variable.is_array:
-        return _SCALARS[variable.type](values[0])
-    return _ARRAYS[variable.type](_layout(variable.dimensions), values)
+def values_of(entries: Sequence[tuple[int, int, Value]]) -> Values:
+    """Return (view, element, value) entries as a Values message."""
+    if not entries:
+        return NO_VALUES
+    variables, elements, values = zip(*entries, strict=True)
+    texts = [value for value in values if isinstance(value, str)]
+    numbers = [0.0 if isinstance(value, str) else value for value in values] if texts else values
+    return Values(variables, elements, numbers, texts)
+
+
+def value_type_name(variable: CommonVariable) -> str | None:
+    """Return the ROS type of a variable's topic, None for arrays of strings, which std_msgs cannot carry."""
+    message = _ARRAYS.get(variable.type) if variable.is_array else _SCALARS[variable.type]
+    return f"std_msgs/msg/{message.__name__}" if message else None
+
+
+def message_maker(variable: CommonVariable) -> Callable[[Any], Message]:
+    """Return what makes the message of a variable's topic: of its value, or of an array's values in order.
+
+    An array's layout names its dimensions.
+    """
+    maker: Callable[[Any], Message] = _SCALARS[variable.type]
+    return partial(_ARRAYS[variable.type], _layout(variable.dimensions)) if variable.is_array else maker
 
 
 def _layout(dimensions: tuple[int, ...]) -> MultiArrayLayout:
@@ -163,7 +156,7 @@ class RackMessages:
     def writes(self, writes: Sequence[Write]) -> list[CommonWrite]:
         """Return entries of the write log, those of one writer, kind and instant together."""
         messages = []
-        for (time_ns, writer, kind), group in groupby(writes, key=lambda entry: (entry[1], entry[2], entry[3])):
+        for (time_ns, writer, kind), group in groupby(writes, key=itemgetter(1, 2, 3)):
             self._sequence += 1
             messages.append(
                 CommonWrite(
@@ -173,7 +166,7 @@ class RackMessages:
                     self._slots[writer],
                     kind,
                     self._sequence,
-                    values_of((entry[4], entry[5], entry[6]) for entry in group),
+                    values_of([_ENTRY(entry) for entry in group]),
                 )
             )
         return messages
@@ -201,10 +194,10 @@ class RackMessages:
             min(record.duration_ns, 0xFFFFFFFF),
             min(record.skipped, 0xFFFFFFFF),
             full,
-            values_of(changed) if changed else NO_VALUES,
-            values_of(record.reads) if record.reads else NO_VALUES,
-            values_of(record.writes) if record.writes else NO_VALUES,
-            values_of((view, 0, value) for view, value in record.commits) if record.commits else NO_VALUES,
+            values_of(changed),
+            values_of(record.reads),
+            values_of(record.writes),
+            values_of([(view, 0, value) for view, value in record.commits]),
             [ScanError(line, code) for line, code in record.errors],
         )
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 from automax_ros.bags.cdr import encoder
 from automax_ros.bags.messages import NAMES
 from automax_ros.bags.qos import LATCHED, SCAN, VALUE, QosProfile
-from automax_ros.bags.rack_messages import Message, RackMessages, value_message, value_type_name
+from automax_ros.bags.rack_messages import Message, RackMessages, message_maker, value_type_name
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
@@ -48,6 +49,7 @@ class _ValueTopic:
     def __init__(self, variable: CommonVariable, topic: Topic) -> None:
         self.variable = variable
         self.topic = topic
+        self.make = message_maker(variable)
         self.encode = encoder(topic.type_name)
         self.interval_ns = round(NS_PER_S / variable.rate_limit_hz) if variable.rate_limit_hz else 0
         self.last_ns = -1
@@ -75,6 +77,7 @@ class RackStream:
         self._sinks: list[Sink] = []
         self._encoders = {name: encoder(name) for name in NAMES.values() if name.startswith("automax_msgs/")}
         self._next_snapshot: dict[str, int] = {}
+        self._begun = False
 
     @property
     def topics(self) -> list[Topic]:
@@ -87,12 +90,10 @@ class RackStream:
         """The topics that Processors send on."""
         return [*self.scans_topics.values(), *self.states_topics.values()]
 
-    def value_topic(self, variable: CommonVariable) -> Topic | None:
-        """Return the topic of a variable, None if it has none."""
-        for value in self._values.values():
-            if value.variable.name == variable.name:
-                return value.topic
-        return None
+    def value_topic(self, view: int) -> Topic | None:
+        """Return the topic of a variable by its index in the rack's table, None if it has none."""
+        value = self._values.get(view)
+        return value.topic if value else None
 
     def add_sink(self, sink: Sink) -> None:
         """Hand every message to a further taker."""
@@ -108,6 +109,12 @@ class RackStream:
         self._send_image(self._rack.now_ns)
         self._send_values(self._values, self._rack.now_ns)
         self._rack.observe(self)
+        self._begun = True
+
+    def send_image(self) -> None:
+        """Send all of common memory as it is now, for somebody who joins a running rack."""
+        if self._begun:
+            self._send_image(self._rack.now_ns)
 
     def end(self) -> None:
         """Send what is held back by rate limits and the final states."""
@@ -121,7 +128,7 @@ class RackStream:
     # RackObserver
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
-        """Send a scan, its writes and the values that changed; every now and then a snapshot before it."""
+        """Send a scan, its writes and the values that changed; every now and then a snapshot behind them."""
         now = record.time_ns
         full = now >= self._next_snapshot.get(task.name, 0) and record.scan > 0
         message = self._messages.scan(task, record, full=full)
@@ -140,7 +147,11 @@ class RackStream:
         """Send writes from outside and the values that changed."""
         self._send_writes(writes, self._rack.now_ns)
 
-    def all_stopped(self, reason: str, now_ns: int) -> None:
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """Send the task's new state: no scan tells that a tunable was set."""
+        self._send_state(task, now_ns)
+
+    def all_stopped(self, reason: str, now_ns: int) -> None:  # noqa: ARG002
         """Send the states in which the tasks were stopped."""
         for task in self._rack.tasks:
             self._send_state(task, now_ns)
@@ -178,17 +189,15 @@ class RackStream:
             elif not value.waits:
                 value.waits = True
                 key = EventKey(EventClass.OBSERVE, 0, value.variable.name)
-                self._rack.scheduler.at(due, key, lambda now, view=view, value=value: self._send_late(view, value, now))
+                self._rack.scheduler.at(due, key, partial(self._send_late, view, value))
 
     def _send_late(self, view: int, value: _ValueTopic, now_ns: int) -> None:
-        if value.waits:
+        if value.waits and now_ns >= value.last_ns + value.interval_ns:
             self._send_value(view, value, now_ns)
 
     def _send_value(self, view: int, value: _ValueTopic, now_ns: int) -> None:
-        memory = self._rack.memory
-        present = [memory.read_now(view, element) for element in range(value.variable.elements)]
-        payload = value.encode(value_message(value.variable, present))
         value.waits = False
+        payload = value.encode(value.make(self._rack.memory.present(view)))
         if payload != value.last_payload:
             value.last_ns, value.last_payload = now_ns, payload
             stamp = self._messages.stamp(now_ns)

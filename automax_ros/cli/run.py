@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
@@ -20,15 +21,18 @@ from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack, RackError
-from automax_ros.rack.settings import SettingError, setting, watched
+from automax_ros.rack.settings import SettingError, Watched, setting, watched
 
+WITHOUT_ROS = "or run with --simulated, which needs no ROS"
 _UNREADABLE = frozenset({"AMX6000", "AMX6001", "AMX6002"})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax run``."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file")
-    parser.add_argument("--simulated", action="store_true", help="simulated time, as fast as the machine can, without ROS")
+    parser.add_argument(
+        "--simulated", action="store_true", help="simulated time, as fast as the machine can, without ROS"
+    )
     parser.add_argument("--duration", metavar="S", help="seconds of rack time after which the run ends by itself")
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
     parser.add_argument(
@@ -48,34 +52,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
     duration_ns = _duration(arguments.duration)
-    if not arguments.simulated:
-        from automax_ros.nodes.environment import RosUnavailable, prepare
-
+    with stop_signals() as stop:
+        if not arguments.simulated:
+            _prepare_ros()
+        config = _config(arguments.config, allow_outside=arguments.allow_outside)
+        if config is None:
+            return 1
+        settings = _settings(config, arguments.settings)
+        watch = _watched(config, arguments.watch)
         try:
-            prepare()
-        except RosUnavailable as error:
-            raise UsageError(str(error), "or run with --simulated, which needs no ROS") from error
-    config = _config(arguments.config, allow_outside=arguments.allow_outside)
-    if config is None:
-        return 1
-    settings = _settings(config, arguments.settings)
-    names = watch_list(arguments.watch)
-    try:
-        watch = watched(config, names)
-        if arguments.simulated:
-            from automax_ros.cli.run_simulated import run_simulated
+            if arguments.simulated:
+                from automax_ros.cli.run_simulated import run_simulated
 
-            return run_simulated(config, duration_ns, arguments.record, settings, watch)
-        from automax_ros.cli.run_live import run_live
+                return run_simulated(config, duration_ns, arguments.record, settings, watch, stop)
+            from automax_ros.cli.run_live import run_live
 
-        return run_live(config, duration_ns, arguments.record, settings, watch)
-    except SettingError as error:
-        raise UsageError(str(error), error.hint) from error
-    except RackError as error:
-        return _refused(error)
-    except BagError as error:
-        print(error, file=sys.stderr)
-        return 2
+            return run_live(config, duration_ns, arguments.record, settings, watch, stop)
+        except RackError as error:
+            return _refused(error)
+        except BagError as error:
+            print(error, file=sys.stderr)
+            return 2
 
 
 def warn(rack: Rack) -> None:
@@ -96,6 +93,15 @@ def _duration(text: str | None) -> int | None:
     return duration_ns
 
 
+def _prepare_ros() -> None:
+    from automax_ros.nodes.environment import RosUnavailable, prepare
+
+    try:
+        prepare()
+    except RosUnavailable as error:
+        raise UsageError(str(error), WITHOUT_ROS) from error
+
+
 def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:
     from automax_ros.rack.loader import load
 
@@ -111,6 +117,13 @@ def _settings(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
         return [setting(config, text) for text in texts]
     except SettingError as error:
         raise UsageError(f"--set: {error}", error.hint) from error
+
+
+def _watched(config: RackConfig, texts: list[str] | None) -> list[Watched]:
+    try:
+        return watched(config, watch_list(texts))
+    except SettingError as error:
+        raise UsageError(f"--watch: {error}", error.hint) from error
 
 
 def _refused(error: RackError) -> int:

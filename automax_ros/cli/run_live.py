@@ -9,28 +9,16 @@ from pathlib import Path
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.run import warn
 from automax_ros.cli.run_simulated import report_end
-from automax_ros.cli.signals import stop_signals
+from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.types import Value
+from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.launcher import LiveRack
-from automax_ros.nodes.lock import RackAlreadyRuns, RackLock, domain_id
-from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.nodes.lock import LockError, RackLock, domain_id
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
-
-
-class _Stop:
-    """Remembers a stop request that comes before the rack lives, and hands it on to the rack."""
-
-    def __init__(self) -> None:
-        self.requested = False
-        self.live: LiveRack | None = None
-
-    def request(self) -> None:
-        """Ask the run to end."""
-        self.requested = True
-        if self.live is not None:
-            self.live.stopping = True
+from automax_ros.rack.settings import Watched
 
 
 def run_live(
@@ -38,15 +26,15 @@ def run_live(
     duration_ns: int | None,
     record: Path | None,
     settings: list[tuple[str, Value]],
-    watch: Sequence[CommonVariable],
+    watch: Sequence[Watched],
+    stop: StopRequest,
 ) -> int:
-    """Run until the duration has passed, Ctrl-C or SIGTERM; return the exit code."""
-    stop = _Stop()
-    domain = domain_id()
+    """Run until the duration has passed or a stop is requested; return the exit code."""
     try:
-        with stop_signals(stop.request), RackLock(config.namespace, domain):
+        domain = domain_id()
+        with RackLock(config.namespace, domain):
             return _run_locked(config, duration_ns, record, settings, watch, stop, domain)
-    except RackAlreadyRuns as error:
+    except (LockError, RosUnavailable) as error:
         raise UsageError(str(error)) from error
 
 
@@ -55,20 +43,19 @@ def _run_locked(
     duration_ns: int | None,
     record: Path | None,
     settings: list[tuple[str, Value]],
-    watch: Sequence[CommonVariable],
-    stop: _Stop,
+    watch: Sequence[Watched],
+    stop: StopRequest,
     domain: int,
 ) -> int:
     rack = Rack(config, stopwatch=time.perf_counter_ns)
     warn(rack)
     live = LiveRack(rack)
-    stop.live = live
-    live.stopping = stop.requested
-    recorder = None
+    recorder: Recorder | None = None
     display = StatusDisplay(rack, watch, live=True)
     told = [False, False]
 
     def on_idle(now_ns: int) -> None:
+        live.stopping = stop.requested
         display.update(now_ns)
         if rack.stop_reason is not None and not told[0]:
             told[0] = True
@@ -84,9 +71,11 @@ def _run_locked(
         live.start(settings)
         live.run(duration_ns, on_idle)
     finally:
-        live.close()
-        if recorder is not None:
-            recorder.close()
+        try:
+            live.close()
+        finally:
+            if recorder is not None:
+                recorder.close()
     display.finish(record)
     return report_end(rack, recorder)
 

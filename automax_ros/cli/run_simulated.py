@@ -9,23 +9,16 @@ from pathlib import Path
 from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.run import warn
-from automax_ros.cli.signals import stop_signals
+from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.types import Value
-from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.settings import Watched
 
 SLICE_NS = 100 * NS_PER_MS
 """Rack time between two looks at signals and the display."""
-
-
-class _Stop:
-    requested = False
-
-    def request(self) -> None:
-        """Ask the loop to end."""
-        self.requested = True
 
 
 def run_simulated(
@@ -33,28 +26,27 @@ def run_simulated(
     duration_ns: int | None,
     record: Path | None,
     settings: list[tuple[str, Value]],
-    watch: Sequence[CommonVariable],
+    watch: Sequence[Watched],
+    stop: StopRequest,
 ) -> int:
-    """Run until the duration has passed, a fault stops all tasks, or Ctrl-C; return the exit code."""
+    """Run until the duration has passed, a fault stops all tasks, or a stop is requested; return the exit code."""
     rack = Rack(config)
     warn(rack)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, record) if record is not None else None
     display = StatusDisplay(rack, watch, live=False)
-    stop = _Stop()
-    with stop_signals(stop.request):
-        try:
-            if recorder is not None:
-                stream.begin()
-            rack.start(settings)
-            while not stop.requested and rack.stop_reason is None and (duration_ns is None or rack.now_ns < duration_ns):
-                end = rack.now_ns + SLICE_NS
-                rack.scheduler.run_until(end if duration_ns is None else min(end, duration_ns))
-                display.update(rack.now_ns)
-        finally:
-            if recorder is not None:
-                stream.end()
-                recorder.close()
+    try:
+        if recorder is not None:
+            stream.begin()
+        rack.start(settings)
+        while not stop.requested and rack.stop_reason is None and (duration_ns is None or rack.now_ns < duration_ns):
+            end = rack.now_ns + SLICE_NS
+            rack.scheduler.run_until(end if duration_ns is None else min(end, duration_ns))
+            display.update(rack.now_ns)
+    finally:
+        if recorder is not None:
+            stream.end()
+            recorder.close()
     display.finish(record)
     return report_end(rack, recorder)
 

@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import FrameType
 
 
+@dataclass
+class StopRequest:
+    """Whether a signal has asked for the end."""
+
+    requested: bool = False
+
+
 @contextmanager
-def stop_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Call ``stop`` on SIGINT and SIGTERM while the block lasts."""
+def stop_signals() -> Iterator[StopRequest]:
+    """Note SIGINT and SIGTERM while the block lasts.
 
-    def answer(_: int, __: FrameType | None) -> None:
-        stop()
+    Once one has come, both stay without effect: a second Ctrl-C must not turn the clean end into another.
+    """
+    stop = StopRequest()
 
-    before = {number: signal.signal(number, answer) for number in (signal.SIGINT, signal.SIGTERM)}
+    def note(_: int, __: FrameType | None) -> None:
+        stop.requested = True
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield
+        yield stop
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if stop.requested else handler)

@@ -8,10 +8,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from automax_ros.cli.terminal import rewrites_lines
+from automax_ros.core.diagnostics import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
-from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.rack import Processor, Rack
+from automax_ros.rack.settings import Watched
 from automax_ros.runtime.functions import text_of
 
 _TERMINAL_PERIOD_NS = 200_000_000
@@ -21,17 +23,16 @@ _PLAIN_PERIOD_NS = 5 * NS_PER_S
 class StatusDisplay:
     """Shows a rack's progress on standard output; ``live``: on the wall clock, so loads can be measured."""
 
-    def __init__(self, rack: Rack, watch: Sequence[CommonVariable], *, live: bool) -> None:
+    def __init__(self, rack: Rack, watch: Sequence[Watched], *, live: bool) -> None:
         """Begin; nothing is printed before the first update is due."""
         self._rack, self._watch, self._live = rack, watch, live
-        self._terminal = sys.stdout.isatty()
+        self._terminal = rewrites_lines(sys.stdout)
         self._period_ns = _TERMINAL_PERIOD_NS if self._terminal else _PLAIN_PERIOD_NS
         self._began = self._last = time.monotonic_ns()
         self._last_rack_ns = 0
         self._last_scans = 0
         self._last_busy: dict[int, int] = {}
         self._drawn = False
-        self._errors_shown = 0
 
     def update(self, now_ns: int) -> None:
         """Show the state at a rack time if it is time to."""
@@ -66,7 +67,8 @@ class StatusDisplay:
         for task in rack.tasks:
             for entry in task.errors.entries:
                 print(f"  {task.name}: {entry.describe()}")
-        print("  " + "  ".join(self._values()))
+        if self._watch:
+            print("  " + "  ".join(self._values()))
         if bag is not None:
             size = sum(item.stat().st_size for item in bag.iterdir())
             print(f"recorded {bag}: {size / 1e6:.2f} MB")
@@ -101,7 +103,7 @@ class StatusDisplay:
         return f"P{processor.slot} {100 * share:.1f} %"
 
     def _values(self) -> list[str]:
-        return [f"{variable.name}={_shown(self._rack.value(variable.name))}" for variable in self._watch]
+        return [f"{item.label}={_shown(self._rack.value(item.name, item.element))}" for item in self._watch]
 
     def _clear(self) -> None:
         if self._drawn:
@@ -112,4 +114,4 @@ class StatusDisplay:
 def _shown(value: Value) -> str:
     if isinstance(value, bool):
         return "1" if value else "0"
-    return text_of(value)
+    return printable(text_of(value))

@@ -18,6 +18,11 @@ def wants_colour(stream: TextIO) -> bool:
     return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
+def rewrites_lines(stream: TextIO) -> bool:
+    """Whether a stream is a terminal that can write its last line anew."""
+    return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+
+
 def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, stream: TextIO) -> None:
     """Print diagnostics of one text in the order of their places, in colour if the stream wants it."""
     colour = wants_colour(stream)

@@ -225,7 +225,22 @@ def _assigns(cursor: Cursor) -> bool:
     if cursor.following.text not in ("(", "["):
         return cursor.following.text == "="
     inside = cursor.tokens[cursor.position + 2 : cursor.position + 4]
-    return not (len(inside) == 2 and inside[0].kind is Kind.WORD and inside[1].text == "=")
+    if len(inside) < 2 or inside[0].kind is not Kind.WORD or inside[1].text != "=":
+        return True
+    return _assigned_behind_parenthesis(cursor)
+
+
+def _assigned_behind_parenthesis(cursor: Cursor) -> bool:
+    """Return whether `=` stands behind the closing parenthesis: else NAME(WORD = ... is a block without its CALL."""
+    depth = 0
+    for index in range(cursor.position + 1, len(cursor.tokens) - 1):
+        token = cursor.tokens[index]
+        depth += (token.text in ("(", "[")) - (token.text in (")", "]"))
+        if depth == 0:
+            return cursor.tokens[index + 1].text == "="
+        if token.kind.ends_segment:
+            break
+    return False
 
 
 def _check_glued_remark(cursor: Cursor) -> None:

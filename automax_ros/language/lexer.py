@@ -107,8 +107,8 @@ class LineLexer:
         column, end_column = match.start() + 1, match.end() + 1
         if upper != text:
             self._saw_lower(text, Span(line, column, end_column))
-        if upper in ("REM", "REM!") and _begins_statement(before):
-            return self.remark(match.string, line, match.start(), text[:3])
+        if upper == "REM" and _begins_statement(before):
+            return self.remark(match.string, line, match.start(), text)
         return Token(Kind.NAME if upper[-1] in TYPE_CHARACTERS else Kind.WORD, upper, line, column, end_column)
 
     def _number(self, match: re.Match[str], span: Span) -> Token:

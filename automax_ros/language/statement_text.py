@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from automax_ros.language.constants import REAL_DIGITS
 from automax_ros.language.expressions import LEVELS, NOT_LEVEL
 from automax_ros.language.functions import FUNCTIONS
 from automax_ros.language.tree import (
@@ -150,7 +151,9 @@ def _literal(literal: IntegerLiteral | RealLiteral | StringLiteral | BooleanLite
 def _real(value: float) -> str:
     """Return a real constant of at most 8 digits, with its decimal point."""
     text = f"{value:.8G}"
-    return text if "." in text or "E" in text else f"{text}.0"
+    if "." in text or "E" in text:
+        return text
+    return f"{text}.0" if len(text.lstrip("-")) < REAL_DIGITS else f"{text}."
 
 
 def _declared(item: Declared) -> str:

@@ -18,7 +18,7 @@ NO_SPAN = Span(0, 0, 0)
 
 def _span() -> Span:
     """Return a span field's default: nodes made by hand have none."""
-    return field(default=NO_SPAN, compare=False, kw_only=True)  # type: ignore[return-value]
+    return field(default=NO_SPAN, compare=False, kw_only=True)
 
 
 # Expressions

@@ -1,8 +1,8 @@
 """The node ``common_memory``: the rack's common variables as topics.
 
 Publishes: ``variables`` (automax_msgs/VariableTable, latched), ``backplane`` (automax_msgs/CommonWrite),
-``backplane/snapshot`` (automax_msgs/CommonImage, latched), ``common/NAME`` (std_msgs, latched) for each variable with
-``ros: out`` or ``ros: in``.
+``backplane/snapshot`` (automax_msgs/CommonImage, latched, sent anew to each late joiner), ``common/NAME`` (std_msgs,
+latched) for each variable with ``ros: out`` or ``ros: in``.
 
 Subscribes: ``common/NAME/set`` (std_msgs, reliable) for each variable with ``ros: in``, and for no other.
 """
@@ -13,11 +13,13 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.event_handler import QoSPublisherMatchedInfo
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from automax_ros.bags.rack_stream import RackStream, Topic
 from automax_ros.core.types import Value
+from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import COMMAND_QOS, message_class, publisher
 from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
@@ -32,14 +34,23 @@ REFUSAL_INTERVAL_S = 1.0
 class CommonMemoryNode(Node):  # type: ignore[misc]
     """Serves the topics of common memory; its callbacks run between scans, on the thread that scans."""
 
-    def __init__(self, rack: Rack, stream: RackStream, context: Context) -> None:
-        """Create publishers and subscriptions; messages flow once the stream begins."""
+    def __init__(
+        self, rack: Rack, stream: RackStream, context: Context, catch_up: Callable[[], None] = lambda: None
+    ) -> None:
+        """Create publishers and subscriptions; messages flow once the stream begins.
+
+        ``catch_up`` brings rack time to the present.
+        """
         super().__init__("common_memory", namespace=f"/{rack.config.namespace}", context=context)
-        self._rack = rack
-        own = [topic for topic in stream.topics if topic not in stream.module_topics]
-        self._publishers_by_name: dict[str, Publisher[Any]] = {topic.name: publisher(self, topic) for topic in own}
+        self._rack, self._stream, self._catch_up = rack, stream, catch_up
+        self._readers = 0
+        self._publishers_by_name: dict[str, Publisher[Any]] = {}
+        for own in stream.topics:
+            if own.slot is None:
+                joined = self._joined if own == stream.snapshot_topic else None
+                self._publishers_by_name[own.name] = publisher(self, own, joined)
         for view, variable in enumerate(rack.config.variables):
-            topic = stream.value_topic(variable)
+            topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
                 self._subscribe(view, variable, topic)
         stream.add_sink(self._publish)
@@ -49,6 +60,13 @@ class CommonMemoryNode(Node):  # type: ignore[misc]
         if found is not None:
             found.publish(payload)
 
+    def _joined(self, matched: QoSPublisherMatchedInfo) -> None:
+        """Send the image anew to a late joiner: the one that waits for it may be as old as the run."""
+        if matched.total_count > self._readers:
+            self._catch_up()
+            self._stream.send_image()
+        self._readers = matched.total_count
+
     def _subscribe(self, view: int, variable: CommonVariable, topic: Topic) -> None:
         self.create_subscription(
             message_class(topic.type_name), set_topic(topic.name), self._writer(view, variable), COMMAND_QOS
@@ -56,12 +74,15 @@ class CommonMemoryNode(Node):  # type: ignore[misc]
 
     def _writer(self, view: int, variable: CommonVariable) -> Callable[[Any], None]:
         """Return the callback that writes a variable."""
+        throttle = Throttle(REFUSAL_INTERVAL_S)
 
         def write(message: Any) -> None:
+            self._catch_up()
             try:
                 self._rack.write_view(view, _elements(variable, message), ROS_WRITER)
             except MemoryValueError as error:
-                self.get_logger().warning(f"write refused: {error}", throttle_duration_sec=REFUSAL_INTERVAL_S)
+                if throttle.passes():
+                    self.get_logger().warning(f"write refused: {error}")
 
         return write
 

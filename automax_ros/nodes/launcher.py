@@ -1,9 +1,9 @@
 """One process that composes all nodes of a rack over one memory image, on the wall clock.
 
-The loop stands on absolute deadlines: it serves ROS until the next instant of the rack's scheduler, then carries out what
-is due. No ROS timer is in the way (they skip ticks on a busy host); a deadline that the host made the loop miss is
-skipped and counted, and the next scan stays on the grid. Messages are served on the same thread, so a write from outside
-always falls between two scans.
+The loop stands on absolute deadlines: it serves ROS until the next instant of the rack's scheduler, then carries out
+what is due. No ROS timer is in the way (they skip ticks on a busy host); a deadline that the host made the loop miss is
+skipped and counted, and the next scan stays on the grid. Messages are served on the same thread, so a write from
+outside always falls between two scans.
 """
 
 from __future__ import annotations
@@ -20,12 +20,15 @@ from automax_ros.bags.rack_stream import RackStream
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.nodes.common_memory import CommonMemoryNode
+from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.rack.rack import Rack
 
 LONGEST_WAIT_NS = 50 * NS_PER_MS
 """The loop wakes at least this often, so that a signal is answered at once."""
+START_LEAD_NS = 50 * NS_PER_MS
+"""Rack time 0 lies so far ahead of the start, so that presets and start-up parts make no scan miss its deadline."""
 CHORE_PERIOD_NS = 100 * NS_PER_MS
 """How often the loop calls ``on_idle``."""
 _NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
@@ -35,7 +38,9 @@ _NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 class LiveRack:
     """A rack with its nodes in this process.
 
-    Make it, ``start`` it, then ``run``; ``close`` in any case. ``stopping`` may be set from a signal handler.
+    Raises RosUnavailable if ROS cannot be initialised.
+
+    Make it, ``start`` it, then ``run``; ``close`` in any case. ``on_idle`` or a callback sets ``stopping``.
     """
 
     rack: Rack
@@ -50,20 +55,23 @@ class LiveRack:
     def __post_init__(self) -> None:
         """Initialise ROS for this process and create all nodes."""
         self._context = Context()
-        self._context.init(args=_NO_CONSOLE)
+        try:
+            self._context.init(args=_NO_CONSOLE)
+        except RuntimeError as error:
+            raise RosUnavailable(f"ROS 2 does not start: {error}") from error
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
         self._executor = make_executor(self._context)
-        self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context))
+        self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context, self._catch_up))
         for processor in self.rack.processors:
-            self._nodes.append(ProcessorNode(self.rack, processor, self.stream, self._context))
+            self._nodes.append(ProcessorNode(self.rack, processor, self.stream, self._context, self._catch_up))
         for node in self._nodes:
             self._executor.add_node(node)
 
     def start(self, settings: list[tuple[str, Value]]) -> None:
-        """Begin the stream and put the rack into RUN; rack time starts now."""
-        self._zero_ns = time.monotonic_ns()
-        self.stream.begin(time.time_ns())
+        """Begin the stream and put the rack into RUN; rack time starts in a moment."""
+        self._zero_ns = time.monotonic_ns() + START_LEAD_NS
+        self.stream.begin(time.time_ns() + START_LEAD_NS)
         self._begun = True
         self.rack.start(settings)
 
@@ -87,6 +95,10 @@ class LiveRack:
             wait = max(0, wake - (time.monotonic_ns() - self._zero_ns))
             self._executor.spin_once(timeout_sec=wait / NS_PER_S)
 
+    def _catch_up(self) -> None:
+        """Bring rack time to the present, for what comes from outside while the loop waits for the next deadline."""
+        self.rack.scheduler.pass_until(time.monotonic_ns() - self._zero_ns)
+
     def close(self) -> None:
         """Stop the tasks, send what is still to be sent, destroy the nodes and end ROS in this process."""
         self.rack.stop()
@@ -97,4 +109,3 @@ class LiveRack:
         for node in self._nodes:
             node.destroy_node()
         self._context.try_shutdown()
-

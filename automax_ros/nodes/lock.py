@@ -8,15 +8,31 @@ import tempfile
 from pathlib import Path
 from types import TracebackType
 
+from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.rack.findings import quoted
 
-class RackAlreadyRuns(Exception):
+MAX_DOMAIN = 232
+"""Beyond it the ports of DDS end."""
+
+
+class LockError(Exception):
+    """The lock cannot be taken."""
+
+
+class RackAlreadyRuns(LockError):
     """Another process of this host runs a rack of the same name in the same ROS domain."""
 
 
 def domain_id() -> int:
-    """Return the ROS domain of this process."""
-    text = os.environ.get("ROS_DOMAIN_ID", "")
-    return int(text) if text.isdigit() else 0
+    """Return the ROS domain of this process.
+
+    Raises:
+        RosUnavailable: ROS_DOMAIN_ID is not one that ROS accepts.
+    """
+    text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not (text.isascii() and text.isdigit() and len(text) <= 3 and int(text) <= MAX_DOMAIN):
+        raise RosUnavailable(f"ROS_DOMAIN_ID={quoted(text)} is no number from 0 to {MAX_DOMAIN}")
+    return int(text)
 
 
 class RackLock:
@@ -33,8 +49,12 @@ class RackLock:
 
         Raises:
             RackAlreadyRuns: another process holds it.
+            LockError: its file cannot be opened.
         """
-        self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        try:
+            self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except OSError as error:
+            raise LockError(f"{self._rack}: cannot open the lock file {self._path}: {error.strerror}") from error
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

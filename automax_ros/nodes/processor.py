@@ -3,13 +3,15 @@
 Publishes: ``/RACK/scans`` (automax_msgs/Scan) and ``/RACK/states`` (automax_msgs/TaskState) of its tasks,
 ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once a second and when a task's state changes.
 
-Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the task.
+Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the
+task.
 
 Its tasks' run-time errors and PRINT lines go to /rosout.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -21,6 +23,7 @@ from rclpy.publisher import Publisher
 
 from automax_ros.bags.rack_stream import RackStream, Topic
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import publisher
 from automax_ros.nodes.tunables import Tunable, tunables_of
 from automax_ros.rack.rack import Processor, Rack
@@ -30,22 +33,35 @@ from automax_ros.runtime.scheduler import EventClass, EventKey
 from automax_ros.runtime.task import ScanRecord, Status, Task
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S
+ERROR_INTERVAL_S = 1.0
+"""A task's run-time errors are reported at most this often ..."""
+ERRORS_SHOWN = 5
+"""... and then so many of one scan."""
 
 
 class ProcessorNode(Node):  # type: ignore[misc]
     """Serves one Processor; the scheduler of the rack scans its tasks."""
 
-    def __init__(self, rack: Rack, processor: Processor, stream: RackStream, context: Context) -> None:
-        """Create publishers and parameters, and observe the rack."""
+    def __init__(
+        self,
+        rack: Rack,
+        processor: Processor,
+        stream: RackStream,
+        context: Context,
+        catch_up: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Create publishers and parameters, and observe the rack; ``catch_up`` brings rack time to the present."""
         super().__init__(f"processor_{processor.slot}", namespace=f"/{rack.config.namespace}", context=context)
-        self._rack, self._processor = rack, processor
+        self._rack, self._processor, self._catch_up = rack, processor, catch_up
         own = [topic for topic in stream.module_topics if topic.slot == processor.slot]
         self._publishers_by_topic: dict[Topic, Publisher[Any]] = {topic: publisher(self, topic) for topic in own}
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(processor.tasks)}
         for tunable in self._tunables.values():
             self.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor())
-        self.add_on_set_parameters_callback(self._tune)
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._tune)
+        self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in processor.tasks}
         self._skipped_reported = dict.fromkeys((task.name for task in processor.tasks), 0)
         stream.add_sink(self._publish)
         rack.observe(self)
@@ -54,18 +70,21 @@ class ProcessorNode(Node):  # type: ignore[misc]
 
     # RackObserver
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
         """Report errors and printed lines of the Processor's own tasks."""
         if task.slot != self._processor.slot:
             return
-        for line, code in record.errors:
-            entry = LogEntry(line, code, record.scan)
-            self.get_logger().warning(f"{task.name}: {entry.describe()}", throttle_duration_sec=1.0)
+        if record.errors and self._error_throttles[task.name].passes():
+            for line, code in record.errors[:ERRORS_SHOWN]:
+                self.get_logger().warning(f"{task.name}: {LogEntry(line, code, record.scan).describe()}")
         while task.printed:
             self.get_logger().info(f"{task.name}: {task.printed.popleft()}")
 
     def written(self, writes: list[Write]) -> None:
         """Writes from outside are no matter of a Processor."""
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """Who tunes a task tells its parameter."""
 
     def all_stopped(self, reason: str, now_ns: int) -> None:
         """Report a STOP ALL."""
@@ -77,17 +96,25 @@ class ProcessorNode(Node):  # type: ignore[misc]
         if found is not None:
             found.publish(payload)
 
-    def _tune(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
-        """Tune tasks; parameters that are no tunables pass."""
+    def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
+        """Refuse what a task would refuse, before any of the parameters is set; those that are no tunables pass."""
         for parameter in parameters:
             tunable = self._tunables.get(parameter.name)
             if tunable is None:
                 continue
             try:
-                tunable.task.tune(tunable.variable, parameter.value)
-            except (ValueError, KeyError) as error:
+                tunable.task.tuning(tunable.variable, parameter.value)
+            except ValueError as error:
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _tune(self, parameters: list[Parameter[Any]]) -> None:
+        """Tune tasks by the parameters that have been set."""
+        self._catch_up()
+        for parameter in parameters:
+            tunable = self._tunables.get(parameter.name)
+            if tunable is not None:
+                self._rack.tune(tunable.task, tunable.variable, parameter.value)
 
     def _publish_diagnostics(self, now_ns: int) -> None:
         statuses = [self._status(task, now_ns) for task in self._processor.tasks]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from typing import Any
 
+from rclpy.event_handler import PublisherEventCallbacks, QoSPublisherMatchedInfo
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -39,6 +41,10 @@ def ros_qos(profile: QosProfile) -> QoSProfile:
     )
 
 
-def publisher(node: Node, topic: Topic) -> Publisher[Any]:
-    """Return a node's publisher of a topic; it takes the message as CDR bytes."""
-    return node.create_publisher(message_class(topic.type_name), topic.name, ros_qos(topic.qos))
+def publisher(
+    node: Node, topic: Topic, matched: Callable[[QoSPublisherMatchedInfo], None] | None = None
+) -> Publisher[Any]:
+    """Return a node's publisher of a topic; it takes the message as CDR bytes. ``matched`` is told of each reader."""
+    events = PublisherEventCallbacks(matched=matched)
+    kind = message_class(topic.type_name)
+    return node.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events)

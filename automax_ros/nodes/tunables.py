@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
+from automax_ros.core.decimal_text import real_text
 from automax_ros.core.types import DataType, bare_name
 from automax_ros.language.program import TuningLimits
 from automax_ros.rack.ros_names import TYPE_WORDS
 from automax_ros.runtime.task import Task
 
-_GRID_TOLERANCE = 1e-6
+_GRID_TOLERANCE = 1e-7
+"""Stricter than rclpy's 1e-6."""
+_MOST_STEPS = 1_000_000
+"""With more the rounding of floating point can exceed the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -28,15 +33,19 @@ class Tunable:
 
     @property
     def initial(self) -> float | int:
-        """The parameter's first value: the one the task has, a REAL as its eight digits say."""
+        """The parameter's first value: the one the task has, a REAL with no more digits than it has."""
         return self._shown(self.task.value(self.variable))
 
     def descriptor(self) -> ParameterDescriptor:
-        """Return limits and step. Where the limits and values do not lie on the step's grid, rclpy would refuse them:
-        the step then stands in the text alone."""
+        """Return limits and step.
+
+        rclpy refuses what does not lie on the grid of LOW and steps, which it computes in floating point. Where that
+        would hit HIGH, the present value or 0, or the grid is too fine, the step stands in the text alone.
+        """
         low, high, step = (self._shown(value) for value in (self.limits.low, self.limits.high, self.limits.step))
         descriptor = ParameterDescriptor(description=f"tunable {self.variable} of task {self.task.name}, step {step:g}")
-        on_grid = all(_on_grid(value - low, step) for value in (high, self.initial))
+        anchors = (high, self.initial, 0) if low < 0 < high else (high, self.initial)
+        on_grid = (high - low) / step <= _MOST_STEPS and all(_on_grid(value, low, step) for value in anchors)
         if self.type is DataType.REAL:
             span = FloatingPointRange(from_value=low, to_value=high, step=step if on_grid else 0.0)
             descriptor.floating_point_range = [span]
@@ -46,11 +55,12 @@ class Tunable:
 
     def _shown(self, value: object) -> float | int:
         assert isinstance(value, (int, float))
-        return float(f"{value:.8g}") if self.type is DataType.REAL else int(value)
+        return float(real_text(value)) if self.type is DataType.REAL else int(value)
 
 
-def _on_grid(distance: float, step: float) -> bool:
-    return abs(distance / step - round(distance / step)) < _GRID_TOLERANCE
+def _on_grid(value: float, low: float, step: float) -> bool:
+    """Whether rclpy finds a value on the grid: it compares relatively, so a 0 must be met exactly."""
+    return math.isclose(low + round((value - low) / step) * step, value, rel_tol=_GRID_TOLERANCE)
 
 
 def tunables_of(tasks: Sequence[Task]) -> list[Tunable]:

@@ -1,9 +1,9 @@
 """The rack: modules, common memory, tasks and their schedule, wired from a configuration. No ROS 2.
 
-    rack = Rack(config)
-    rack.start()
-    rack.run(10.0)      # ten simulated seconds
-    rack.value("SPEED_REF%")
+rack = Rack(config)
+rack.start()
+rack.run(10.0)      # ten simulated seconds
+rack.value("SPEED_REF%")
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
 from automax_ros.runtime.compiler import compile_program
 from automax_ros.runtime.memory import CommonMemory, ViewSpec, Write, WriteKind
 from automax_ros.runtime.scheduler import EventClass, EventKey, Scheduler
 from automax_ros.runtime.task import ScanRecord, Status, Task
-from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
 
 
 class RackError(Exception):
@@ -108,7 +108,7 @@ class Rack:
 
     @property
     def fingerprint(self) -> int:
-        """A number of 63 bits that the configuration and all sources determine: the run's id where no other is given."""
+        """A number of 63 bits that configuration and sources determine: the run's id where no other is given."""
         digest = hashlib.sha256(self.config.text.encode())
         for name in sorted(self.sources):
             digest.update(name.encode() + b"\0" + self.sources[name].text.encode() + b"\0")
@@ -280,8 +280,7 @@ class Rack:
                 statistics.longest_ns = max(statistics.longest_ns, taken)
                 if record is not None:
                     record.duration_ns = taken
-            if record is not None or task.status is Status.FAULTED:
-                self._after(task, record)
+            self._after(task, record)
 
         return scan
 

@@ -118,6 +118,11 @@ class CommonMemory:
         array = self._arrays[view]
         return self._cells[view] if array is None else array[element]
 
+    def present(self, view: int) -> Value | list[Value]:
+        """Return the actual value of a simple variable, or a copy of an array's values."""
+        array = self._arrays[view]
+        return self._cells[view] if array is None else array[:]
+
     def write_now(
         self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
     ) -> None:

@@ -33,6 +33,10 @@ class Status(enum.Enum):
     FAULTED = "faulted"
 
 
+_RUNNING = Status.RUNNING
+"""A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
+
+
 @dataclass
 class ScanRecord:
     """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value)."""
@@ -103,7 +107,7 @@ class RecordingIo(TaskIo):
         super().__init__(task)
         self.record = ScanRecord(0, 0)
         self.latch = self._latch
-        self.read_now = self._read_now  # type: ignore[method-assign]
+        self.read_now = self._read_now
         self._plan = task.plan
 
     def _latch(self) -> Latched:
@@ -152,6 +156,8 @@ class Task:
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
         self.status = Status.STOPPED
         self.scan_number = 0
+        self._scan = compiled.scan
+        self._recording = False
         self._io: TaskIo = TaskIo(self)
 
     @property
@@ -173,6 +179,7 @@ class Task:
     def record_scans(self, *, on: bool = True) -> None:
         """Begin or end to keep a record of each scan."""
         self._io = RecordingIo(self) if on else TaskIo(self)
+        self._recording = on
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
         """Put the task into RUN: blocks start anew, the statements before SCAN_LOOP execute once.
@@ -185,10 +192,10 @@ class Task:
 
     def scan(self, now_ns: int, skipped: int = 0) -> ScanRecord | None:
         """Execute one scan at an instant; ``skipped`` deadlines were missed before it. Returns its record, if kept."""
-        if self.status is not Status.RUNNING:
+        if self.status is not _RUNNING:
             return None
         self.scan_number += 1
-        return self._execute(self.compiled.scan, now_ns, skipped)
+        return self._execute(self._scan, now_ns, skipped)
 
     def scan_modeled(self, now_ns: int, skipped: int = 0) -> Generator[int, int | None, ScanRecord | None]:
         """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
@@ -272,7 +279,7 @@ class Task:
         return stored
 
     def _execute(self, part: Callable[..., bool], now_ns: int, skipped: int) -> ScanRecord | None:
-        record = self._begin_record(now_ns, skipped)
+        record = self._begin_record(now_ns, skipped) if self._recording else None
         self.memory.now_ns = now_ns
         try:
             if part(self.state, self._io):

@@ -48,8 +48,8 @@ LOG = [
 def test_a_row_for_each_instant_with_a_change_and_values_held(tmp_path: Path) -> None:
     assert exported(tmp_path, LOG) == [
         "time_s,REF%,COUNT!,GAIN,RUN@",
-        "0,0,0,0,0",
-        "0.005,-100,0,0,1",
+        "0,0,0,0.0,0",
+        "0.005,-100,0,0.0,1",
         "0.01,-100,70000,0.1,1",
         "0.02,5,70000,0.1,0",
     ]

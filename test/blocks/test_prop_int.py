@@ -84,6 +84,14 @@ def test_range_of_section_51_limits_the_integrator_alone(share, span, sign):
     assert held["output"] == sorted((-32768, sign * (span + 1000), 32767))[1]
 
 
+@pytest.mark.parametrize(("limits", "span"), [((20000, 10000), 8191), ((-10000, -20000), -8191)])
+def test_the_integrator_keeps_its_range_where_the_limits_lie_beyond_it(limits, span):
+    """The output is limited as programmed all the same."""
+    block = run("PROP_INT", kp=1.0, wld=1.0, limit_plus=limits[0], limit_minus=limits[1])
+    assert block.scan(input=0)["output"] == min(limits, key=abs)
+    assert block.state["integrator"] == span
+
+
 def test_holds_stop_the_integrator_but_not_kp_times_input():
     block = run("PROP_INT", wld=5.0)
     for _ in range(20):

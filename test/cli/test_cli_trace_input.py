@@ -184,7 +184,7 @@ def test_any_bytes_give_a_table_and_an_exit_code(lone, data):
 
 
 @pytest.mark.soak
-@settings(deadline=None, derandomize=True, max_examples=20_000)
+@settings(deadline=None, derandomize=True, max_examples=5_000)
 @given(data=TABLES)
 def test_any_bytes_give_an_exit_code_at_length(lone, data):
     _, path = lone

@@ -20,6 +20,7 @@ from automax_ros.language.tree import (
     Element,
     End,
     Event,
+    Expression,
     For,
     FunctionCall,
     Gosub,
@@ -78,19 +79,35 @@ SIGNED = st.one_of(
 )
 
 
-def _deeper(inner: st.SearchStrategy) -> st.SearchStrategy:
-    few = st.lists(inner, min_size=1, max_size=3).map(tuple)
-    return st.one_of(
-        st.builds(Binary, st.sampled_from(sorted(LEVELS)), inner, inner),
-        st.builds(Unary, st.sampled_from(["-", "+", "NOT"]), inner),
-        st.builds(Element, NAMES, few),
-        st.builds(FunctionCall, st.sampled_from(sorted(set(FUNCTIONS) - {"TST_ERRLOG@"})), few),
-    )
+FUNCTION_NAMES = sorted(set(FUNCTIONS) - {"TST_ERRLOG@"})
 
 
-EXPRESSIONS = st.recursive(
-    st.one_of(CONSTANTS, st.builds(Variable, NAMES), st.just(FunctionCall("TST_ERRLOG@"))), _deeper, max_leaves=12
-)
+@st.composite
+def expressions(draw: st.DrawFn, depth: int = 3) -> Expression:
+    """An expression of at most ``depth`` operations above one another."""
+    kind = draw(st.integers(0, 6 if depth else 2))
+    if kind == 0:
+        return draw(CONSTANTS)
+    if kind == 1:
+        return Variable(draw(NAMES))
+    if kind == 2:
+        return FunctionCall("TST_ERRLOG@")
+    if kind == 3:
+        return Unary(draw(st.sampled_from(["-", "+", "NOT"])), draw(expressions(depth - 1)))
+    if kind == 4:
+        arguments = tuple(draw(expressions(depth - 1)) for _ in range(draw(st.integers(1, 2))))
+        element = draw(st.booleans())
+        return (
+            Element(draw(NAMES), arguments)
+            if element
+            else FunctionCall(draw(st.sampled_from(FUNCTION_NAMES)), arguments)
+        )
+    operator = draw(st.sampled_from(sorted(LEVELS)))
+    return Binary(operator, draw(expressions(depth - 1)), draw(expressions(depth - 1)))
+
+
+EXPRESSIONS = expressions(1)
+DEEP_EXPRESSIONS = expressions(4)
 TARGETS = st.one_of(
     st.builds(Variable, NAMES), st.builds(Element, NAMES, st.lists(EXPRESSIONS, min_size=1, max_size=2).map(tuple))
 )
@@ -159,21 +176,25 @@ ONE_LINE = st.builds(
 )
 
 
-def _blocks(inner: st.SearchStrategy) -> st.SearchStrategy:
-    bodies = st.lists(inner, max_size=3).map(tuple)
-    return st.one_of(
-        st.builds(If, EXPRESSIONS, bodies, bodies),
-        st.builds(For, st.builds(Variable, NAMES), EXPRESSIONS, EXPRESSIONS, st.none() | EXPRESSIONS, bodies),
-    )
-
-
-STATEMENTS = st.recursive(st.one_of(SIMPLE, SIMPLE, SIMPLE, REMARKS, ONE_LINE), _blocks, max_leaves=6)
+@st.composite
+def statements(draw: st.DrawFn, depth: int = 2) -> Statement:
+    """A statement with at most ``depth`` blocks inside one another."""
+    kind = draw(st.integers(0, 8 if depth else 6))
+    if kind < 5:
+        return draw(SIMPLE)
+    if kind < 7:
+        return draw(REMARKS if kind == 5 else ONE_LINE)
+    bodies = st.lists(statements(depth - 1), max_size=3).map(tuple)
+    if kind == 7:
+        return If(draw(EXPRESSIONS), draw(bodies), draw(bodies))
+    step = draw(st.none() | EXPRESSIONS)
+    return For(Variable(draw(NAMES)), draw(EXPRESSIONS), draw(EXPRESSIONS), step, draw(bodies))
 
 
 @st.composite
 def modules(draw: st.DrawFn) -> Module:
     """A task: statements with numbers, some of them joined to the line before."""
-    module = numbered(Module(tuple(draw(st.lists(STATEMENTS, max_size=5)))))
+    module = numbered(Module(tuple(draw(st.lists(statements(), max_size=5)))))
     result: list[Statement] = []
     for statement in module.statements:
         before = result[-1] if result else None

@@ -216,6 +216,7 @@ SIMPLE = {
     "A%[B%, 2] = 1": Assignment(Element("A%", (B, TWO)), ONE),
     "SPEED = 1": Assignment(Variable("SPEED"), ONE),
     "SPEED(1) = 1": Assignment(Element("SPEED", (ONE,)), ONE),
+    "SPEED(A = 1) = 1": Assignment(Element("SPEED", (Binary("=", Variable("A"), ONE),)), ONE),
     "X! = 1": Assignment(Variable("X!"), ONE),
     "GOTO 200": Goto(200),
     "GOSUB 200": Gosub(200),

@@ -27,7 +27,7 @@ from automax_ros.language.tree import (
     Variable,
 )
 from language.parser_support import expression_of, module_of
-from language.random_trees import EXPRESSIONS, modules
+from language.random_trees import DEEP_EXPRESSIONS, modules
 
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
 FLAG, ASSIGN = Variable("FLAG@"), Assignment(Variable("A%"), IntegerLiteral(1))
@@ -68,7 +68,7 @@ def parsed_back(module: Module) -> Module:
     return back
 
 
-@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=SLOW)
+@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=SLOW)
 @given(modules())
 def test_printed_task_parses_back_to_an_equal_tree(module: Module) -> None:
     back = parsed_back(module)
@@ -76,14 +76,14 @@ def test_printed_task_parses_back_to_an_equal_tree(module: Module) -> None:
     assert print_module(back) == print_module(module)
 
 
-@settings(max_examples=500, deadline=None, derandomize=True, suppress_health_check=SLOW)
-@given(EXPRESSIONS)
+@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=SLOW)
+@given(DEEP_EXPRESSIONS)
 def test_printed_expression_parses_back_to_an_equal_tree(expression: Expression) -> None:
     assert expression_of(print_expression(expression)) == expression
 
 
 @pytest.mark.soak
-@settings(max_examples=5000, deadline=None, suppress_health_check=SLOW)
+@settings(max_examples=3000, deadline=None, suppress_health_check=SLOW)
 @given(modules())
 def test_many_printed_tasks_parse_back(module: Module) -> None:
     assert parsed_back(module) == module
@@ -101,7 +101,15 @@ def test_only_parentheses_that_are_needed(text: str) -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(1.5, "1.5"), (5.0, "5.0"), (1e10, "1E+10"), (0.1, "0.1"), (1.0000001, "1.0000001"), (0.0, "0.0")],
+    [
+        (1.5, "1.5"),
+        (5.0, "5.0"),
+        (1e10, "1E+10"),
+        (0.1, "0.1"),
+        (1.0000001, "1.0000001"),
+        (0.0, "0.0"),
+        (1e7, "10000000."),
+    ],
 )
 def test_real_constants_without_a_spelling(value: float, text: str) -> None:
     assert print_expression(RealLiteral(value)) == text

@@ -1,0 +1,557 @@
+"""A task by walking its syntax tree: an independent model of what the compiler makes, from the rules of semantics.
+
+It knows values, not static types or bounds: every intermediate is clamped, every value has its own kind.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from automax_ros.blocks.instance import Instance
+from automax_ros.core.types import DataType, type_of_name
+from automax_ros.language import tree
+from automax_ros.language.program import Program
+from automax_ros.language.tree import Scope
+
+LARGEST = float(np.float32(9.2233717e18))
+LOW32, HIGH32 = -(2**31), 2**31 - 1
+RANGES = {DataType.INTEGER: (-32768, 32767, 7020), DataType.DOUBLE: (LOW32, HIGH32, 7021)}
+
+
+class Jump(Exception):
+    def __init__(self, line):
+        self.line = line
+
+
+class Leave(Exception):
+    """RETURN from a subroutine."""
+
+
+class Ended(Exception):
+    """The scan is over; ``stopped`` by STOP."""
+
+    def __init__(self, stopped):
+        self.stopped = stopped
+
+
+def single(value: float) -> tuple[float, bool]:
+    """What a REAL variable takes, and whether it was clamped."""
+    if math.isnan(value):
+        return 0.0, True
+    if abs(value) > LARGEST:
+        return math.copysign(LARGEST, value), True
+    if 0 <= value < 5.4210107e-20 or -2.7105054e-20 < value <= 0:
+        return 0.0, False
+    return float(np.float32(value)), False
+
+
+def whole(value: float) -> int:
+    if math.isnan(value):
+        return 0
+    return int(max(-1e19, min(1e19, value)))
+
+
+def real_text(value: float) -> str:
+    text = f"{0.0 if value == 0 else value:.8G}"
+    mantissa, mark, exponent = text.partition("E")
+    return text if not mark else f"{mantissa}E{'-' if exponent[0] == '-' else '+'}{exponent[1:].lstrip('0').rjust(2, '0')}"
+
+
+class Interpreter:
+    """``commons`` is actual memory by name; ``log`` (line, code), ``writes`` (kind, name, element, value) are filled."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.locals = {name: self._fresh(symbol) for name, symbol in program.symbols.items() if symbol.scope is Scope.LOCAL}
+        self.commons = {name: self._fresh(symbol) for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
+        self.latch = {}
+        self.log, self.writes, self.printed = [], [], []
+        self.blocks = {}
+        self.pointer = 0
+        self.line = 0
+        self.depth = 0
+        self.overflow = 0
+        self.errors = 0
+        self.stopped = False
+
+    def _fresh(self, symbol):
+        if symbol.tuning is not None:
+            return symbol.tuning.current
+        return [symbol.type.zero] * symbol.elements if symbol.dimensions else symbol.type.zero
+
+    def run(self):
+        self.pointer, self.blocks = 0, {}
+        self.line = 0
+        self._all(self.program.startup)
+
+    def scan(self):
+        latched = [name for name, symbol in self.program.symbols.items() if symbol.latched]
+        self.latch = {name: self.commons[name] for name in latched}
+        before = dict(self.latch)
+        self.line = self.program.scan_loop_line
+        if self._all(self.program.scan):
+            return
+        for name in latched:
+            if self.latch[name] != before[name]:
+                self._write_common("COMMIT", name, 0, self.latch[name])
+
+    def _all(self, statements) -> bool:
+        """Carry statements out from the top; return whether STOP ended them."""
+        self.depth = 0
+        try:
+            self._list(statements)
+        except Ended as end:
+            self.stopped = end.stopped
+            return end.stopped
+        return False
+
+    # Statements
+
+    def _list(self, statements, start=0):
+        numbers = {item.number: index for index, item in enumerate(statements) if item.number is not None}
+        index = start
+        while index < len(statements):
+            try:
+                self._one(statements[index])
+                index += 1
+            except Jump as jump:
+                if jump.line not in numbers:
+                    raise
+                index = numbers[jump.line]
+
+    def _one(self, statement):
+        if statement.number is not None:
+            self.line = statement.number
+        method = getattr(self, f"_do_{type(statement).__name__.lower()}", None)
+        if method is not None:
+            method(statement)
+
+    def _framed(self, work):
+        """One statement: its first overflow is logged at its end."""
+        line, self.overflow = self.line, 0
+        result = work()
+        if self.overflow:
+            self._error(self.overflow, line)
+        return result
+
+    def _error(self, code, line=None):
+        self.log.append((self.line if line is None else line, code))
+        self.errors += 1
+
+    def _note(self, code):
+        self.overflow = self.overflow or code
+
+    def _do_assignment(self, statement):
+        self._framed(lambda: self._store(statement.target, self.value(statement.value)))
+
+    def _do_if(self, statement):
+        chosen = statement.then if self._framed(lambda: self.value(statement.condition)) else statement.otherwise
+        self._list(chosen)
+
+    def _do_for(self, statement):
+        variable = statement.variable
+
+        def begin():
+            first = self.value(statement.start)
+            last = self.value(statement.stop)
+            step = 1 if statement.step is None else self.value(statement.step)
+            self._store(variable, first)
+            if step == 0:
+                self._error(7027)
+            return last, step
+
+        last, step = self._framed(begin)
+        while step:
+            value = self.value(variable)
+            if (value > last) if step > 0 else (value < last):
+                break
+            self._list(statement.body)
+
+            def following():
+                low, high, code = RANGES.get(variable.type, (0, 0, 0))
+                total = self.value(variable) + step
+                if variable.type.is_integer:
+                    total = whole(total)
+                    if not low <= total <= high:
+                        total = low if total < low else high
+                        self._note(code)
+                self._store(variable, total)
+                return bool(self.overflow)
+
+            if self._framed(following):
+                break
+
+    def _do_goto(self, statement):
+        raise Jump(statement.line)
+
+    def _do_gosub(self, statement):
+        self._call(statement.line)
+
+    def _call(self, line):
+        if self.depth == 16:
+            self._error(7028)
+            return
+        self.depth += 1
+        try:
+            self._from_line(line)
+        except Leave:
+            self.depth -= 1
+            return
+        raise Ended(False)
+
+    def _from_line(self, line):
+        """The subroutine stands on the top level."""
+        statements = self.program.scan
+        if line not in [item.number for item in statements]:
+            statements = self.program.startup
+        self._list(statements, [item.number for item in statements].index(line))
+
+    def _do_return(self, statement):
+        if self.depth == 0:
+            self._error(7029)
+        else:
+            raise Leave
+
+    def _do_onjump(self, statement):
+        selector = self._framed(lambda: self.value(statement.selector))
+        if 1 <= selector <= len(statement.lines):
+            line = statement.lines[selector - 1]
+            if statement.gosub:
+                self._call(line)
+            else:
+                raise Jump(line)
+
+    def _do_end(self, statement):
+        raise Ended(False)
+
+    def _do_stop(self, statement):
+        raise Ended(True)
+
+    def _do_print(self, statement):
+        def put():
+            text = ""
+            for item, separator in zip(statement.items, statement.separators, strict=True):
+                text += self.text(self.value(item))
+                if separator == ",":
+                    text += " " * (14 - len(text) % 14)
+            self.printed.append(text)
+
+        self._framed(put)
+
+    def _do_read(self, statement):
+        self._framed(lambda: [self._read_one(target) for target in statement.targets])
+
+    def _read_one(self, target):
+        if self.pointer >= len(self.program.data):
+            self._error(7030)
+            return
+        value = self.program.data[self.pointer]
+        self.pointer += 1
+        kinds = {bool: DataType.BOOLEAN, str: DataType.STRING}
+        kind = kinds.get(type(value))
+        if kind is not (target.type if target.type in kinds.values() else None):
+            self._error(7032)
+            value = target.type.zero
+        self._store(target, value)
+
+    def _do_restore(self, statement):
+        line = statement.line or 0
+        self.pointer = next((first for number, first in self.program.data_lines if number >= line), len(self.program.data))
+
+    def _do_clearerrorlog(self, statement):
+        self.errors = 0
+
+    def _do_call(self, statement):
+        bound = self.program.calls[statement.span]
+        self.line = bound.line
+        constants = (tree.IntegerLiteral, tree.RealLiteral, tree.BooleanLiteral)
+        inputs = {item.name for item in bound.block.inputs}
+        given = {name: value for name, value in bound.arguments.items() if name in inputs}
+        fixed = {name.lower(): value.value for name, value in given.items() if isinstance(value, constants)}
+        if statement.span not in self.blocks:
+            self.blocks[statement.span] = Instance(bound.block, self.program.period_ns, **fixed)
+        block = self.blocks[statement.span]
+        now = {name.lower(): self._seen(value) for name, value in given.items() if name.lower() not in fixed}
+        for output in bound.block.outputs:
+            if output.holds:
+                block.outputs[output.variable] = self._seen(bound.arguments[output.name])
+        held = {output.name: block.outputs[output.variable] for output in bound.block.outputs if output.holds}
+        results = block.scan(**now)
+        if block.error:
+            self._error(block.error)
+        for output in bound.block.outputs:
+            if output.name in bound.arguments and held.get(output.name) != results[output.variable]:
+                self._put(bound.arguments[output.name], results[output.variable], in_block=True)
+
+    def _seen(self, given):
+        if isinstance(given, tree.Unary):
+            return not self._seen(given.operand)
+        return self.latch[given.name] if given.name in self.latch else self.value(given)
+
+    # Stores
+
+    def _store(self, target, value):
+        kind = target.type
+        if kind is DataType.STRING:
+            value = value[: self.program.symbols[target.name].length]
+        elif kind is DataType.REAL:
+            value, clamped = single(float(value))
+            if clamped:
+                self._note(7022)
+        elif kind.is_integer:
+            low, high, code = RANGES[kind]
+            value = whole(value) if isinstance(value, float) else int(value)
+            if not low <= value <= high:
+                value = low if value < low else high
+                self._note(code)
+        self._put(target, value)
+
+    def _put(self, target, value, in_block=False):
+        name, element = target.name, None
+        if isinstance(target, tree.Element):
+            element = self.index(target)
+            if element is None:
+                self._error(7026)
+                return
+        if name in self.locals:
+            if element is None:
+                self.locals[name] = value
+            else:
+                self.locals[name][element] = value
+        elif in_block and name in self.latch:
+            self.latch[name] = value
+        else:
+            self._write_common("BASIC", name, element or 0, value)
+
+    def _write_common(self, kind, name, element, value):
+        self.writes.append((kind, name, element, value))
+        if self.program.symbols[name].dimensions:
+            self.commons[name][element] = value
+        else:
+            self.commons[name] = value
+
+    # Expressions
+
+    def index(self, element):
+        """Flat index, None where a subscript is out of range."""
+        subscripts = [self.value(item) for item in element.subscripts]
+        flat = 0
+        for subscript, size in zip(subscripts, self.program.symbols[element.name].dimensions, strict=True):
+            if not 0 <= subscript < size:
+                return None
+            flat = flat * size + subscript
+        return flat
+
+    def value(self, node):
+        return getattr(self, f"_{type(node).__name__.lower()}")(node)
+
+    def _integerliteral(self, node):
+        return node.value
+
+    _realliteral = _stringliteral = _booleanliteral = _integerliteral
+
+    def _variable(self, node):
+        return self.locals[node.name] if node.name in self.locals else self.commons[node.name]
+
+    def _element(self, node):
+        index = self.index(node)
+        if index is None:
+            self._error(7026)
+            return type_of_name(node.name).zero
+        return (self.locals[node.name] if node.name in self.locals else self.commons[node.name])[index]
+
+    def fitted(self, value: int) -> int:
+        if LOW32 <= value <= HIGH32:
+            return value
+        self._note(7023)
+        return LOW32 if value < 0 else HIGH32
+
+    def _unary(self, node):
+        operand = self.value(node.operand)
+        if node.operator == "NOT":
+            return (not operand) if isinstance(operand, bool) else -1 - operand
+        if node.operator == "+":
+            return operand
+        if isinstance(node.operand, tree.IntegerLiteral) or isinstance(operand, float):
+            return -operand
+        return self.fitted(-operand)
+
+    def _binary(self, node):
+        chain, first = [], node
+        while isinstance(first, tree.Binary):
+            chain.append(first)
+            first = first.left
+        left = self.value(first)
+        for item in reversed(chain):
+            left = self.operation(item.operator, left, self.value(item.right))
+        return left
+
+    def operation(self, operator, left, right):
+        if operator in ("=", "<>", "<", ">", "<=", ">="):
+            return {
+                "=": left == right,
+                "<>": left != right,
+                "<": left < right,
+                ">": left > right,
+                "<=": left <= right,
+                ">=": left >= right,
+            }[operator]
+        if operator in ("AND", "OR", "XOR"):
+            result = {"AND": left & right, "OR": left | right, "XOR": left ^ right}[operator]
+            return result if isinstance(left, bool) and isinstance(right, bool) else int(result)
+        if isinstance(left, str):
+            return (left + right)[:132]
+        real = isinstance(left, float) or isinstance(right, float)
+        left, right = (float(left), float(right)) if real else (int(left), int(right))
+        if operator == "/":
+            return self.quotient(left, right, real)
+        if operator == "**":
+            return self.real_power(left, right) if real else self.power(left, right)
+        result = {"+": left + right, "-": left - right, "*": left * right}[operator]
+        return result if real else self.fitted(result)
+
+    def quotient(self, left, right, real):
+        if right == 0:
+            self._error(7024)
+            most = LARGEST if real else HIGH32
+            least = -LARGEST if real else LOW32
+            return most if left > 0 else least if left < 0 else (0.0 if real else 0)
+        if real:
+            return left / right
+        return self.fitted(abs(left) // abs(right) * (1 if (left < 0) == (right < 0) else -1))
+
+    def power(self, base, exponent):
+        if exponent < 0:
+            if base == 0:
+                self._error(7024)
+                return HIGH32
+            return base ** (exponent % 2) if abs(base) == 1 else 0
+        # 40 doublings leave 32 bits as surely as more, of the same parity
+        return self.fitted(base ** (exponent if exponent < 40 else 40 + exponent % 2))
+
+    def real_power(self, base, exponent):
+        if base == 0 and exponent < 0:
+            self._error(7024)
+            return LARGEST
+        if base < 0 and exponent != math.floor(exponent) and math.isfinite(base) and math.isfinite(exponent):
+            self._error(7025)
+            return 0.0
+        try:
+            return math.pow(base, exponent)
+        except OverflowError:
+            self._note(7023)
+            return -LARGEST if base < 0 and exponent % 2 == 1 else LARGEST
+
+    def _functioncall(self, node):
+        arguments = [self.value(argument) for argument in node.arguments]
+        letter = {"%": "i", "$": "s", "@": "b"}.get(node.name[-1], "")
+        return getattr(self, f"fn_{node.name.rstrip('%$@').lower()}{letter}")(*arguments)
+
+    def bad(self, result):
+        self._error(7025)
+        return result
+
+    def fn_abs(self, value):
+        return abs(value) if isinstance(value, float) else self.fitted(abs(value))
+
+    def fn_int(self, value):
+        return self.fitted(whole(value)) if isinstance(value, float) else value
+
+    def fn_sgn(self, value):
+        return 1 if value > 0 else -1 if value < 0 else 0
+
+    def fn_min(self, *values):
+        return self._alike(min(values), values)
+
+    def fn_max(self, *values):
+        return self._alike(max(values), values)
+
+    def _alike(self, value, values):
+        return float(value) if any(isinstance(item, float) for item in values) else value
+
+    def fn_sqrt(self, value):
+        return math.sqrt(value) if 0 <= value < math.inf else self.bad(0.0)
+
+    def fn_sin(self, value):
+        return math.sin(value) if math.isfinite(value) else self.bad(0.0)
+
+    def fn_atn(self, value):
+        return self.bad(0.0) if math.isnan(value) else math.atan(value)
+
+    def fn_ln(self, value):
+        return math.log(value) if 0 < value < math.inf else self.bad(0.0)
+
+    def fn_exp(self, value):
+        if value < 700:
+            return math.exp(value)
+        self._note(7023)
+        return LARGEST
+
+    def fn_leni(self, text):
+        return len(text)
+
+    def fn_asci(self, text):
+        return ord(text[0]) if text else self.bad(0)
+
+    def fn_chrs(self, code):
+        return chr(code) if 0 <= code <= 255 else self.bad("")
+
+    def fn_strs(self, value):
+        return self.text(value)
+
+    def fn_val(self, text):
+        try:
+            assert text.strip() and not set(text.strip()) - set("0123456789+-.Ee")
+            value, clamped = single(float(text))
+        except (ValueError, AssertionError):
+            return self.bad(0.0)
+        if clamped:
+            self._note(7023)
+        return value
+
+    def fn_lefts(self, text, count):
+        return text[:count] if count >= 0 else self.bad("")
+
+    def fn_rights(self, text, count):
+        return (text[-count:] if count else "") if count >= 0 else self.bad("")
+
+    def fn_mids(self, text, first, count):
+        return text[first - 1 :][:count] if first >= 1 and count >= 0 else self.bad("")
+
+    def word(self, value, place, bits):
+        """A 16-bit word from a string of 16 binary digits."""
+        if not 0 <= place <= 15:
+            return self.bad(value)
+        digits = bits(f"{value & 0xFFFF:016b}")
+        return int(digits, 2) - (0x10000 if digits[0] == "1" else 0)
+
+    def fn_bit_seti(self, value, bit):
+        return self.word(value, bit, lambda digits: digits[: 15 - bit] + "1" + digits[16 - bit :])
+
+    def fn_bit_clri(self, value, bit):
+        return self.word(value, bit, lambda digits: digits[: 15 - bit] + "0" + digits[16 - bit :])
+
+    def fn_bit_tstb(self, value, bit):
+        return f"{value & 0xFFFFFFFF:032b}"[31 - bit] == "1" if 0 <= bit <= 31 else self.bad(False)
+
+    def fn_shiftli(self, value, places):
+        return self.word(value, places, lambda digits: digits[places:] + "0" * places)
+
+    def fn_shiftri(self, value, places):
+        return self.word(value, places, lambda digits: "0" * places + digits[: 16 - places])
+
+    def fn_rotateli(self, value, places):
+        return self.word(value, places, lambda digits: digits[places:] + digits[:places])
+
+    def fn_rotateri(self, value, places):
+        return self.word(value, places, lambda digits: digits[16 - places :] + digits[: 16 - places])
+
+    def fn_tst_errlogb(self):
+        return self.errors > 0
+
+    def text(self, value):
+        if isinstance(value, bool):
+            return "TRUE" if value else "FALSE"
+        return real_text(value) if isinstance(value, float) else str(value)

@@ -1,0 +1,199 @@
+"""What the tests with real processes share: `automax run` as a child, and a ROS node of the test's own."""
+
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+ROOT = Path(__file__).parents[2]
+RACKS = Path(__file__).parent / "racks"
+TYPES = RACKS / "types" / "rack.yaml"
+STUCK = RACKS / "stuck" / "rack.yaml"
+COMMAND = (sys.executable, "-m", "automax_ros.cli.main")
+PATIENCE_S = 60.0
+"""How long a condition may take on a busy machine before a test gives up."""
+
+
+class Ended(NamedTuple):
+    """How a process ended, and how long it took since it was asked to."""
+
+    code: int
+    out: str
+    err: str
+    seconds: float
+
+
+class Automax:
+    """`automax` with arguments as a child process, in a ``with`` block that leaves nothing running."""
+
+    def __init__(self, *arguments: str | Path, environment: dict[str, str] | None = None) -> None:
+        self.process = subprocess.Popen(
+            [*COMMAND, *map(str, arguments)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+            env=environment,
+        )
+        self.began = time.monotonic()
+        self.out: list[str] = []
+        self.err: list[str] = []
+        self._readers = [self._reader(self.process.stdout, self.out), self._reader(self.process.stderr, self.err)]
+
+    def __enter__(self) -> "Automax":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        for reader in self._readers:
+            reader.join()
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+    def wait_for_line(self, text: str) -> None:
+        """Wait until standard output holds a text."""
+        wait_until(lambda: text in "".join(self.out) or self.process.poll() is not None)
+        assert text in "".join(self.out), f"no {text!r} in {self.out}, {self.err}"
+
+    def wait_until_catching(self, number: signal.Signals) -> None:
+        """Wait until the process handles a signal itself."""
+        status = Path(f"/proc/{self.pid}/status")
+
+        def catches() -> bool:
+            caught = re.search(r"^SigCgt:\s*([0-9a-f]+)", status.read_text(), re.MULTILINE)
+            return caught is not None and bool(int(caught[1], 16) >> (number - 1) & 1)
+
+        wait_until(catches, pause_s=0.001)
+
+    def send(self, number: signal.Signals) -> None:
+        self.process.send_signal(number)
+
+    def end(self, *signals: signal.Signals) -> Ended:
+        """Send signals, wait for the end and return all output."""
+        asked = time.monotonic()
+        for number in signals:
+            self.process.send_signal(number)
+        self.process.wait(PATIENCE_S)
+        seconds = time.monotonic() - asked
+        for reader in self._readers:
+            reader.join()
+        return Ended(self.process.returncode, "".join(self.out), "".join(self.err), seconds)
+
+    @staticmethod
+    def _reader(stream: IO[str] | None, lines: list[str]) -> threading.Thread:
+        assert stream is not None
+        thread = threading.Thread(target=lambda: lines.extend(iter(stream.readline, "")), daemon=True)
+        thread.start()
+        return thread
+
+
+def automax(*arguments: str | Path, environment: dict[str, str] | None = None) -> Ended:
+    """Run `automax` to its end."""
+    with Automax(*arguments, environment=environment) as process:
+        return process.end()
+
+
+def wait_until(condition: Callable[[], bool], pause_s: float = 0.02) -> None:
+    """Wait for a condition, looking at it again and again."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, "the condition never came true"
+        time.sleep(pause_s)
+
+
+class Client:
+    """A ROS node of the test process, in its own context, spun only while the test waits.
+
+    To find a running rack takes it up to 3 s, so tests share one and ``forget`` what they have subscribed to.
+    """
+
+    def __init__(self, name: str = "client") -> None:
+        from rclpy.context import Context
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.node import Node
+
+        self.context = Context()
+        self.context.init(args=["--ros-args", "--disable-stdout-logs"])
+        self.node: Any = Node(name, context=self.context, enable_rosout=False)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self._subscriptions: list[Any] = []
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def listen(self, kind: Any, topic: str, *, latched: bool = False, depth: int = 1000) -> list[Any]:
+        """Subscribe, and return the list to which messages are added while the client waits."""
+        from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+        received: list[Any] = []
+        self._subscriptions.append(self.node.create_subscription(kind, topic, received.append, qos))
+        return received
+
+    def forget(self) -> None:
+        """End all subscriptions."""
+        for subscription in self._subscriptions:
+            self.node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
+    def until(self, condition: Callable[[], bool], what: str = "") -> None:
+        """Serve the node until a condition is true."""
+        deadline = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < deadline, f"it never came true: {what or condition}"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def spin(self, seconds: float) -> None:
+        """Serve the node for a while: where nothing must happen, there is no condition to wait for."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def first(self, kind: Any, topic: str) -> Any:
+        """Return what waits for late joiners on a latched topic."""
+        received = self.listen(kind, topic, latched=True, depth=1)
+        self.until(lambda: bool(received), f"a message on {topic}")
+        return received[0]
+
+    def send(self, kind: Any, topic: str, *messages: Any) -> None:
+        """Publish messages once somebody listens."""
+        publisher = self.node.create_publisher(kind, topic, 10)
+        self.until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
+        for message in messages:
+            publisher.publish(message)
+        publisher.wait_for_all_acked()
+        self.node.destroy_publisher(publisher)
+
+    def result(self, future: Any) -> Any:
+        """Wait for a service's answer."""
+        self.until(future.done, "an answer")
+        return future.result()
+
+
+def ns(stamp: Any) -> int:
+    """A ROS time in nanoseconds."""
+    return int(stamp.sec * 1_000_000_000 + stamp.nanosec)
+
+
+def entries(values: Any) -> list[tuple[int, int, float]]:
+    """The entries of a Values message: variable, element, value."""
+    return list(zip(values.variable, values.element, values.value, strict=True))
+
+
+def consecutive(numbers: Sequence[int]) -> bool:
+    return list(numbers) == list(range(numbers[0], numbers[0] + len(numbers)))
