@@ -48,8 +48,8 @@ def main() -> None:
         recorded = min(run(config, Path(temporary) / f"bag{number}") for number in range(REPEATS))
         size = sum(item.stat().st_size for item in (Path(temporary) / "bag0").iterdir())
     for word, taken, wanted in (("without recording", plain, 200), ("with recording", recorded, 60)):
-        pace = SECONDS / taken
-        print(f"{word:18} {pace:7.0f} x real time, {taken / SECONDS / rate * 1e6:6.1f} us a scan; wanted: at least {wanted}")
+        pace, scan_us = SECONDS / taken, taken / SECONDS / rate * 1e6
+        print(f"{word:18} {pace:7.0f} x real time, {scan_us:6.1f} us a scan; wanted: at least {wanted}")
     print(f"bag: {size / 1e6:.2f} MB, {size / SECONDS / rate:.0f} bytes a scan")
 
 

@@ -43,7 +43,9 @@ TASK = """10 COMMON IN!, SEEN!
 def percentiles(values: list[float]) -> str:
     """Return p50, p99 and the greatest, in the values' unit."""
     ordered = sorted(values)
-    return f"p50 {statistics.median(ordered):8.1f}  p99 {ordered[int(len(ordered) * 0.99)]:8.1f}  max {ordered[-1]:8.1f}"
+    return (
+        f"p50 {statistics.median(ordered):8.1f}  p99 {ordered[int(len(ordered) * 0.99)]:8.1f}  max {ordered[-1]:8.1f}"
+    )
 
 
 def loop_jitter(period_ns: int) -> tuple[list[float], int]:
@@ -81,11 +83,10 @@ def loop_jitter(period_ns: int) -> tuple[list[float], int]:
 def write_latency(tick_ms: float) -> list[float]:
     """Return the time in us from a publish on /set in this process to the latch in a rack of another process."""
     import rclpy
+    from automax_msgs.msg import Scan
     from rclpy.qos import QoSProfile
     from rclpy.serialization import deserialize_message
     from std_msgs.msg import Int32
-
-    from automax_msgs.msg import Scan
 
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)

@@ -69,12 +69,11 @@ def render(diagnostic: Diagnostic, source: SourceText) -> str:
     """Return a diagnostic as the person reads it: place, message, source line, caret, notes and hint."""
     lines = source.lines
     parts = [
-        f"{source.name}:{diagnostic.span.line}:{diagnostic.span.column}: "
-        f"{diagnostic.severity.value}[{diagnostic.code}]: {diagnostic.message}",
+        f"{_place(source, diagnostic.span)}: {diagnostic.severity.value}[{diagnostic.code}]: {diagnostic.message}",
         *_excerpt(diagnostic.span, lines),
     ]
     for note in diagnostic.notes:
-        parts.append(f"{source.name}:{note.span.line}:{note.span.column}: note: {note.message}")
+        parts.append(f"{_place(source, note.span)}: note: {note.message}")
         parts.extend(_excerpt(note.span, lines))
     if diagnostic.hint:
         parts.append(f"  hint: {diagnostic.hint}")
@@ -113,6 +112,10 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     return any(item.severity is Severity.ERROR for item in diagnostics)
 
 
+def _place(source: SourceText, span: Span) -> str:
+    return f"{source.name}:{span.line}:{span.column}"
+
+
 def _excerpt(span: Span, lines: list[str]) -> list[str]:
     if not 1 <= span.line <= len(lines):
         return []
@@ -124,5 +127,5 @@ def _excerpt(span: Span, lines: list[str]) -> list[str]:
 
 
 def printable(text: str) -> str:
-    """Return a text with control characters (but the tab) replaced, so that a hostile source cannot drive a terminal."""
+    """Return a text with control characters but the tab replaced, so that a hostile source cannot drive a terminal."""
     return "".join(char if char == "\t" or char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)

@@ -5,6 +5,7 @@ Everything here is built from + - * /, comparisons and integers, so that it give
 
 from __future__ import annotations
 
+import math
 import struct
 
 INT16_MIN, INT16_MAX = -32768, 32767
@@ -50,7 +51,7 @@ def stored_real(value: float) -> tuple[float, bool]:
 
     The nearest single-precision value; clamped at +-9.2233717E18; 0 below the smallest magnitude (decision).
     """
-    if value != value:
+    if math.isnan(value):
         return 0.0, True
     if value > REAL_MAX:
         return REAL_MAX, True

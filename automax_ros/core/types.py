@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import enum
-from typing import Union
 
-Value = Union[int, float, bool, str]
+Value = int | float | bool | str
 """A value of a variable: int for INTEGER and DOUBLE, float for REAL, bool for BOOLEAN, str for STRING."""
 
 NAME_LIMIT = 16

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Union
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.types import DataType, type_of_name
@@ -113,10 +112,10 @@ class FunctionCall:
     span: Span = _span()
 
 
-Expression = Union[
-    IntegerLiteral, RealLiteral, StringLiteral, BooleanLiteral, Variable, Element, Unary, Binary, FunctionCall
-]
-Target = Union[Variable, Element]
+Expression = (
+    IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral | Variable | Element | Unary | Binary | FunctionCall
+)
+Target = Variable | Element
 
 
 # Statements
@@ -366,33 +365,35 @@ class Label:
     span: Span = _span()
 
 
-Statement = Union[
-    Declaration,
-    Assignment,
-    If,
-    For,
-    Goto,
-    Gosub,
-    Return,
-    OnJump,
-    Read,
-    Data,
-    Restore,
-    Print,
-    Stop,
-    Event,
-    Call,
-    IoWrite,
-    ClearErrorLog,
-    End,
-    Remark,
-    Label,
-]
+Statement = (
+    Declaration
+    | Assignment
+    | If
+    | For
+    | Goto
+    | Gosub
+    | Return
+    | OnJump
+    | Read
+    | Data
+    | Restore
+    | Print
+    | Stop
+    | Event
+    | Call
+    | IoWrite
+    | ClearErrorLog
+    | End
+    | Remark
+    | Label
+)
 
 
 @dataclass(frozen=True)
 class Module:
-    """A whole task: its statements in order. ``number`` of a statement is the line number that stands before it,
-    None for a further statement of the same line; the statement it belongs to is the last number before it."""
+    """A whole task: its statements in order.
+
+    ``number`` of a statement is the line number that stands before it, None for a further statement of the same line.
+    """
 
     statements: tuple[Statement, ...]

@@ -94,10 +94,11 @@ def _element(config: RackConfig, text: str) -> Watched:
         name = _simple(config, text).name
         return Watched(name, name)
     variable = _variable(config, match["name"])
+    if not variable.is_array:
+        raise SettingError(f"{variable.name} is not an array")
     subscripts = [int(subscript) for subscript in match["subscripts"].split(",")]
     if len(subscripts) != len(variable.dimensions):
-        count = len(variable.dimensions)
-        raise SettingError(f"{variable.name} has {count} subscripts, not {len(subscripts)}")
+        raise SettingError(f"{variable.name} has {len(variable.dimensions)} subscripts, not {len(subscripts)}")
     element = 0
     for subscript, size in zip(subscripts, variable.dimensions, strict=True):
         if subscript >= size:

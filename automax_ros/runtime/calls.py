@@ -226,7 +226,7 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, bindings: dict
 def coefficient_function(
     block: Block, period_s: float, literals: dict[str, float], variable: tuple[str, ...]
 ) -> Callable[..., tuple[float | bool, ...]]:
-    """Return the function that computes a block's coefficients from its variable parameters, and whether one is limited."""
+    """Return what computes a block's coefficients from its variable parameters, and whether one is limited."""
 
     def coefficients(*values: float) -> tuple[float | bool, ...]:
         results, limited = evaluate(block, period_s, {**literals, **dict(zip(variable, values, strict=True))})

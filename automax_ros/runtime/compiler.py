@@ -136,7 +136,7 @@ class _Compilation:
         definitions = [self._wrapped(*parts) for parts in functions]
         module = ast.fix_missing_locations(ast.Module(list(definitions), []))
         made: dict[str, object] = {"__builtins__": {}, **self._globals}
-        exec(compile(module, f"<{self._program.name}>", "exec"), made)  # noqa: S102 - made of syntax trees only
+        exec(compile(module, f"<{self._program.name}>", "exec"), made)
         return CompiledTask(
             program=self._program,
             layout=Layout(tuple(self._fields.values())),

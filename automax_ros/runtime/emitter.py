@@ -108,7 +108,7 @@ class Emitter:
         return build.name(result)
 
     def noting(self, call: ast.expr, *overflows: int) -> ast.expr:
-        """Emit a call that returns a result and a problem; the problems ``overflows`` count as the statement's overflow."""
+        """Emit a call that returns a result and a problem; ``overflows`` count as the statement's overflow."""
         result, problem = self.temporary(), build.name(self.temporary())
         self.emit(build.assign_all([result, problem.id], call))
         tests = [build.compare(problem, "=", build.constant(code)) for code in overflows]
@@ -121,7 +121,7 @@ class Emitter:
         return self.program.symbols[name]
 
     def read(self, name: str, element: ast.expr | None = None) -> ast.expr:
-        """Return the present value of a variable; a common is read from actual memory, by a block from the latch (3.3)."""
+        """Return a variable's present value; a common is read from actual memory, by a block from the latch (3.3)."""
         symbol = self.symbol(name)
         if symbol.scope is Scope.LOCAL:
             return build.name(variable_name(name)) if element is None else build.item(variable_name(name), element)

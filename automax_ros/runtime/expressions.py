@@ -95,7 +95,7 @@ def lower_element(emitter: Emitter, element: Element) -> Lowered:
 
 
 def lower_index(emitter: Emitter, element: Element) -> tuple[ast.expr, ast.expr | None]:
-    """Return an element's flat index (last subscript fastest) and the test that it is in range, None if it always is."""
+    """Return an element's flat index, last subscript fastest, and the test that it is in range, if there is need."""
     dimensions = emitter.symbol(element.name).dimensions
     flat: ast.expr | None = None
     tests: list[ast.expr] = []

@@ -48,7 +48,7 @@ class Fold(ast.NodeTransformer):
         self._bindings = bindings
         self._helpers = helpers
 
-    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802 - the visitor protocol's name
+    def visit_Name(self, node: ast.Name) -> ast.expr:
         """Replace a bound name, wherever it is read or written."""
         bound = self._bindings.get(node.id)
         if bound is None:
@@ -58,11 +58,11 @@ class Fold(ast.NodeTransformer):
             return ast.Name(bound.id, ast.Store())
         return bound
 
-    def visit_Tuple(self, node: ast.Tuple) -> ast.expr:  # noqa: N802
+    def visit_Tuple(self, node: ast.Tuple) -> ast.expr:
         """Make a new tuple: the given one belongs to all calls of the block."""
         return ast.Tuple([self.visit(item) for item in node.elts], node.ctx)
 
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:  # noqa: N802
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         """Fold NOT and the sign of constants."""
         node = ast.UnaryOp(node.op, self.visit(node.operand))
         value = value_of(node.operand)
@@ -75,7 +75,7 @@ class Fold(ast.NodeTransformer):
             return build.constant(-value)
         return node
 
-    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:  # noqa: N802
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         """Fold + - * of constants."""
         node = ast.BinOp(self.visit(node.left), node.op, self.visit(node.right))
         left, right = value_of(node.left), value_of(node.right)
@@ -86,7 +86,7 @@ class Fold(ast.NodeTransformer):
             return node.left
         return node
 
-    def visit_Compare(self, node: ast.Compare) -> ast.expr:  # noqa: N802
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
         """Fold a comparison of two constants."""
         node = ast.Compare(self.visit(node.left), node.ops, [self.visit(item) for item in node.comparators])
         if len(node.ops) == 1:
@@ -95,7 +95,7 @@ class Fold(ast.NodeTransformer):
                 return ast.Constant(bool(_COMPARE[type(node.ops[0])](left, right)))
         return node
 
-    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:  # noqa: N802
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         """Leave out operands that cannot decide, stop at one that does."""
         neutral = isinstance(node.op, ast.And)
         kept: list[ast.expr] = []
@@ -112,7 +112,7 @@ class Fold(ast.NodeTransformer):
             return ast.Constant(neutral)
         return kept[0] if len(kept) == 1 else ast.BoolOp(node.op, kept)
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:  # noqa: N802
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         """Choose at compile time where the test is constant."""
         test: ast.expr = self.visit(node.test)
         value = value_of(test)
@@ -121,7 +121,7 @@ class Fold(ast.NodeTransformer):
             return chosen
         return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
 
-    def visit_Call(self, node: ast.Call) -> ast.expr:  # noqa: N802
+    def visit_Call(self, node: ast.Call) -> ast.expr:
         """Carry out a helper whose arguments are all constant; one that fails stays: a test may stand before it."""
         arguments = [self.visit(argument) for argument in node.args]
         values = [value_of(argument) for argument in arguments]

@@ -85,7 +85,7 @@ def real_power(base: float, exponent: float) -> Fallible:
 
 def whole(value: float) -> int:
     """Return a REAL without its fraction; what is no number is 0, an infinite one lies beyond 32 bits."""
-    if value != value:
+    if math.isnan(value):
         return 0
     if value >= 1e18:
         return 10**18
@@ -124,7 +124,7 @@ def tangent(angle_rad: float) -> Fallible:
 
 def arc_tangent(value: float) -> Fallible:
     """ATN: the angle in radians."""
-    return (math.atan(value), 0) if value == value else (0.0, BAD_ARGUMENT)
+    return (0.0, BAD_ARGUMENT) if math.isnan(value) else (math.atan(value), 0)
 
 
 def natural_logarithm(value: float) -> Fallible:

@@ -11,12 +11,11 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Union
 
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN
 from automax_ros.core.types import DataType, Value
 
-StateValue = Union[Value, list[Value]]
+StateValue = Value | list[Value]
 """A field's value in the state: a list for an array."""
 
 
@@ -107,7 +106,7 @@ class Layout:
         return [field.fresh() for field in self.fields]
 
     def restart(self, state: list[StateValue]) -> None:
-        """Put a state where RUN puts it: blocks and stacks start anew, locals and tunables keep their values (2.4.5)."""
+        """Put a state where RUN puts it: blocks and stacks start anew, locals and tunables keep (2.4.5)."""
         for position, field in enumerate(self.fields):
             if field.role in (Role.BLOCK, Role.STACK):
                 state[position] = field.fresh()

@@ -49,7 +49,7 @@ def _as_real(emitter: Emitter, value: Lowered) -> ast.expr:
     literal = value_of(value.node)
     if isinstance(literal, (int, float)):
         return build.constant(stored_real(float(literal))[0])
-    if value.type is not DataType.REAL and -_EXACT_IN_REAL <= value.low and value.high <= _EXACT_IN_REAL:
+    if value.type is not DataType.REAL and value.low >= -_EXACT_IN_REAL and value.high <= _EXACT_IN_REAL:
         return build.binary(value.node, "+", build.constant(0.0))
     result, flag = emitter.temporary(), emitter.temporary()
     emitter.emit(build.assign_all([result, flag], emitter.operation("store_real", value.node)))

@@ -90,11 +90,11 @@ class TaskIo:
         """Clear the error log (CLR_ERRLOG)."""
         self._task.errors.clear()
 
-    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:  # noqa: ARG002
         """Return a register; without a module in that slot it is a bus error."""
         return 0, BUS_ERROR
 
-    def io_write(self, slot: int, register: int, value: int) -> int:
+    def io_write(self, slot: int, register: int, value: int) -> int:  # noqa: ARG002
         """Write a register; without a module in that slot it is a bus error."""
         return BUS_ERROR
 
@@ -269,7 +269,8 @@ class Task:
         if symbol.tuning is None:
             raise KeyError(name)
         low, high = symbol.tuning.low, symbol.tuning.high
-        assert not isinstance(low, str) and not isinstance(high, str)
+        assert not isinstance(low, str)
+        assert not isinstance(high, str)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             raise ValueError(f"{name} cannot be {value!r}: that is no number")
         # A limit such as 0.1 is held in single precision too, so the stored value is what must lie inside.

@@ -12,7 +12,7 @@ from automax_ros.language.program import Program
 
 from .support import TICK
 
-DECLARATIONS = """10 LOCAL A%, B%, D!, E!, R, Q, X@, Y@, S$, P$*5, T%(10), U!(2,3), V(4), W@(3)
+DECLARATIONS = """10 LOCAL A%, B%, D!, E!, R, Q, X@, Y@, S$, P$:5, T%(10), U!(2,3), V(4), W@(3)
 11 LOCAL F0%, F1%, F2!, FR, G% [CURRENT=3, HIGH=10, LOW=-10], H [CURRENT=1.5, HIGH=9.0, LOW=-9.0]
 12 COMMON KA%, KB%, KD!, KR, KX@, KY@, KS$, KT%(4), KV(2), KW@(2), KF%
 """
@@ -29,8 +29,9 @@ READABLE = {
     "string": WRITABLE["string"],
 }
 INTEGERS = "0 1 2 3 7 10 15 16 31 100 32767 32768 65535 65536 2147483647 0FFFFH 80000000H 0FFFFFFFFH 7FFFFFFFH".split()
-REALS = "0.0 0.5 1.0 1.5 3.25 100.0 32767.9 2147483648.0 9.2E18 1.0E-19 6.0E-20 16777217.0".split()
+REALS = "0.0 0.5 1.0 1.5 3.25 100.0 32767.9 2.1474836E9 9.2E18 1.0E-19 6.0E-20 1.6777217E7".split()
 STRINGS = ['""', '"A"', '"12"', '"3.5E2"', '"LONG TEXT"', '"1E30"', '"-7 "']
+PLACES = st.sampled_from(["0", "1", "7", "15", "A%", "B%", "(A% AND 15)", "G%"])
 LOOPS = ("F0%", "F1%", "F2!", "FR", "KF%")
 REFUSED = {"AMX4024", "AMX2007", "AMX2008", "AMX2019", "AMX4023", "AMX0045", "AMX4056"}
 """What the checker knows of constants: a random task that has one of these is left out."""
@@ -83,7 +84,7 @@ def _integers(depth):
         calls(["INT", "SGN"], expressions("real", depth)),
         calls(["MIN", "MAX"], one, one, one),
         calls(["LEN%", "ASC%"], expressions("string", depth)),
-        calls(["BIT_SET%", "BIT_CLR%", "SHIFTL%", "SHIFTR%", "ROTATEL%", "ROTATER%"], one, expressions("integer", 0)),
+        calls(["BIT_SET%", "BIT_CLR%", "SHIFTL%", "SHIFTR%", "ROTATEL%", "ROTATER%"], one, PLACES),
     )
 
 
@@ -108,7 +109,7 @@ def _booleans(depth):
         operations(["AND", "OR", "XOR", "=", "<>"], logic, logic),
         operations(["=", "<>"], text, text),
         logic.map(lambda inner: f"(NOT ({inner}))"),
-        calls(["BIT_TST@"], expressions("integer", depth), expressions("integer", 0)),
+        calls(["BIT_TST@"], expressions("integer", depth), PLACES),
         st.just("TST_ERRLOG@"),
     )
 

@@ -1,0 +1,249 @@
+"""`automax run` in simulated time: arguments, exit codes, summary, status lines."""
+
+import itertools
+import re
+
+import pytest
+
+from automax_ros.cli import status as status_module
+from automax_ros.cli.status import StatusDisplay
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.settings import Watched
+
+RACK = """\
+rack: LINE1
+slots:
+  0:
+    module: 57C435
+    tasks:
+      TASK: {priority: 5}
+common:
+  REF%: {ros: in, preset: 5}
+  RUN@:
+  GAIN: {preset: 1.5}
+  TOTAL!:
+  NOTE$:8:
+  TABLE%(2,3): {preset: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]}
+"""
+TASK = """\
+10 COMMON REF%, RUN@, GAIN, TOTAL!, NOTE$:8, TABLE%(2,3)
+20 LOCAL NIL%, X%
+100 CALL SCAN_LOOP(TICKS=2)
+110 TOTAL! = TOTAL! + REF%
+120 IF RUN@ THEN X% = 1 / NIL%
+130 END
+"""
+
+
+@pytest.fixture
+def run(automax):
+    """Call `automax run rack.yaml --simulated` with further options."""
+    automax.write("rack.yaml", RACK)
+    automax.write("TASK.BLK", TASK)
+    return lambda *options: automax("run", "rack.yaml", "--simulated", *options)
+
+
+def test_summary_of_a_run(run):
+    result = run("--duration", "1.1")
+    assert (result.code, result.err) == (0, "")
+    first, header, task, values = result.out.splitlines()
+    assert re.fullmatch(r"ran 1\.100 s in \d+\.\d\d s \(\d+ times real time\)", first)
+    assert header.split() == ["task", "slot", "period", "ms", "scans", "late", "errors"]
+    assert task.split() == ["TASK", "0", "11", "100", "0", "0"]
+    assert values.split() == ["REF%=5", "RUN@=0", "GAIN=1.5", "TOTAL!=500"]
+
+
+def test_run_time_errors_stand_in_the_summary(run):
+    result = run("--duration", "0.05", "--set", "RUN@=on")
+    assert result.code == 0
+    errors = [line.strip() for line in result.out.splitlines() if "AMX7" in line]
+    assert [line.partition(":")[0:1] for line in errors] == [("TASK",)] * 3
+    assert errors[0].startswith("TASK: scan 1, line 120: AMX7")
+    assert errors[-1].startswith("TASK: scan 5, line 120: AMX7")
+
+
+@pytest.mark.parametrize("duration", ["0", "-1", "abc", "nan", "inf", "1e400", "", "1e-12", "0x10"])
+def test_bad_duration_is_wrong_usage(run, duration):
+    result = run(f"--duration={duration}")
+    assert result.code == 2
+    assert "--duration" in result.err
+    assert result.out == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("REF%=-7", "REF%=-7"),
+        ("ref% = 7", "REF%=7"),
+        ("RUN@=TRUE", "RUN@=1"),
+        ("RUN@=off", "RUN@=0"),
+        ("GAIN=0.25", "GAIN=0.25"),
+        ("NOTE$=a=b", "NOTE$=a=b"),
+        ("NOTE$=", "NOTE$="),
+        ("TOTAL!=2147483647", "TOTAL!=2147483647"),
+    ],
+)
+def test_set_writes_before_the_first_scan(run, text, values):
+    name = values.partition("=")[0]
+    result = run("--duration", "0.001", "--set", "REF%=0", "--set", text, "--watch", name)
+    assert result.code == 0, result.err
+    assert result.out.splitlines()[-1].strip() == values
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("REF%", "'REF%' is not NAME=VALUE"),
+        ("=5", "no common variable ''"),
+        ("REFF%=5", "did you mean REF%?"),
+        ("REF=5", "no common variable 'REF'"),
+        ("REF%=40000", "'40000' is no value for REF%, type INTEGER"),
+        ("REF%=1.5", "'1.5' is no value for REF%"),
+        ("REF%=", "'' is no value for REF%"),
+        ("RUN@=2", "'2' is no value for RUN@, type BOOLEAN"),
+        ("GAIN=nan", "'nan' is no value for GAIN, type REAL"),
+        ("GAIN=1e30", "no value for GAIN"),
+        ("NOTE$=123456789", "no value for NOTE$, type STRING"),
+        ("NOTE$=\udcff", "no value for NOTE$"),
+        ("TABLE%=1", "TABLE% is an array"),
+        ("REF%=" + "9" * 10_000, "no value for REF%"),
+    ],
+)
+def test_bad_setting_is_wrong_usage(run, text, words):
+    result = run("--duration", "1", "--set", text)
+    assert result.code == 2
+    assert result.err.startswith("automax run: error: --set: ")
+    assert words in result.err
+    assert len(result.err) < 300
+    assert result.out == ""
+
+
+@pytest.mark.parametrize(
+    ("watch", "shown"),
+    [
+        ("TABLE%(2,1)", "TABLE%(2,1)=9"),
+        ("table%[0,3], ref%", "TABLE%(0,3)=3  REF%=5"),
+        ("NOTE$", "NOTE$="),
+    ],
+)
+def test_watched_values_are_shown(run, watch, shown):
+    assert run("--duration", "0.001", "--watch", watch).out.splitlines()[-1].strip() == shown
+
+
+@pytest.mark.parametrize(
+    ("watch", "words"),
+    [
+        ("SPEED%", "no common variable 'SPEED%'"),
+        ("TABLE%", "TABLE% is an array\n  hint: one element of it is TABLE%(0,0)"),
+        ("TABLE%(1)", "TABLE% has 2 subscripts, not 1"),
+        ("TABLE%(1,4)", "the largest is 3"),
+        ("REF%(0)", "REF% is not an array"),
+        ("TABLE%(1,", "no common variable"),
+    ],
+)
+def test_bad_watch_is_wrong_usage(run, watch, words):
+    result = run("--duration", "1", "--watch", watch)
+    assert result.code == 2
+    assert result.err.startswith("automax run: error: --watch: ")
+    assert words in result.err
+
+
+def test_unreadable_file_is_wrong_usage(automax, tmp_path):
+    for name in ("missing.yaml", "."):
+        result = automax("run", name, "--simulated", "--duration", "1")
+        assert result.code == 2, name
+        assert result.err.endswith(f"automax run: error: {name} cannot be used\n")
+
+
+def test_text_that_is_no_yaml_is_wrong_usage(automax):
+    for content in (b"rack: [", b"\xff\xfe\x00", b"a: &b 1\nc: *b\n"):
+        result = automax("run", automax.write("bad.yaml", content), "--simulated", "--duration", "1")
+        assert result.code in (1, 2), content
+        assert "bad.yaml:" in result.err
+
+
+def test_errors_of_the_rack_file_are_shown_with_their_places(automax):
+    automax.write("TASK.BLK", TASK)
+    result = automax("run", automax.write("rack.yaml", RACK.replace("57C435", "57C430")), "--simulated")
+    assert result.code == 1
+    assert "rack.yaml:4:" in result.err
+    assert "error[AMX6" in result.err
+
+
+def test_errors_of_a_task_are_shown_and_nothing_starts(automax):
+    automax.write("rack.yaml", RACK)
+    automax.write("TASK.BLK", TASK.replace("NIL%, X%", "NIL%"))
+    result = automax("run", "rack.yaml", "--simulated", "--duration", "1", "--record", "bag")
+    assert result.code == 1
+    assert "TASK.BLK:5:" in result.err
+    assert result.err.endswith("no task is started: errors in TASK.BLK (the rack shows E0)\n")
+    assert result.out == ""
+    assert not (automax.folder / "bag").exists()
+
+
+def test_fault_ends_the_run(automax):
+    automax.write("rack.yaml", RACK)
+    automax.write("TASK.BLK", TASK.replace("120 IF RUN@ THEN X% = 1 / NIL%", "120 IF TOTAL! > 20 THEN 120"))
+    result = automax("run", "rack.yaml", "--simulated", "--duration", "1000", "--record", "bag")
+    assert result.code == 1
+    assert "automax run: STOP ALL: task TASK: scan 5, line 120: AMX7040" in result.err
+    assert "(code 14 on the rack)" in result.err
+    assert "recorded bag: " in result.out
+
+
+def test_existing_folder_is_not_recorded_into(run, automax):
+    (automax.folder / "bag").mkdir()
+    result = run("--duration", "1", "--record", "bag")
+    assert result.code == 2
+    assert "bag: error[AMX6800]: exists already" in result.err
+    assert list((automax.folder / "bag").iterdir()) == []
+
+
+def test_recording_that_breaks_off_is_told_and_the_run_goes_on(run, automax, monkeypatch):
+    from automax_ros.bags import writer
+
+    def full(self, data):
+        if self._size > 20_000:
+            raise OSError(28, "No space left on device")
+        return original(self, data)
+
+    original = writer._DataFile.write
+    monkeypatch.setattr(writer._DataFile, "write", full)
+    result = run("--duration", "100", "--record", "bag")
+    assert result.code == 1
+    assert "ran 100.000 s" in result.out
+    assert "AMX6801" in result.err
+    assert "No space left" in result.err
+
+
+# The status line
+
+
+@pytest.fixture
+def rack(automax):
+    automax.write("TASK.BLK", TASK)
+    automax.write("rack.yaml", RACK)
+    config = load(automax.folder / "rack.yaml").config
+    assert config is not None
+    return Rack(config, stopwatch=itertools.count(0, 110_000).__next__)
+
+
+def test_plain_line_comes_every_five_seconds(rack, capsys, monkeypatch):
+    clock = iter([0, 1_000_000_000, 5_000_000_000, 9_000_000_000, 10_000_000_000])
+    monkeypatch.setattr(status_module.time, "monotonic_ns", lambda: next(clock))
+    display = StatusDisplay(rack, [Watched("REF%", "REF%")], live=True)
+    rack.start()
+    for second in (1, 5, 9, 10):
+        rack.scheduler.run_until(second * 1_000_000_000)
+        display.update(rack.now_ns)
+    lines = capsys.readouterr().out.splitlines()
+    # 91 scans a second of 110 us each are 1 % of the Processor's time.
+    assert [line.split("  ")[-4:] for line in lines] == [["91 scans/s", "P0 1.0 %", "late 0", "REF%=5"]] * 2
+
+
+def test_text_of_a_string_cannot_drive_the_terminal(rack, capsys):
+    display = StatusDisplay(rack, [Watched("NOTE$", "NOTE$")], live=False)
+    rack.start([("NOTE$", "\x1b[2Jx\r\n")])
+    display.finish(None)
+    assert "NOTE$=\N{REPLACEMENT CHARACTER}[2Jx" in capsys.readouterr().out

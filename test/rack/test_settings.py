@@ -1,0 +1,99 @@
+"""Names and values from a command line; test/cli/test_run.py has the messages."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from automax_ros.core.types import DataType
+from automax_ros.rack.config import CommonVariable, Direction, RackConfig
+from automax_ros.rack.settings import DEFAULT_WATCHED, SettingError, Watched, setting, value_of_text, watched
+
+from .helpers import HEAD, good
+
+COMMON = """\
+common:
+  REF%: {}
+  GRID%(1,2): {ros: out}
+  NOTE$:8: {}
+  SHUT%: {ros: closed}
+  A%: {}
+  B@: {}
+  C!: {}
+  D: {}
+  E%: {}
+"""
+
+
+@pytest.fixture
+def config(tmp_path) -> RackConfig:
+    return good(tmp_path, HEAD + COMMON)
+
+
+def test_default_is_the_first_published_numbers_and_booleans(config):
+    names = [item.name for item in watched(config, None)]
+    assert names == ["REF%", "A%", "B@", "C!", "D"]
+    assert len(names) == DEFAULT_WATCHED
+
+
+def test_names_of_the_command_line_keep_their_order(config):
+    assert watched(config, ["d", "SHUT%", "note$", "grid%(1, 2)"]) == [
+        Watched("D", "D"),
+        Watched("SHUT%", "SHUT%"),
+        Watched("NOTE$", "NOTE$"),
+        Watched("GRID%(1,2)", "GRID%", 5),
+    ]
+    assert watched(config, []) == []
+
+
+@given(first=st.integers(0, 1), second=st.integers(0, 2))
+def test_last_subscript_runs_fastest(first, second):
+    variable = CommonVariable("GRID%", DataType.INTEGER, (2, 3), direction=Direction.OUT)
+    (found,) = watched(_rack_of(variable), [f"GRID%({first},{second})"])
+    assert found.element == 3 * first + second
+
+
+def _rack_of(variable: CommonVariable) -> RackConfig:
+    from pathlib import Path
+
+    return RackConfig("LINE1", "line1", Path("rack.yaml"), "", False, None, (), (variable,))
+
+
+@pytest.mark.parametrize(
+    "name", ["GRID%", "GRID%(2,0)", "GRID%(0,3)", "GRID%(0)", "REF%(0)", "NONE%", "", "GRID%(-1,0)"]
+)
+def test_what_does_not_exist_cannot_be_watched(config, name):
+    with pytest.raises(SettingError):
+        watched(config, [name])
+
+
+def test_setting_names_the_variable_as_the_rack_does(config):
+    assert setting(config, " ref% = 12 ") == ("REF%", 12)
+    assert setting(config, "NOTE$= a=b ") == ("NOTE$", "a=b")
+
+
+@settings(deadline=None, derandomize=True)
+@given(kind=st.sampled_from(DataType), text=st.text(max_size=40) | st.from_regex(r"[-+]?[0-9._eE]{0,12}"))
+def test_any_text_is_a_value_that_fits_or_refused(kind, text):
+    variable = CommonVariable("V", kind, length=8 if kind is DataType.STRING else 0)
+    try:
+        value = value_of_text(variable, text)
+    except SettingError as error:
+        assert kind.word in str(error)
+        return
+    if kind is DataType.STRING:
+        assert isinstance(value, str)
+        assert len(value) <= 8
+        assert value.encode().decode() == value
+    elif kind is DataType.BOOLEAN:
+        assert isinstance(value, bool)
+    elif kind is DataType.REAL:
+        assert isinstance(value, float)
+        assert abs(value) <= 9.2233720e18
+    else:
+        assert isinstance(value, int)
+        assert -(2**31) <= value < 2**31
+
+
+def test_lone_surrogates_are_no_text(config):
+    with pytest.raises(SettingError, match=r"no value for NOTE\$"):
+        setting(config, "NOTE$=\udcff")
