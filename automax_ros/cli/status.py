@@ -83,8 +83,7 @@ class StatusDisplay:
             parts += [self._load(processor, wall) for processor in self._rack.processors]
         else:
             parts.append(f"{(now_ns - self._last_rack_ns) / max(1, wall - self._last):.0f}x")
-        late = sum(item.skipped for item in self._rack.statistics.values())
-        parts += [f"late {late}", *self._values()]
+        parts += self._values()
         self._last, self._last_rack_ns, self._last_scans = wall, now_ns, scans
         line = "  ".join(parts)
         if self._terminal:
@@ -96,11 +95,12 @@ class StatusDisplay:
         sys.stdout.flush()
 
     def _load(self, processor: Processor, wall: int) -> str:
-        """Return a Processor's share of the time since the last line."""
+        """Return a Processor's share of the time since the last line, and the deadlines it has missed."""
         busy = sum(self._rack.statistics[task.name].total_ns for task in processor.tasks)
         share = (busy - self._last_busy.get(processor.slot, 0)) / max(1, wall - self._last)
         self._last_busy[processor.slot] = busy
-        return f"P{processor.slot} {100 * share:.1f} %"
+        late = sum(self._rack.statistics[task.name].skipped for task in processor.tasks)
+        return f"P{processor.slot} {100 * share:.1f} % late {late}"
 
     def _values(self) -> list[str]:
         return [f"{item.label}={_shown(self._rack.value(item.name, item.element))}" for item in self._watch]

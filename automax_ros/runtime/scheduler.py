@@ -1,8 +1,8 @@
 """The scheduler: an event queue in integer nanoseconds; time belongs to it and to nobody else.
 
 Events are ordered by (time, class, priority, name), so nothing is left to chance. ``run_until`` is simulated time:
-every event at its own instant. ``run_due`` is the wall clock: somebody who knows the time calls it, periodic events whose
-instants have passed unserved are skipped and counted, and the next one stays on the grid.
+every event at its own instant. ``run_due`` is the wall clock: somebody who knows the time calls it, periodic events
+whose instants have passed unserved are skipped and counted, and the next one stays on the grid.
 """
 
 from __future__ import annotations

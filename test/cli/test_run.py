@@ -239,7 +239,7 @@ def test_plain_line_comes_every_five_seconds(rack, capsys, monkeypatch):
         display.update(rack.now_ns)
     lines = capsys.readouterr().out.splitlines()
     # 91 scans a second of 110 us each are 1 % of the Processor's time.
-    assert [line.split("  ")[-4:] for line in lines] == [["91 scans/s", "P0 1.0 %", "late 0", "REF%=5"]] * 2
+    assert [line.split("  ")[-3:] for line in lines] == [["91 scans/s", "P0 1.0 % late 0", "REF%=5"]] * 2
 
 
 def test_text_of_a_string_cannot_drive_the_terminal(rack, capsys):

@@ -77,8 +77,7 @@ def test_any_text_is_a_value_that_fits_or_refused(kind, text):
     variable = CommonVariable("V", kind, length=8 if kind is DataType.STRING else 0)
     try:
         value = value_of_text(variable, text)
-    except SettingError as error:
-        assert kind.word in str(error)
+    except SettingError:
         return
     if kind is DataType.STRING:
         assert isinstance(value, str)

@@ -316,7 +316,7 @@ def outside_writes(draw) -> dict[str, object]:
         "KA%": edges,
         "KB%": edges,
         "KD!": edges | st.sampled_from([-(2**31), 2**31 - 1]),
-        "KR": st.sampled_from([0.0, -1.5, 2.5, 9.0e18]),
+        "KR": st.sampled_from([0.0, -1.5, 2.5, 2.0**62]),
         "KX@": st.booleans(),
         "KS$": st.sampled_from(["", "7", "AB"]),
     }
