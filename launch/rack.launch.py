@@ -18,7 +18,8 @@ def start_rack(context: LaunchContext) -> list[ExecuteProcess]:
         return LaunchConfiguration(name).perform(context)
 
     command = [ExecutableInPackage(package=PACKAGE, executable="automax"), "run", value("config")]
-    command += [f"--{name}" for name in ("simulated", "distributed") if value(name) == "true"]
+    if value("simulated") == "true":
+        command.append("--simulated")
     for name in ("duration", "record"):
         if value(name):
             command += [f"--{name}", value(name)]
@@ -35,9 +36,6 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument("config", default_value=example, description="rack YAML file"),
             DeclareLaunchArgument(
                 "simulated", default_value="false", choices=yes_no, description="simulated time, as fast as it goes"
-            ),
-            DeclareLaunchArgument(
-                "distributed", default_value="false", choices=yes_no, description="one process a module"
             ),
             DeclareLaunchArgument("duration", default_value="", description="seconds to run; empty: until Ctrl-C"),
             DeclareLaunchArgument("record", default_value="", description="bag folder to record into; empty: none"),

@@ -45,10 +45,10 @@ class RecordedMemory:
         assert (wanted, index) == (view, element)
         return value
 
-    def write_now(self, view: int, value: Value, writer: int, element: int = 0, kind: object = None) -> None:
+    def write_now(self, view: int, value: Value, writer: int, element: int = 0, kind: object = None) -> None:  # noqa: ARG002
         self.written.append((view, element, value))
 
-    def commit(self, changes: list[tuple[int, Value]], writer: int) -> None:
+    def commit(self, changes: list[tuple[int, Value]], writer: int) -> None:  # noqa: ARG002
         self.committed += [(view, 0, value) for view, value in changes]
 
 
@@ -95,14 +95,14 @@ class Reexecution:
         assert message.source_hash == task.compiled.program.source_hash
         values = _state_values(task.layout, message)
         if self._known.get(message.task) == message.scan and not self._tuned(task, values):
-            assert task.snapshot() == values
+            assert _bits(task.snapshot()) == _bits(values)
         task.restore(values)
         self._known[message.task] = message.scan
 
     def _tuned(self, task: Task, values: list[Value]) -> bool:
         """Whether a state differs from ours in tunables alone: somebody has tuned the task since its last scan."""
-        before = task.snapshot()
-        different = {number for number, pair in enumerate(zip(before, values, strict=True)) if pair[0] != pair[1]}
+        pairs = zip(_bits(task.snapshot()), _bits(values), strict=True)
+        different = {number for number, (before, after) in enumerate(pairs) if before != after}
         tunables = {number for number, item in enumerate(task.layout.fields) if item.role.value == "tunable"}
         return bool(different) and different <= tunables
 
@@ -132,6 +132,11 @@ class Reexecution:
             (view, element, _typed(self._kinds[view], value, texts))
             for view, element, value in zip(values.variable, values.element, values.value, strict=True)
         ]
+
+
+def _bits(values: list[Value]) -> list[str]:
+    """Values for a comparison in which NaN is NaN, and 0.0 is not -0.0."""
+    return [repr(value) for value in values]
 
 
 def _task(compiled: CompiledTask, memory: Any) -> Task:

@@ -1,0 +1,60 @@
+"""The lock that lets one rack of a name run in a ROS domain; test/system/test_stopping.py has it between processes."""
+
+import os
+
+import pytest
+
+from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.nodes.lock import LockError, RackAlreadyRuns, RackLock, domain_id
+
+
+@pytest.fixture(autouse=True)
+def folder(monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return tmp_path
+
+
+def test_second_holder_is_told_who_holds_it():
+    with RackLock("line1", 7):
+        with pytest.raises(
+            RackAlreadyRuns, match=rf"rack /line1 in ROS domain 7 runs already \(process {os.getpid()}\)"
+        ):
+            RackLock("line1", 7).__enter__()
+        with RackLock("line1", 8), RackLock("line2", 7):
+            pass
+
+
+def test_lock_is_free_afterwards():
+    for _ in range(3):
+        with RackLock("line1", 7):
+            pass
+
+
+def test_lock_is_free_after_an_error():
+    with pytest.raises(ZeroDivisionError), RackLock("line1", 7):
+        raise ZeroDivisionError
+    with RackLock("line1", 7):
+        pass
+
+
+def test_link_in_the_way_is_refused(folder):
+    (folder / "elsewhere").write_text("keep")
+    (folder / f"automax_ros_{os.getuid()}_7_line1.lock").symlink_to(folder / "elsewhere")
+    with pytest.raises(LockError, match="cannot open the lock file"):
+        RackLock("line1", 7).__enter__()
+    assert (folder / "elsewhere").read_text() == "keep"
+
+
+@pytest.mark.parametrize(("text", "domain"), [(None, 0), ("", 0), ("0", 0), ("232", 232), (" 5 ", 5)])
+def test_domain(monkeypatch, text, domain):
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    if text is not None:
+        monkeypatch.setenv("ROS_DOMAIN_ID", text)
+    assert domain_id() == domain
+
+
+@pytest.mark.parametrize("text", ["-1", "233", "x", "1.5", "²", "9" * 5000])
+def test_wrong_domain(monkeypatch, text):
+    monkeypatch.setenv("ROS_DOMAIN_ID", text)
+    with pytest.raises(RosUnavailable, match="no number from 0 to 232"):
+        domain_id()
