@@ -51,7 +51,7 @@ class BlockInstance:
         block = self.bound.block
         entries: list[tuple[str, DataType, Value]] = [(state.name, state.type, state.initial) for state in block.states]
         if self.variable_coefficients and block.coefficients is not None:
-            entries += [(f"seen_{name.lower()}", DataType.REAL, math.nan) for name in self.variable_coefficients]
+            entries += [(f"seen_{name.lower()}", DataType.REAL, math.inf) for name in self.variable_coefficients]
             entries += [(name, DataType.REAL, 0.0) for name in block.coefficients.names]
             entries.append(("limited", DataType.BOOLEAN, False))
         return [
