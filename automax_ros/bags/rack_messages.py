@@ -119,6 +119,10 @@ class RackMessages:
         self._sequence = 0
         self._slots = {writer.id: writer.slot for writer in rack.writers}
         self._latched: dict[str, Latched] = {}
+        image = rack.memory.image()
+        self._image_variables = [view for view, _, _ in image]
+        self._image_elements = [element for _, element, _ in image]
+        self._text_positions = [position for position, entry in enumerate(image) if isinstance(entry[2], str)]
         self._views = {task.name: [rack.memory.view(name) for name in task.compiled.latched] for task in rack.tasks}
 
     def stamp(self, now_ns: int) -> int:
@@ -151,7 +155,18 @@ class RackMessages:
 
     def image(self, now_ns: int) -> CommonImage:
         """Return all of common memory as it is."""
-        return CommonImage(self.stamp(now_ns), self._run_id, self._sequence, values_of(self._rack.memory.image()))
+        values: list[Any] = []
+        for view in range(len(self._rack.memory.specs)):
+            present = self._rack.memory.present(view)
+            if isinstance(present, list):
+                values += present
+            else:
+                values.append(present)
+        texts = [values[position] for position in self._text_positions]
+        for position in self._text_positions:
+            values[position] = 0.0
+        image = Values(self._image_variables, self._image_elements, values, texts)
+        return CommonImage(self.stamp(now_ns), self._run_id, self._sequence, image)
 
     def writes(self, writes: Sequence[Write]) -> list[CommonWrite]:
         """Return entries of the write log, those of one writer, kind and instant together."""

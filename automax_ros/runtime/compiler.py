@@ -9,13 +9,18 @@ Three functions come from one lowering of the same tree:
 
 Each returns True if the task executed STOP. ``state`` is the list of the layout's fields: loaded into locals at the
 start, stored back at the end, also when the scan is broken off. ``io`` is what a scan may touch: see ``ScanIo``.
+
+``scan_steps`` and the printed source are made when they are first asked for: most runs need neither.
 """
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass
+import gc
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol, cast
 
 from automax_ros.blocks.declaration import HELPERS
@@ -101,8 +106,18 @@ class CompiledTask:
     latched: tuple[str, ...]
     startup: Scan
     scan: Scan
-    scan_steps: ScanSteps
-    source: str
+    _compilation: _Compilation = field(repr=False, compare=False)
+
+    @cached_property
+    def scan_steps(self) -> ScanSteps:
+        """The scan as a generator."""
+        return cast(ScanSteps, self._compilation.functions("scan_steps")["scan_steps"])
+
+    @cached_property
+    def source(self) -> str:
+        """The three functions as text."""
+        definitions = self._compilation.definitions("startup", "scan", "scan_steps")
+        return "\n\n\n".join(ast.unparse(ast.fix_missing_locations(item)) for item in definitions) + "\n"
 
 
 def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:
@@ -127,30 +142,35 @@ class _Compilation:
         self._globals: dict[str, object] = {"ScanTooLong": ScanTooLong}
 
     def result(self) -> CompiledTask:
-        """Compile the three functions."""
-        functions = [
-            self._function("startup", self._program.startup, scans=False, modeled=False),
-            self._function("scan", self._program.scan, scans=True, modeled=False),
-            self._function("scan_steps", self._program.scan, scans=True, modeled=True),
-        ]
-        definitions = [self._wrapped(*parts) for parts in functions]
-        module = ast.fix_missing_locations(ast.Module(list(definitions), []))
-        made: dict[str, object] = {"__builtins__": {}, **self._globals}
-        exec(compile(module, f"<{self._program.name}>", "exec"), made)
+        """Compile the task."""
+        made = self.functions("startup", "scan")
         return CompiledTask(
             program=self._program,
             layout=Layout(tuple(self._fields.values())),
             latched=self._latched,
             startup=cast(Scan, made["startup"]),
             scan=cast(Scan, made["scan"]),
-            scan_steps=cast(ScanSteps, made["scan_steps"]),
-            source="\n\n\n".join(ast.unparse(definition) for definition in definitions) + "\n",
+            _compilation=self,
         )
 
-    def _function(
-        self, name: str, statements: tuple[Statement, ...], *, scans: bool, modeled: bool
-    ) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
-        emitter = Emitter(self._program, self._views, modeled, self._cost)
+    def functions(self, *names: str) -> dict[str, object]:
+        """Compile some of the three functions."""
+        with _collections_paused():
+            definitions: list[ast.stmt] = [*self.definitions(*names)]
+            code = compile(ast.fix_missing_locations(ast.Module(definitions, [])), f"<{self._program.name}>", "exec")
+        made: dict[str, object] = {"__builtins__": {}, **self._globals}
+        exec(code, made)
+        return made
+
+    def definitions(self, *names: str) -> list[ast.FunctionDef]:
+        """Lower some of the three functions; the state's fields are known when ``scan`` was among them."""
+        parts = [self._function(name) for name in names]
+        return [self._wrapped(*part) for part in parts]
+
+    def _function(self, name: str) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
+        scans = name != "startup"
+        statements = self._program.scan if scans else self._program.startup
+        emitter = Emitter(self._program, self._views, name == "scan_steps", self._cost)
         lowering = StatementLowering(emitter, dict(self._instances.items()))
         if scans:
             emitter.line = self._program.scan_loop_line
@@ -246,6 +266,18 @@ class _Compilation:
             opening.append(build.assign("block_lines", ast.Tuple([build.constant(line) for line in lines], ast.Load())))
         self._globals.update(extra)
         return build.function(name, ["state", "io"], [*opening, *body, *ending])
+
+
+@contextmanager
+def _collections_paused() -> Iterator[None]:
+    """Collect no garbage meanwhile: all of a long task's tree is alive, and looking through it takes most of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def _assigned(body: list[ast.stmt]) -> frozenset[str]:

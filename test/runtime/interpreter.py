@@ -56,7 +56,9 @@ def whole(value: float) -> int:
 def real_text(value: float) -> str:
     text = f"{0.0 if value == 0 else value:.8G}"
     mantissa, mark, exponent = text.partition("E")
-    return text if not mark else f"{mantissa}E{'-' if exponent[0] == '-' else '+'}{exponent[1:].lstrip('0').rjust(2, '0')}"
+    return (
+        text if not mark else f"{mantissa}E{'-' if exponent[0] == '-' else '+'}{exponent[1:].lstrip('0').rjust(2, '0')}"
+    )
 
 
 class Interpreter:
@@ -64,8 +66,12 @@ class Interpreter:
 
     def __init__(self, program: Program) -> None:
         self.program = program
-        self.locals = {name: self._fresh(symbol) for name, symbol in program.symbols.items() if symbol.scope is Scope.LOCAL}
-        self.commons = {name: self._fresh(symbol) for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
+        self.locals = {
+            name: self._fresh(symbol) for name, symbol in program.symbols.items() if symbol.scope is Scope.LOCAL
+        }
+        self.commons = {
+            name: self._fresh(symbol) for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON
+        }
         self.latch = {}
         self.log, self.writes, self.printed = [], [], []
         self.blocks = {}
@@ -258,7 +264,9 @@ class Interpreter:
 
     def _do_restore(self, statement):
         line = statement.line or 0
-        self.pointer = next((first for number, first in self.program.data_lines if number >= line), len(self.program.data))
+        self.pointer = next(
+            (first for number, first in self.program.data_lines if number >= line), len(self.program.data)
+        )
 
     def _do_clearerrorlog(self, statement):
         self.errors = 0

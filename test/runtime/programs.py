@@ -28,8 +28,41 @@ READABLE = {
     "boolean": WRITABLE["boolean"],
     "string": WRITABLE["string"],
 }
-INTEGERS = "0 1 2 3 7 10 15 16 31 100 32767 32768 65535 65536 2147483647 0FFFFH 80000000H 0FFFFFFFFH 7FFFFFFFH".split()
-REALS = "0.0 0.5 1.0 1.5 3.25 100.0 32767.9 2.1474836E9 9.2E18 1.0E-19 6.0E-20 1.6777217E7".split()
+INTEGERS = [
+    "0",
+    "1",
+    "2",
+    "3",
+    "7",
+    "10",
+    "15",
+    "16",
+    "31",
+    "100",
+    "32767",
+    "32768",
+    "65535",
+    "65536",
+    "2147483647",
+    "0FFFFH",
+    "80000000H",
+    "0FFFFFFFFH",
+    "7FFFFFFFH",
+]
+REALS = [
+    "0.0",
+    "0.5",
+    "1.0",
+    "1.5",
+    "3.25",
+    "100.0",
+    "32767.9",
+    "2.1474836E9",
+    "9.2E18",
+    "1.0E-19",
+    "6.0E-20",
+    "1.6777217E7",
+]
 STRINGS = ['""', '"A"', '"12"', '"3.5E2"', '"LONG TEXT"', '"1E30"', '"-7 "']
 PLACES = st.sampled_from(["0", "1", "7", "15", "A%", "B%", "(A% AND 15)", "G%"])
 LOOPS = ("F0%", "F1%", "F2!", "FR", "KF%")
@@ -140,7 +173,10 @@ def assignments(draw, depth: int = 2) -> str:
 
 @st.composite
 def block_calls(draw) -> str:
-    integer, boolean = st.sampled_from(["A%", "B%", "KA%", "KB%", "T%(A%)", "KT%(2)"]), st.sampled_from(["X@", "KX@", "KW@(1)"])
+    integer, boolean = (
+        st.sampled_from(["A%", "B%", "KA%", "KB%", "T%(A%)", "KT%(2)"]),
+        st.sampled_from(["X@", "KX@", "KW@(1)"]),
+    )
     one, two, out = draw(integer), draw(integer), draw(integer)
     flag, flag_out = draw(boolean), draw(boolean)
     return draw(
@@ -201,7 +237,11 @@ def bodies(draw, depth: int, loops: tuple[str, ...], most: int = 4) -> list:
 def loop(draw, depth: int, loops: tuple[str, ...]):
     variable, others = loops[0], loops[1:]
     small = st.sampled_from(["0", "1", "4", "-2", "(B% AND 3)", "(KA% AND 3)", "G%", "2.5"])
-    first, last, step = draw(small), draw(small), draw(st.sampled_from(["", "", "1", "-1", "2", "(A% AND 1)", "0.5", "H"]))
+    first, last, step = (
+        draw(small),
+        draw(small),
+        draw(st.sampled_from(["", "", "1", "-1", "2", "(A% AND 1)", "0.5", "H"])),
+    )
     if draw(st.integers(0, 7)) == 0 and variable.endswith("%"):
         first, last, step = "32765", "32767", draw(st.sampled_from(["", "1", "2", "(A% AND 1) + 1"]))
     head = f"FOR {variable} = {first} TO {last}" + (f" STEP {step}" if step else "")

@@ -67,7 +67,9 @@ class Programmed:
 
 
 def variables(kind: DataType) -> st.SearchStrategy[str]:
-    elements = st.builds(lambda name, index: f"{name}({index})", st.sampled_from(ARRAYS[kind]), st.sampled_from(INDEXES))
+    elements = st.builds(
+        lambda name, index: f"{name}({index})", st.sampled_from(ARRAYS[kind]), st.sampled_from(INDEXES)
+    )
     return st.sampled_from(SIMPLE[kind]) | elements
 
 
@@ -306,7 +308,9 @@ def test_a_block_that_a_goto_skips_keeps_output_and_state():
 
 
 def test_two_calls_of_one_line_have_two_states():
-    task = ran("CALL RAMP(INPUT=100, ACCEL_RATE=10, OUTPUT=A%) \\ CALL RAMP(INPUT=100, ACCEL_RATE=7, OUTPUT=B%)", scans=2)
+    task = ran(
+        "CALL RAMP(INPUT=100, ACCEL_RATE=10, OUTPUT=A%) \\ CALL RAMP(INPUT=100, ACCEL_RATE=7, OUTPUT=B%)", scans=2
+    )
     assert (task.value("30 RAMP.register"), task.value("30.2 RAMP.register")) == (20, 14)
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from automax_ros.core.types import DataType
 from automax_ros.language.program import Program
-from automax_ros.language.tree import Assignment, Binary, FunctionCall, IntegerLiteral, RealLiteral, Unary, Variable
+from automax_ros.language.tree import Assignment
 from automax_ros.runtime.compiler import compile_program
 from automax_ros.runtime.memory import CommonMemory
 from automax_ros.runtime.task import Task
@@ -101,7 +101,9 @@ def test_bounds_never_leave_out_a_clamp(names, target):
     text = lines(*(f"{target} = {form.format(*names)}" for form in BOUNDED))
     program = program_of(text)
     single = [
-        dataclasses.replace(program, scan=(statement,)) for statement in program.scan if isinstance(statement, Assignment)
+        dataclasses.replace(program, scan=(statement,))
+        for statement in program.scan
+        if isinstance(statement, Assignment)
     ]
     for part in single:
         compiled = compile_program(part, {})
@@ -228,78 +230,8 @@ def test_small_reals_become_zero():
 
 
 def test_strings_are_cut_to_132_in_expressions_and_to_their_length_in_variables():
-    task = ran('S$ = "ABCDEFGHIJ"', 'A% = LEN%(L$ + L$)', 'P$ = S$ + "X"', declare="LOCAL S$, P$:4, L$:100, A%")
+    task = ran('S$ = "ABCDEFGHIJ"', "A% = LEN%(L$ + L$)", 'P$ = S$ + "X"', declare="LOCAL S$, P$:4, L$:100, A%")
     assert task.value("P$") == "ABCD"
     hundred = ["L$ = L$ + S$"] * 10
     task = ran('S$ = "ABCDEFGHIJ"', *hundred, "A% = LEN%(L$ + L$)", declare="LOCAL S$, L$:100, A%")
     assert task.value("A%") == 132
-
-
-def deep_sum(operands: int) -> Binary:
-    expression: object = Variable("R")
-    for number in range(operands - 1):
-        expression = Binary("+-"[number % 2], expression, Variable("Q"))
-    return expression
-
-
-@pytest.mark.parametrize("target", ["R", "D!", "S$", "X@"])
-def test_chains_of_thousands_of_operands_compile(target):
-    """The checker limits a tree's height; the compiler itself must not depend on that."""
-    program = program_of(lines("R = Q"))
-    chains = {
-        "R": deep_sum(5000),
-        "D!": deep_integers(5000),
-        "S$": deep_strings(3000),
-        "X@": Binary("=", deep_sum(2001), Variable("R")),
-    }
-    scan = (Assignment(Variable(target), chains[target], number=100),)
-    compiled = compile_program(dataclasses.replace(program, scan=scan), {})
-    task = Task(compiled, CommonMemory([]))
-    task.state[compiled.layout.index("R")] = 2.0
-    task.state[compiled.layout.index("Q")] = 0.5
-    task.state[compiled.layout.index("A%")] = 3
-    task.run()
-    task.scan(0)
-    assert task.value(target) == {"R": 2.5, "D!": 15000, "S$": "x" * 31, "X@": True}[target]
-
-
-def deep_integers(operands: int) -> Binary:
-    expression: object = Variable("A%")
-    for _ in range(operands - 1):
-        expression = Binary("+", expression, Variable("A%"))
-    return expression
-
-
-def deep_strings(operands: int):
-    from automax_ros.language.tree import StringLiteral
-
-    expression: object = StringLiteral("x")
-    for _ in range(operands - 1):
-        expression = Binary("+", expression, StringLiteral("x"))
-    return expression
-
-
-def test_64_nested_operations_each_with_a_long_chain_compile():
-    """Signs, functions and parentheses do not hide how deep a tree is."""
-    inner: object = Variable("R")
-    for level in range(64):
-        for _ in range(39):
-            inner = Binary("+", inner, RealLiteral(0.0))
-        inner = Unary("-", inner) if level % 2 else FunctionCall("ABS", (inner,))
-    for _ in range(39):
-        inner = Binary("+", inner, IntegerLiteral(0))
-    program = program_of(lines("R = Q"))
-    compiled = compile_program(dataclasses.replace(program, scan=(Assignment(Variable("R"), inner, number=100),)), {})
-    task = Task(compiled, CommonMemory([]))
-    task.state[compiled.layout.index("R")] = 3.0
-    task.run()
-    task.scan(0)
-    assert task.value("R") == -3.0
-
-
-def test_a_statement_of_8192_characters_compiles():
-    terms = " + ".join(f"({' * '.join(['A%'] * 60)})" for _ in range(27))
-    statement = f"D! = {terms}"
-    assert 5000 < len(statement) < 8192
-    task = ran("A% = 1", statement)
-    assert task.value("D!") == 27

@@ -54,7 +54,6 @@ def test_turns_and_the_value_afterwards(loop, head, variable, turns, after):
         ("FOR A% = 0 TO 32767 STEP 20000", "A%", 2, 32767, 7020),
         ("FOR A% = -32767 TO -32768 STEP -1", "A%", 2, -32768, 7020),
         ("FOR D! = 2147483646 TO 2147483647", "D!", 2, 2147483647, 7021),
-        ("FOR R = 8.0E18 TO 9.2E18 STEP 1.0E18", "R", 2, 9.0e18, 0),
         ("FOR R = 9.0E18 TO 9.2E18 STEP 9.0E18", "R", 1, 9.223371487098962e18, 7022),
     ],
 )
@@ -63,8 +62,8 @@ def test_an_increment_out_of_range_is_logged_and_ends_the_loop(loop, head, varia
     task = loop(head, variable)
     assert task.value("C%") == turns
     assert task.value(variable) == pytest.approx(after, rel=1e-6)
-    assert [item for _, item in logged(task)] == ([code] if code else [])
-    assert all(220 <= line <= 230 for line, _ in logged(task))
+    assert [item for _, item in logged(task)] == [code]
+    assert logged(task)[0][0] in (220, 230), "the line of NEXT"
     assert task.value("B%") == 1
 
 
@@ -145,7 +144,9 @@ def test_sixteen_loops_nest_in_both_forms():
         opened = [f"FOR {name} = 1 TO {2 if name == 'V0%' else 1}" for name in variables]
         closed = [f"NEXT {name}" for name in reversed(variables)]
         jump = ["IF N% > 100 THEN 29000"] if jumps else []
-        text = lines(*opened, "N% = N% + 1", *closed, *jump, "29000 N% = N% + 10", declare=f"LOCAL N%, {', '.join(variables)}")
+        text = lines(
+            *opened, "N% = N% + 1", *closed, *jump, "29000 N% = N% + 10", declare=f"LOCAL N%, {', '.join(variables)}"
+        )
         task, _ = task_of(text)
         run_scans(task, 1)
         scan_in_steps(task, 2)

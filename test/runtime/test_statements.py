@@ -171,7 +171,10 @@ def test_read_of_another_kind_gives_zero():
 
 def test_one_read_logs_one_overflow():
     task = ran("READ A%, B%, D!", "DATA 40000, -40000, 1.0E10")
-    assert ([task.value(name) for name in ("A%", "B%", "D!")], logged(task)) == ([32767, -32768, 2**31 - 1], [(30, 7020)])
+    assert ([task.value(name) for name in ("A%", "B%", "D!")], logged(task)) == (
+        [32767, -32768, 2**31 - 1],
+        [(30, 7020)],
+    )
 
 
 def test_restore_goes_back_to_the_start_or_to_a_line():
@@ -278,7 +281,9 @@ def test_io_without_a_module_is_a_bus_error():
 
 
 def test_what_runs_before_scan_loop_uses_actual_memory_once():
-    task, memory = task_of("10 COMMON N%\n20 LOCAL A%\n30 N% = N% + 5\n40 CALL SCAN_LOOP(TICKS=4)\n50 A% = N%\n60 END\n")
+    task, memory = task_of(
+        "10 COMMON N%\n20 LOCAL A%\n30 N% = N% + 5\n40 CALL SCAN_LOOP(TICKS=4)\n50 A% = N%\n60 END\n"
+    )
     memory.write_from_outside(0, 1, OTHER)
     run_scans(task, 3)
     assert (memory.read_now(0), task.value("A%")) == (6, 6)

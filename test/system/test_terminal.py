@@ -56,7 +56,7 @@ def test_terminal_line_is_rewritten_and_fits(colour):
     lines = drawn.split(REDRAW)[1:]
     assert len(lines) >= 3
     for line in lines:
-        assert re.match(r" *\d+\.\d s  \d+ scans/s  \d+x  late 0  REF%=1000", line)
+        assert re.match(r" *\d+\.\d s  \d+ scans/s  \d+x  REF%=1000", line)
         assert len(line) < COLUMNS
         assert "\n" not in line
     assert summary.startswith("ran ")
