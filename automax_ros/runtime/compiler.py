@@ -270,7 +270,7 @@ class _Compilation:
 
 @contextmanager
 def _collections_paused() -> Iterator[None]:
-    """Collect no garbage meanwhile: all of a long task's tree is alive, and looking through it takes most of the time."""
+    """Collect no garbage meanwhile: a long task's tree is all alive, and to look through it takes most of the time."""
     enabled = gc.isenabled()
     gc.disable()
     try:

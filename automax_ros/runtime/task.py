@@ -275,6 +275,8 @@ class Task:
             raise ValueError(f"{name} cannot be {value!r}: that is no number")
         # A limit such as 0.1 is held in single precision too, so the stored value is what must lie inside.
         stored = stored_real(float(value))[0] if symbol.type is DataType.REAL else int(value)
+        if symbol.type is not DataType.REAL and stored != value:
+            raise ValueError(f"{name} = {value} is no whole number")
         if not low <= stored <= high:
             raise ValueError(f"{name} = {value:.8g} lies outside {low:.8g} to {high:.8g}")
         return stored

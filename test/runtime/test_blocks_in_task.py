@@ -10,18 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.coefficients import limited
 from automax_ros.blocks.declaration import Block, Form
-from automax_ros.blocks.instance import Instance
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, type_of_name
 
-from .support import OTHER, TICK, logged, ran, repeatable, run_scans, scan_in_steps, task_of
+from .block_model import SIZE, TICKS, Model, ModelBlock, Programmed
+from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_in_steps, task_of
 
 BLOCKS = [block for block in CATALOGUE.values() if block.step is not None]
-TICKS = 4
-SUBSCRIPT = 7026
-SIZE = 4
 EDGES = st.sampled_from([-32768, -32767, -1, 0, 1, 32766, 32767])
 VALUES = {
     DataType.INTEGER: EDGES | st.integers(-32768, 32767) | st.integers(-50, 50),
@@ -52,18 +48,6 @@ def declarations() -> str:
     local = ", ".join(name for name in names if name.startswith("L"))
     common = ", ".join(name for name in names if name.startswith("K"))
     return f"10 LOCAL {local}\n11 COMMON {common}\n"
-
-
-@dataclasses.dataclass(frozen=True)
-class Programmed:
-    """A CALL: the text of each parameter by keyword."""
-
-    block: Block
-    parameters: dict[str, str]
-
-    def text(self, line: int) -> str:
-        inside = ", ".join(f"{name}={value}" for name, value in self.parameters.items())
-        return f"{line} CALL {self.block.name}({inside})"
 
 
 def variables(kind: DataType) -> st.SearchStrategy[str]:
@@ -102,86 +86,6 @@ def calls(draw, block: Block) -> Programmed:
         if output.required or everything or draw(st.booleans()):
             parameters[output.name] = draw(variables(output.type))
     return Programmed(block, parameters)
-
-
-class Model:
-    """Variables of a task, and a block on them by its step function as it stands."""
-
-    def __init__(self, values: dict[str, object]) -> None:
-        self.values = values
-        self.codes: list[int] = []
-
-    def place(self, text: str) -> tuple[str, int | None]:
-        """Name and flat index of a variable; the index is -1 out of range, None without one."""
-        if "(" not in text:
-            return text, None
-        name, _, index = text[:-1].partition("(")
-        number = int(index) if index.isdigit() else self.values[index]
-        return name, number if 0 <= number < SIZE else -1
-
-    def read(self, text: str):
-        if text in ("TRUE", "FALSE"):
-            return text == "TRUE"
-        if text[0] == "-" and text[1].isalpha():
-            return not self.read(text[1:])
-        if text[0] in "-0123456789":
-            return float(text) if "." in text else int(text)
-        name, index = self.place(text)
-        if index == -1:
-            self.codes.append(SUBSCRIPT)
-            return type_of_name(name).zero
-        return self.values[name] if index is None else self.values[name][index]
-
-    def write(self, text: str, value) -> None:
-        name, index = self.place(text)
-        if index == -1:
-            self.codes.append(SUBSCRIPT)
-        elif index is None:
-            self.values[name] = value
-        else:
-            self.values[name][index] = value
-
-
-class ModelBlock:
-    def __init__(self, call: Programmed) -> None:
-        self.call = call
-        self.inputs = {
-            item.variable: call.parameters[item.name] for item in call.block.inputs if item.name in call.parameters
-        }
-        self.outputs = {
-            item.variable: (call.parameters[item.name], item.holds)
-            for item in call.block.outputs
-            if item.name in call.parameters
-        }
-        fixed = {name: text for name, text in self.inputs.items() if text.lstrip("-")[0] not in "LK"}
-        self.fixed = {name: Model({}).read(text) for name, text in fixed.items()}
-        self.instance = Instance(call.block, TICKS * TICK, **self.fixed)
-        self.was_limited = False
-
-    def scan(self, model: Model) -> None:
-        given_now = {name: model.read(text) for name, text in self.inputs.items() if name not in self.fixed}
-        before = {}
-        for name, (text, holds) in self.outputs.items():
-            if holds:
-                before[name] = self.instance.outputs[name] = model.read(text)
-        results = self.instance.scan(**given_now)
-        self._note_limits(model, given_now)
-        if self.call.block.logs and self.instance.error:
-            model.codes.append(self.instance.error)
-        for name, (text, holds) in self.outputs.items():
-            if not holds or results[name] != before[name]:
-                model.write(text, results[name])
-
-    def _note_limits(self, model: Model, given_now) -> None:
-        declared = self.call.block.coefficients
-        if declared is None:
-            return
-        everything = {**self.fixed, **given_now}
-        reals = {name: everything[name.lower()] for name in declared.parameters if name.lower() in everything}
-        moved = bool(limited(declared, TICKS * TICK / 1e9, reals)[1])
-        if moved and not self.was_limited:
-            model.codes.append(7004)
-        self.was_limited = moved
 
 
 @st.composite
@@ -321,7 +225,7 @@ def test_a_block_in_a_loop_runs_once_a_turn_on_one_state():
 
 def test_a_coefficient_out_of_its_limits_is_logged_when_it_goes_out():
     """Semantics, Coefficients: on the scan in which it goes out of range, not on every scan."""
-    text = "10 COMMON GAIN\n11 LOCAL A%, B%\n20 CALL SCAN_LOOP(TICKS=4)\n30 CALL LAG(INPUT=A%, WLG=GAIN, OUTPUT=B%)\n40 END\n"
+    text = lines("CALL LAG(INPUT=A%, WLG=GAIN, OUTPUT=B%)", declare="LOCAL A%, B% \\ COMMON GAIN")
     task, memory = task_of(text, GAIN=5.0)
     task.run()
     counts = []

@@ -1,4 +1,4 @@
-"""Expressions of BASIC: 32 bits with clamps, truncation, one overflow a statement, no short circuit (semantics, BASIC)."""
+"""Expressions of BASIC: 32 bits with clamps, truncation, one overflow a statement, no short circuit (semantics)."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def agree_on_statement(data, statement: str) -> None:
 
 
 @given(st.data(), statements())
-@repeatable(150)
+@repeatable(70)
 def test_compiled_expressions_are_those_of_the_interpreter(data, statement):
     agree_on_statement(data, statement)
 

@@ -39,7 +39,7 @@ def scan(request):
 
 
 def test_blocks_see_the_latch_and_basic_sees_the_present(scan):
-    task, memory = task_of(SEEN, Restless, **{"REF%": 7})
+    task, _ = task_of(SEEN, Restless, **{"REF%": 7})
     task.run()
     scan(task, 0)
     assert [task.value(name) for name in ("BASIC1%", "BLOCK1%", "BLOCK2%", "BASIC2%")] == [7, 7, 7, 1007]

@@ -95,15 +95,25 @@ def long_task(kind: str, count: int) -> str:
     return lines(*text).replace("30000 END", "32000 END")
 
 
-@pytest.mark.parametrize("kind", ["assignments", "blocks", "jumps"])
-def test_tasks_of_5000_lines_compile_and_run(kind):
-    text = long_task(kind, 5000)
-    program = program_of(text)
-    compiled = []
-    assert timed(lambda: compiled.append(compile_program(program, {}))) < 60
+LONG = pytest.mark.parametrize("kind", ["assignments", "blocks", "jumps"])
+
+
+@LONG
+def test_tasks_of_500_lines_compile_and_run(kind):
     task, _ = task_of(long_task(kind, 500))
     run_scans(task, 2)
     assert task.status is Status.RUNNING
+
+
+@pytest.mark.soak
+@LONG
+def test_tasks_of_5000_lines_compile_and_run(kind):
+    program = program_of(long_task(kind, 5000))
+    assert timed(lambda: compile_program(program, {})) < 60
+    task, _ = task_of(long_task(kind, 5000))
+    run_scans(task, 2)
+    scan_in_steps(task, 3)
+    assert (task.status, task.scan_number) == (Status.RUNNING, 3)
 
 
 def test_a_task_of_nested_conditions_compiles_in_both_forms():
@@ -186,7 +196,8 @@ def test_generated_code_knows_nothing_but_its_own_helpers():
     for node in ast.walk(ast.parse(compiled.source)):
         assert not isinstance(node, (ast.Import, ast.ImportFrom, ast.Global, ast.Lambda))
         if isinstance(node, ast.Attribute):
-            assert (node.attr == "append" or node.value.id == "io") and not node.attr.startswith("_")
+            assert node.attr == "append" or node.value.id == "io"
+            assert not node.attr.startswith("_")
         if isinstance(node, ast.Call):
             called.add(node.func.id if isinstance(node.func, ast.Name) else node.func.attr)
     assert called <= ALLOWED_CALLS

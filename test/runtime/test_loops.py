@@ -104,7 +104,7 @@ def test_a_subroutine_may_set_the_variable():
 
 @pytest.mark.parametrize("scan", [Task.scan, scan_in_steps], ids=["at once", "in steps"])
 def test_a_common_as_variable_is_actual_memory(scan):
-    text = "10 COMMON K%\n20 LOCAL N%\n30 CALL SCAN_LOOP(TICKS=4)\n40 FOR K% = 1 TO 3\n50 N% = N% + K%\n60 NEXT K%\n70 END\n"
+    text = lines("FOR K% = 1 TO 3", "N% = N% + K%", "NEXT K%", declare="COMMON K% \\ LOCAL N%")
     task, memory = task_of(text)
     memory.keep_log()
     task.run()
@@ -154,7 +154,7 @@ def test_sixteen_loops_nest_in_both_forms():
 
 
 def test_writes_of_others_between_scans_do_not_disturb_a_loop():
-    text = "10 COMMON K%\n20 LOCAL N%, I%\n30 CALL SCAN_LOOP(TICKS=4)\n40 FOR I% = 1 TO K%\n50 N% = N% + 1\n60 NEXT I%\n70 END\n"
+    text = lines("FOR I% = 1 TO K%", "N% = N% + 1", "NEXT I%", declare="COMMON K% \\ LOCAL N%, I%")
     task, memory = task_of(text)
     task.run()
     for limit in (3, 0, 5):

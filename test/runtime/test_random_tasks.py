@@ -89,13 +89,13 @@ def agree_in_both_forms(text: str, history) -> None:
 
 
 @given(tasks(), HISTORY)
-@repeatable(50)
+@repeatable(40)
 def test_compiled_tasks_do_what_the_interpreter_does(text, history):
     agree_with_interpreter(text, history)
 
 
 @given(tasks(), HISTORY)
-@repeatable(50)
+@repeatable(25)
 def test_both_forms_of_a_scan_agree(text, history):
     agree_in_both_forms(text, history)
 
@@ -115,7 +115,7 @@ def test_both_forms_of_a_scan_agree_long(text, history):
 
 
 @given(tasks(), HISTORY, st.integers(0, 2))
-@repeatable(25)
+@repeatable(15)
 def test_a_snapshot_goes_on_as_the_task_would_have(text, history, after):
     program = checked(text)
     task, memory = installed(program)
