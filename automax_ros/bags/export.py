@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
@@ -29,6 +30,7 @@ def export_csv(bag: Path, output: Path, watch: Sequence[str] | None = None) -> i
         BagError: the recording cannot be read or has no common memory, a name in ``watch`` is unknown, or the output
             cannot be written.
     """
+    _require_another_file(bag, output)
     rows = _rows(bag, BagReader(bag), watch)
     header = next(rows)
     count = 0
@@ -42,6 +44,15 @@ def export_csv(bag: Path, output: Path, watch: Sequence[str] | None = None) -> i
     except OSError as error:
         raise BagError("AMX6824", output, f"cannot be written: {error.strerror or error}") from error
     return count
+
+
+def _require_another_file(bag: Path, output: Path) -> None:
+    """Refuse to write over the recording that is read."""
+    own = [bag] if bag.is_file() else [*bag.glob("*.mcap*"), bag / "metadata.yaml"]
+    for file in own:
+        with contextlib.suppress(OSError):  # one of them does not exist
+            if output.samefile(file):
+                raise BagError("AMX6824", output, "belongs to the recording itself", "name another file")
 
 
 def _rows(bag: Path, reader: BagReader, watch: Sequence[str] | None) -> Iterator[list[str]]:

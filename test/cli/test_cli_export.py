@@ -48,3 +48,13 @@ def test_terminal_is_told_the_rows(automax, bag, monkeypatch):
     result = automax("export", bag, "--output", "OUT.csv", "--watch", "REF%")
     rows = len((automax.folder / "OUT.csv").read_text().splitlines()) - 1
     assert result.err == f"OUT.csv: {rows} rows\n"
+
+
+@pytest.mark.parametrize("own", ["metadata.yaml", "scans_0.mcap"])
+def test_recording_is_never_written_over(automax, bag, own):
+    before = {file.name: file.read_bytes() for file in (automax.folder / bag).iterdir()}
+    assert own in before
+    result = automax("export", bag, "--output", f"{bag}/{own}")
+    assert result.code == 2
+    assert "belongs to the recording itself" in result.err
+    assert {file.name: file.read_bytes() for file in (automax.folder / bag).iterdir()} == before
