@@ -32,3 +32,42 @@ _BLOCKS: tuple[Block, ...] = (
 
 CATALOGUE: dict[str, Block] = {block.name: block for block in sorted(_BLOCKS, key=lambda block: block.name)}
 """Every control block, in alphabetical order."""
+
+NOT_YET: frozenset[str] = frozenset(
+    {
+        "ABSOLUTE_VALUE",
+        "ALARM",
+        "AMPLIFIER",
+        "BIT_SELECT",
+        "COMPARE",
+        "COUNTER",
+        "DC_DRIVE_CML",
+        "DIFF_LAG",
+        "FUNCTION",
+        "HIGH_PASS_FILTER",
+        "INVERTER",
+        "LEAD_LAG",
+        "LOW_PASS_FILTER",
+        "MOVE",
+        "MULTIPLY_DIVIDE",
+        "NOTCH",
+        "NOTCHN",
+        "PACK_BITS",
+        "PID",
+        "READ_BITS",
+        "READ_WORDS",
+        "RUNNING_AVERAGE",
+        "SAMPLED_AVERAGE",
+        "SEARCH",
+        "SELECT",
+        "SHIFT_BITS",
+        "SHIFT_WORDS",
+        "S_CURVE",
+        "TACHLOSS_OVERSPEED",
+        "THERMAL_OVERLOAD",
+        "UNPACK_BITS",
+        "WRITE_BITS",
+        "WRITE_WORDS",
+    }
+)
+"""Blocks of the manual that the emulator does not have yet."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from automax_ros.blocks.catalogue import NOT_YET
 from automax_ros.blocks.declaration import Block, Input, Output, Processor
 from automax_ros.blocks.rules import Contiguous
 from automax_ros.core.diagnostics import Note, Span
@@ -24,8 +25,12 @@ def check_call(context: Context, call: Call) -> None:
     """Report what is wrong in a CALL; bind it to its block where nothing is."""
     block = context.catalogue.get(call.block)
     if block is None:
+        message = f"there is no block {call.block}"
         hint = context.suggest.hint(call.block, context.catalogue)
-        context.report("AMX4070", f"there is no block {call.block}", context.place_of(call.block, call.span), hint)
+        if call.block in NOT_YET:
+            message = f"the emulator does not have the block {call.block} yet"
+            hint = "`automax blocks` lists those it has"
+        context.report("AMX4070", message, context.place_of(call.block, call.span), hint)
         return
     before = len(context.diagnostics)
     if context.target not in block.runs_on:

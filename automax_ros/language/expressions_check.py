@@ -5,6 +5,8 @@ A type of None means that an error inside was reported and hides the type; nothi
 
 from __future__ import annotations
 
+import re
+
 from automax_ros.core.numbers import INT32_MAX
 from automax_ros.core.types import DataType, bare_name
 from automax_ros.language.check_context import Context
@@ -32,6 +34,9 @@ from automax_ros.language.typing_rules import (
     spine,
     unary_type,
 )
+
+_HEXADECIMAL = re.compile(r"[A-F][0-9A-F]{0,7}H")
+"""A name that looks like a hexadecimal constant without its leading 0."""
 
 
 def check_expression(context: Context, expression: Expression) -> DataType | None:
@@ -178,7 +183,13 @@ def _report_undeclared(context: Context, target: Variable | Element) -> None:
         return
     known = set(context.symbols) | FUNCTIONS.keys() if isinstance(target, Element) else context.symbols
     hint = context.suggest.hint(target.name, known)
-    context.report("AMX4001", f"{target.name} is not declared", target.span, hint or "declare it with LOCAL or COMMON")
+    context.report("AMX4001", f"{target.name} is not declared", target.span, hint or _undeclared_hint(target.name))
+
+
+def _undeclared_hint(name: str) -> str:
+    if _HEXADECIMAL.fullmatch(name):
+        return f"a hexadecimal constant begins with a digit: 0{name}"
+    return "declare it with LOCAL or COMMON"
 
 
 def _has_twin(context: Context, name: str) -> bool:
