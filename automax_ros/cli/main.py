@@ -57,8 +57,10 @@ def _run(argv: list[str]) -> int:
         if name is not None and name not in SUBCOMMANDS:
             raise _unknown(name)
         module = _module(name) if name is not None else None
-        parser = _parser(name, module)
-        arguments = parser.parse_args(argv)
+        parser, own = _parser(name, module)
+        arguments, unknown = parser.parse_known_args(argv)
+        if unknown:
+            own.error(f"unrecognized arguments: {' '.join(unknown)}")
         if module is None:
             parser.print_help(sys.stderr)
             return 2
@@ -70,10 +72,11 @@ def _run(argv: list[str]) -> int:
         return _exit_code(stop.code)
 
 
-def _parser(chosen: str | None, module: ModuleType | None) -> argparse.ArgumentParser:
-    """Return the parser of the whole command line, where only the chosen subcommand knows its arguments."""
+def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.ArgumentParser, argparse.ArgumentParser]:
+    """Return the parser of the whole command line and the chosen subcommand's, which alone knows its arguments."""
     parser = argparse.ArgumentParser(prog="automax", description="A Reliance Electric AutoMax rack, emulated.")
     parser.add_argument("--version", action="version", version=f"automax {__version__}")
+    chosen_parser = parser
     subcommands = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND")
     for name, text in SUBCOMMANDS.items():
         own = module if name == chosen else None
@@ -85,7 +88,8 @@ def _parser(chosen: str | None, module: ModuleType | None) -> argparse.ArgumentP
         )
         if own is not None:
             own.add_arguments(subparser)
-    return parser
+            chosen_parser = subparser
+    return parser, chosen_parser
 
 
 def _module(name: str) -> ModuleType:

@@ -24,7 +24,8 @@ from automax_ros.rack.rack import Rack, RackError
 from automax_ros.rack.settings import SettingError, Watched, setting, watched
 
 WITHOUT_ROS = "or run with --simulated, which needs no ROS"
-_UNREADABLE = frozenset({"AMX6000", "AMX6001", "AMX6002"})
+_CANNOT_BE_READ = "AMX6000"
+_NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -106,8 +107,11 @@ def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:
     from automax_ros.rack.loader import load
 
     result = load(path, allow_outside=allow_outside)
+    for item in result.diagnostics:
+        if item.code == _CANNOT_BE_READ:
+            raise UsageError(f"{path}: {item.message}")
     print_diagnostics(result.diagnostics, result.source, sys.stderr)
-    if any(item.code in _UNREADABLE for item in result.diagnostics):
+    if any(item.code in _NOT_A_TEXT for item in result.diagnostics):
         raise UsageError(f"{path} cannot be used")
     return result.config if not has_errors(result.diagnostics) else None
 

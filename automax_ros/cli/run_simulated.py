@@ -42,6 +42,7 @@ def run_simulated(
         while not stop.requested and rack.stop_reason is None and (duration_ns is None or rack.now_ns < duration_ns):
             end = rack.now_ns + SLICE_NS
             rack.scheduler.run_until(end if duration_ns is None else min(end, duration_ns))
+            display.printed()
             display.update(rack.now_ns)
     finally:
         if recorder is not None:

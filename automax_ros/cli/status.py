@@ -45,6 +45,12 @@ class StatusDisplay:
         self._clear()
         print(text, flush=True)
 
+    def printed(self) -> None:
+        """Show what PRINT statements have written since the last call."""
+        for task in self._rack.tasks:
+            while task.printed:
+                self.message(f"{task.name}: {printable(task.printed.popleft())}")
+
     def finish(self, bag: Path | None) -> None:
         """Print the last state and the summary."""
         wall = time.monotonic_ns()
@@ -85,13 +91,11 @@ class StatusDisplay:
             parts.append(f"{(now_ns - self._last_rack_ns) / max(1, wall - self._last):.0f}x")
         parts += self._values()
         self._last, self._last_rack_ns, self._last_scans = wall, now_ns, scans
-        line = "  ".join(parts)
         if self._terminal:
-            width = shutil.get_terminal_size().columns - 1
-            sys.stdout.write(f"\r\x1b[K{line[:width]}")
+            sys.stdout.write(f"\r\x1b[K{_fitting(parts, shutil.get_terminal_size().columns - 1)}")
             self._drawn = True
         else:
-            sys.stdout.write(line + "\n")
+            sys.stdout.write("  ".join(parts) + "\n")
         sys.stdout.flush()
 
     def _load(self, processor: Processor, wall: int) -> str:
@@ -109,6 +113,16 @@ class StatusDisplay:
         if self._drawn:
             sys.stdout.write("\r\x1b[K")
             self._drawn = False
+
+
+def _fitting(parts: Sequence[str], width: int) -> str:
+    """Return as many parts as a line holds: none is cut, for half a number is a wrong one."""
+    line = parts[0][:width]
+    for part in parts[1:]:
+        if len(line) + 2 + len(part) > width:
+            break
+        line += f"  {part}"
+    return line
 
 
 def _shown(value: Value) -> str:

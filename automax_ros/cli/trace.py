@@ -94,11 +94,13 @@ class _Trace:
         """Scan once for each row, until the table or the task ends."""
         task, period = self._lone.task, self._lone.task.period_ns
         self._write_errors(task.run())
+        self._show_printed()
         if not self._runs():
             return
         for number, _ in enumerate(table.rows()):
             time_ns = number * period
             self._write_errors(task.scan(time_ns))
+            self._show_printed()
             cells = [text_of(read()) for read, text_of in self._cells]
             self._output.writerow([str(number + 1), seconds_text(time_ns), *cells])
             if not self._runs():
@@ -108,6 +110,12 @@ class _Trace:
 
     def _runs(self) -> bool:
         return self._lone.task.status is Status.RUNNING
+
+    def _show_printed(self) -> None:
+        """Pass on the lines of PRINT, beside the table."""
+        task = self._lone.task
+        while task.printed:
+            print(f"{task.name}: {printable(task.printed.popleft())}", file=sys.stderr)
 
     def _write_errors(self, record: ScanRecord | None) -> None:
         if self._errors is None or record is None:

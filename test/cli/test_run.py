@@ -153,7 +153,8 @@ def test_unreadable_file_is_wrong_usage(automax, tmp_path):
     for name in ("missing.yaml", "."):
         result = automax("run", name, "--simulated", "--duration", "1")
         assert result.code == 2, name
-        assert result.err.endswith(f"automax run: error: {name} cannot be used\n")
+        assert result.err.startswith(f"automax run: error: {name}: the rack file "), result.err
+        assert result.err.count("\n") == 1
 
 
 def test_text_that_is_no_yaml_is_wrong_usage(automax):
@@ -247,3 +248,24 @@ def test_text_of_a_string_cannot_drive_the_terminal(rack, capsys):
     rack.start([("NOTE$", "\x1b[2Jx\r\n")])
     display.finish(None)
     assert "NOTE$=\N{REPLACEMENT CHARACTER}[2Jx" in capsys.readouterr().out
+
+
+def test_unknown_option_shows_the_usage_of_run(automax):
+    result = automax("run", "rack.yaml", "--simulate-d")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith("usage: automax run ")
+    assert result.err.endswith("automax run: error: unrecognized arguments: --simulate-d\n")
+
+
+def test_printed_lines_are_shown(automax):
+    automax.write("TASK.BLK", TASK.replace("130 END", '130 PRINT "REF", REF%\n140 END'))
+    result = automax("run", automax.write("rack.yaml", RACK), "--simulated", "--duration", "0.02")
+    assert result.out.splitlines()[0].startswith("TASK: REF ")
+
+
+def test_no_part_of_the_status_line_is_cut():
+    parts = ["  1.0 s", "291 scans/s", "LINE_REF%=1286", "SECT_REF%=1286"]
+    whole = "  ".join(parts)
+    assert status_module._fitting(parts, len(whole)) == whole
+    assert status_module._fitting(parts, len(whole) - 1) == "  ".join(parts[:3])
+    assert status_module._fitting(parts, 4) == "  1."
