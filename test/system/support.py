@@ -49,8 +49,12 @@ class Automax:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.wait()
+        self.process.terminate()  # a process that is killed leaves its shared memory behind
+        try:
+            self.process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
         for reader in self._readers:
             reader.join()
 
@@ -65,13 +69,7 @@ class Automax:
 
     def wait_until_catching(self, number: signal.Signals) -> None:
         """Wait until the process handles a signal itself."""
-        status = Path(f"/proc/{self.pid}/status")
-
-        def catches() -> bool:
-            caught = re.search(r"^SigCgt:\s*([0-9a-f]+)", status.read_text(), re.MULTILINE)
-            return caught is not None and bool(int(caught[1], 16) >> (number - 1) & 1)
-
-        wait_until(catches, pause_s=0.001)
+        wait_until(lambda: catches(self.pid, number), pause_s=0.001)
 
     def send(self, number: signal.Signals) -> None:
         self.process.send_signal(number)
@@ -99,6 +97,12 @@ def automax(*arguments: str | Path, environment: dict[str, str] | None = None) -
     """Run `automax` to its end."""
     with Automax(*arguments, environment=environment) as process:
         return process.end()
+
+
+def catches(pid: int, number: signal.Signals) -> bool:
+    """Whether a process handles a signal itself."""
+    caught = re.search(r"^SigCgt:\s*([0-9a-f]+)", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
+    return caught is not None and bool(int(caught[1], 16) >> (number - 1) & 1)
 
 
 def wait_until(condition: Callable[[], bool], pause_s: float = 0.02) -> None:
@@ -135,7 +139,7 @@ class Client:
         self.node.destroy_node()
         self.context.try_shutdown()
 
-    def listen(self, kind: Any, topic: str, *, latched: bool = False, depth: int = 1000) -> list[Any]:
+    def listen(self, kind: Any, topic: str, *, latched: bool = False, depth: int = 50_000) -> list[Any]:
         """Subscribe, and return the list to which messages are added while the client waits."""
         from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 

@@ -135,7 +135,10 @@ def test_two_racks_share_a_domain(running, module_domain_id):
 def test_killed_rack_leaves_the_name_free(ros_domain_id):
     with Automax("run", TYPES) as process:
         process.wait_for_line(READY)
+        mapped = shared_memory(process.pid)
         assert process.end(signal.SIGKILL).code == -signal.SIGKILL
+    for name in mapped:
+        Path(name).unlink(missing_ok=True)
     ended = automax("run", TYPES, "--duration", "0.1")
     assert (ended.code, ended.err) == (0, "")
 

@@ -14,14 +14,17 @@ from collections.abc import Callable
 
 import pytest
 
-from .support import COMMAND, PATIENCE_S, ROOT, TYPES, automax
+from .support import COMMAND, PATIENCE_S, ROOT, TYPES, automax, catches
 
 COLUMNS = 60
 REDRAW = "\r\x1b[K"
 
 
-def on_terminal(until: Callable[[str], bool], **environment: str) -> str:
-    """Run the rack in simulated time on a terminal of 60 columns until its output satisfies; then Ctrl-C."""
+def on_terminal(until: Callable[[str, float], bool], **environment: str) -> str:
+    """Run the rack in simulated time on a terminal of 60 columns, then Ctrl-C; return all that was shown.
+
+    ``until`` is asked with the text so far, and for how many seconds the program has been ready for Ctrl-C.
+    """
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, COLUMNS, 0, 0))
     surroundings = {key: value for key, value in os.environ.items() if key not in {"COLUMNS", "LINES", "NO_COLOR"}}
@@ -31,6 +34,7 @@ def on_terminal(until: Callable[[str], bool], **environment: str) -> str:
     )
     os.close(slave)
     text, asked = "", False
+    ready: float | None = None
     deadline = time.monotonic() + PATIENCE_S
     try:
         while time.monotonic() < deadline:
@@ -39,7 +43,9 @@ def on_terminal(until: Callable[[str], bool], **environment: str) -> str:
                     text += os.read(master, 65536).decode()
                 except OSError:  # the other end is closed
                     break
-            if not asked and until(text):
+            if ready is None and catches(process.pid, signal.SIGTERM):
+                ready = time.monotonic()
+            if not asked and ready is not None and until(text, time.monotonic() - ready):
                 asked = True
                 process.send_signal(signal.SIGINT)
         assert process.wait(PATIENCE_S) == 0
@@ -51,7 +57,7 @@ def on_terminal(until: Callable[[str], bool], **environment: str) -> str:
 
 @pytest.mark.parametrize("colour", [{}, {"NO_COLOR": "1"}], ids=["colour", "no colour"])
 def test_terminal_line_is_rewritten_and_fits(colour):
-    text = on_terminal(lambda text: text.count(REDRAW) >= 3, TERM="xterm", **colour)
+    text = on_terminal(lambda text, _: text.count(REDRAW) >= 3, TERM="xterm", **colour)
     drawn, summary = text.rsplit(REDRAW, 1)
     lines = drawn.split(REDRAW)[1:]
     assert len(lines) >= 3
@@ -66,8 +72,7 @@ def test_terminal_line_is_rewritten_and_fits(colour):
 
 
 def test_dumb_terminal_gets_no_control_sequences():
-    began = time.monotonic()
-    text = on_terminal(lambda _: time.monotonic() - began > 1.5, TERM="dumb")
+    text = on_terminal(lambda _, seconds: seconds > 1.5, TERM="dumb")
     assert "\x1b" not in text
     assert "ran " in text
 
