@@ -22,7 +22,7 @@ _Cell = float | str | None
 def export_csv(bag: Path, output: Path, watch: Sequence[str] | None = None) -> int:
     """Write the watched variables of a recording to a CSV file; return the number of rows below the header.
 
-    Columns are ``time_s`` and the variables with their type characters. A value holds until it changes; a cell is empty
+    Columns are ``time_s``, counted from the start of the run, and the variables with their type characters. A value holds until it changes; a cell is empty
     as long as the recording has not told the value. Booleans are 0 and 1. Without ``watch`` all simple numeric and
     boolean variables are taken; array elements are named like ``TABLE%(3)``. Memory does not grow with the recording.
 
@@ -101,7 +101,7 @@ def _watched_memory(bag: Path, table: VariableTable, watch: Sequence[str] | None
     except WatchError as error:
         raise BagError("AMX6821", bag, str(error), error.hint) from error
     strings = frozenset(entry.id for entry in variables.values() if entry.type == VariableType.STRING)
-    return _WatchedMemory(watched, strings)
+    return _WatchedMemory(watched, strings, table.stamp)
 
 
 class _CommonLog:
@@ -150,11 +150,11 @@ class _CommonLog:
 
 
 class _WatchedMemory:
-    """The watched variables as the log has told them so far."""
+    """The watched variables as the log has told them so far; ``origin`` is the instant at which the run began."""
 
-    def __init__(self, watched: Sequence[Watched], strings: Collection[int]) -> None:
+    def __init__(self, watched: Sequence[Watched], strings: Collection[int], origin: int) -> None:
         self.header = ["time_s", *(item.label for item in watched)]
-        self._time = 0
+        self._origin = self._time = origin
         self._strings = strings
         self._columns = {(item.variable, item.element): index for index, item in enumerate(watched)}
         self._formats = [_FORMATS[item.kind] for item in watched]
@@ -177,7 +177,7 @@ class _WatchedMemory:
                 self._cells[index] = self._formats[index](value)
                 differs = True
         self._changes.clear()
-        return [seconds_text(self._time), *self._cells] if differs else None
+        return [seconds_text(max(0, self._time - self._origin)), *self._cells] if differs else None
 
     def apply(self, values: Values) -> None:
         """Take over the values of one message.

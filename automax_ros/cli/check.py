@@ -14,6 +14,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from automax_ros.blocks.declaration import Processor
 from automax_ros.cli.task_files import Target, add_target_arguments, check_task_file, name_warning, target_of
 from automax_ros.cli.terminal import count_of, print_diagnostics
 from automax_ros.cli.usage import UsageError
@@ -51,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Check all files; one that cannot be read does not keep the others from being checked."""
     target = target_of(arguments)
+    _refuse_idle_options(arguments)
     findings: list[_Findings] = []
     unusable = 0
     for path in arguments.files:
@@ -71,6 +73,13 @@ def run(arguments: argparse.Namespace) -> int:
     if unusable or any(item.code in _NOT_A_TEXT for item in diagnostics):
         return 2
     return 1 if has_errors(diagnostics) else 0
+
+
+def _refuse_idle_options(arguments: argparse.Namespace) -> None:
+    """Refuse ``--target`` and ``--tick-ms`` where no file heeds them: a rack file says itself what runs its tasks."""
+    given = arguments.tick_ms is not None or arguments.target != Processor.AUTOMAX.value
+    if given and all(path.suffix.upper() in _RACK_SUFFIXES for path in arguments.files):
+        raise UsageError("--target and --tick-ms are for tasks given by themselves", "a rack file has `tick_ms:`")
 
 
 def _task_file(path: Path, target: Target) -> list[_Findings]:

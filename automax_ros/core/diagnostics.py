@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 
 from automax_ros.core.problems import PROBLEMS, Severity
 
 TAB_STOP = 8
+LONGEST_EXCERPT = 160
+"""Most characters of a source line that are shown: a line of a megabyte must not be printed with every finding."""
 
 
 @dataclass(frozen=True, order=True)
@@ -59,7 +62,7 @@ class SourceText:
     name: str
     text: str
 
-    @property
+    @cached_property
     def lines(self) -> list[str]:
         """The physical lines without their ends; CR LF, LF and CR all end a line."""
         return self.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -119,11 +122,15 @@ def _place(source: SourceText, span: Span) -> str:
 def _excerpt(span: Span, lines: list[str]) -> list[str]:
     if not 1 <= span.line <= len(lines):
         return []
-    line = printable(lines[span.line - 1])
-    start = min(max(span.column - 1, 0), len(line))
-    length = max(1, min(span.end_column, len(line) + 2) - span.column)
-    pad = "".join("\t" if char == "\t" else " " for char in line[:start])
-    return [f"  {line}", f"  {pad}{'^' * length}"]
+    whole = lines[span.line - 1]
+    left_out = max(0, min(span.column - LONGEST_EXCERPT // 3, len(whole) - LONGEST_EXCERPT))
+    line = printable(whole[left_out : left_out + LONGEST_EXCERPT])
+    column, end_column = span.column - left_out, span.end_column - left_out
+    start = min(max(column - 1, 0), len(line))
+    before, behind = "..." if left_out else "", "..." if left_out + len(line) < len(whole) else ""
+    length = max(1, min(end_column, len(line) + (1 if behind else 2)) - column)
+    pad = " " * len(before) + "".join("\t" if char == "\t" else " " for char in line[:start])
+    return [f"  {before}{line}{behind}", f"  {pad}{'^' * length}"]
 
 
 def printable(text: str) -> str:

@@ -10,8 +10,10 @@ import struct
 
 INT16_MIN, INT16_MAX = -32768, 32767
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
-REAL_MAX = struct.unpack("<f", struct.pack("<f", 9.2233717e18))[0]
+REAL_LIMIT = 9.2233717e18
 """Largest magnitude of a REAL (2.4.2)."""
+REAL_MAX: float = struct.unpack("<f", struct.pack("<f", REAL_LIMIT))[0]
+"""What a REAL variable holds of it: the nearest single-precision value, which is a little smaller."""
 REAL_MIN_POSITIVE = 5.4210107e-20
 REAL_MIN_NEGATIVE = 2.7105054e-20
 """Smallest magnitude of a negative REAL (2.4.2); below it a value becomes 0 (decision)."""
@@ -54,9 +56,9 @@ def stored_real(value: float) -> tuple[float, bool]:
     if math.isnan(value):
         return 0.0, True
     if value > REAL_MAX:
-        return REAL_MAX, True
+        return REAL_MAX, value > REAL_LIMIT
     if value < -REAL_MAX:
-        return -REAL_MAX, True
+        return -REAL_MAX, value < -REAL_LIMIT
     if -REAL_MIN_NEGATIVE < value < REAL_MIN_POSITIVE:
         return 0.0, False
     single: float = _SINGLE.unpack(_SINGLE.pack(value))[0]

@@ -47,10 +47,14 @@ def _exact(number: float | str, what: str) -> Fraction:
     """Return a number as it is written; a huge exponent is refused before it takes memory."""
     text = str(number).strip()
     try:
-        if len(text) > _LONGEST_NUMBER or not abs(float(text)) < _LARGEST_NUMBER:
-            raise ValueError(text[:_LONGEST_NUMBER])
+        if len(text) > _LONGEST_NUMBER:
+            raise ValueError(text)
+        if abs(float(text)) >= _LARGEST_NUMBER:
+            raise OverflowError(text)
         tiny = float(text) != 0.0 and abs(float(text)) < 1.0 / _LARGEST_NUMBER
         return Fraction(0) if tiny or float(text) == 0.0 else Fraction(text)
+    except OverflowError as error:
+        raise ValueError(f"{what} {text} is too large") from error
     except ValueError as error:
         raise ValueError(f"{what} {text[:_LONGEST_NUMBER]!r} is not a number") from error
 

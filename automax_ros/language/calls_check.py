@@ -58,7 +58,7 @@ def check_scan_loop(context: Context, call: Call) -> None:
     ticks = next((item.value for item in call.arguments if item.keyword == "TICKS"), None)
     if not isinstance(ticks, IntegerLiteral):
         return
-    if context.target is Processor.UDC and ticks.value > UDC_MAX_TICKS:
+    if context.target is Processor.UDC and UDC_MAX_TICKS < ticks.value <= MAX_TICKS:
         message = f"TICKS = {ticks.value} is above {UDC_MAX_TICKS}, the maximum of a UDC task"
         context.report("AMX4085", message, ticks.span, "a UDC's tick is 0.5 ms, its longest scan 10 ms")
     elif 1 <= ticks.value <= MAX_TICKS:

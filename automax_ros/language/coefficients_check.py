@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
+from automax_ros.blocks.coefficients import bounds_of
 from automax_ros.blocks.declaration import Block, Limit
 from automax_ros.language.check_context import Context
 from automax_ros.language.tree import Expression, RealLiteral
@@ -35,7 +36,7 @@ def check_coefficients(
 def _bounds(limit: Limit, period: float, values: dict[str, float]) -> tuple[float, float] | None:
     """Return the limits as numbers, None where a parameter without limits of its own makes them no numbers."""
     try:
-        return limit.low(period, values), limit.high(period, values)
+        return bounds_of(limit, period, values)
     except (ArithmeticError, ValueError):
         return None
 

@@ -86,8 +86,10 @@ def fits(value: Value, kind: DataType) -> bool:
     """Return whether a number, its fraction cut off for an integer, lies in the range of a numeric type."""
     if isinstance(value, (bool, str)) or not kind.is_numeric:
         return True
+    if kind is DataType.REAL:
+        return not stored_real(float(value))[1]
     low, high = RANGES[kind]
-    if isinstance(value, float) and kind.is_integer:
+    if isinstance(value, float):
         return low - 1 < value < high + 1
     return low <= value <= high
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.core.numbers import sign_extended
+from automax_ros.core.numbers import REAL_LIMIT, sign_extended
 from automax_ros.language.tokens import Fault
 
 HEX_DIGITS = 8
@@ -10,7 +10,7 @@ REAL_DIGITS = 8
 STRING_LIMIT = 132
 LARGEST_INTEGER = 2**31
 """Largest decimal constant; with a minus sign before it."""
-LARGEST_REAL = 9.2233717e18
+LARGEST_REAL = REAL_LIMIT
 SMALLEST_POSITIVE = 5.4210107e-20
 SMALLEST_NEGATIVE = 2.7105054e-20
 

@@ -57,15 +57,15 @@ def _count(function: Function) -> str:
 
 
 _SMALLEST = 5e-324
-_BITS = (1, 0, 31, "bits 0 to 31")
-_PLACES = (1, 0, 31, "0 to 31 places")
+_BITS = (1, 0, 15, "bits 0 to 15")
+_PLACES = (1, 0, 15, "0 to 15 places")
 _RANGES: dict[str, tuple[int, float, float, str]] = {
     "SQRT": (0, 0, inf, "0 or more"),
     "LN": (0, _SMALLEST, inf, "more than 0"),
     "CHR$": (0, 0, 255, "0 to 255"),
     "BIT_SET%": _BITS,
     "BIT_CLR%": _BITS,
-    "BIT_TST@": _BITS,
+    "BIT_TST@": (1, 0, 31, "bits 0 to 31"),
     "SHIFTL%": _PLACES,
     "SHIFTR%": _PLACES,
     "ROTATEL%": _PLACES,

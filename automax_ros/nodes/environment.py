@@ -22,6 +22,7 @@ import importlib.util
 import os
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 
 SETUP_COMMAND = "make setup"
@@ -47,6 +48,9 @@ def prepare(*, may_restart: bool = True) -> None:
     """
     restarted = os.environ.pop(_RESTARTED, None) is not None
     put_prefix_first()
+    if not os.environ.get("HOME") and not os.environ.get("ROS_LOG_DIR"):
+        # ROS wants a place for log files even where none are written; services often run without a home.
+        os.environ["ROS_LOG_DIR"] = tempfile.gettempdir()
     if wheels_installed():
         changes = _needed_changes()
         if changes and may_restart and not restarted:

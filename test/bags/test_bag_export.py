@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import export_csv, seconds_text
+from automax_ros.bags.export import export_csv
 from automax_ros.bags.messages import Int16, Values, Variable, VariableTable, VariableType
+from automax_ros.core.decimal_text import seconds_text
 from automax_ros.core.numbers import stored_real
 
 from .recordings import MS, TABLE, image_of, record, sample_recording, write_of
@@ -203,3 +204,13 @@ def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[2] < 1.2 * peaks[1]
+
+
+def test_time_counts_from_the_start_of_a_run_on_the_wall_clock(tmp_path: Path) -> None:
+    noon = 1_795_268_062 * 10**9
+    later = [
+        (VARIABLES, TABLE._replace(stamp=noon)),
+        (SNAPSHOT, START._replace(stamp=noon)),
+        (BACKPLANE, write_of(1, noon + 5 * MS, {REF: 7})),
+    ]
+    assert exported(tmp_path, later, ["REF%"]) == ["time_s,REF%", "0,0", "0.005,7"]

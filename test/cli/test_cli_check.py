@@ -300,3 +300,11 @@ def test_nouns_follow_their_numbers():
 
 def test_name_warning_is_a_warning():
     assert PROBLEMS["AMX6900"].severity.value == "warning"
+
+
+@pytest.mark.parametrize("options", [("--tick-ms", "3"), ("--target", "udc")])
+def test_options_for_tasks_are_refused_where_only_racks_are_checked(automax, options):
+    automax.write("SPEED.BLK", SPEED)
+    result = automax("check", automax.write("rack.yaml", RACK), *options)
+    assert (result.code, result.out) == (2, "")
+    assert "for tasks given by themselves" in result.err
