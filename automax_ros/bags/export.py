@@ -22,9 +22,10 @@ _Cell = float | str | None
 def export_csv(bag: Path, output: Path, watch: Sequence[str] | None = None) -> int:
     """Write the watched variables of a recording to a CSV file; return the number of rows below the header.
 
-    Columns are ``time_s``, counted from the start of the run, and the variables with their type characters. A value holds until it changes; a cell is empty
-    as long as the recording has not told the value. Booleans are 0 and 1. Without ``watch`` all simple numeric and
-    boolean variables are taken; array elements are named like ``TABLE%(3)``. Memory does not grow with the recording.
+    Columns are ``time_s``, counted from the start of the run, and the variables with their type characters. A value
+    holds until it changes; a cell is empty as long as the recording has not told the value. Booleans are 0 and 1.
+    Without ``watch`` all simple numeric and boolean variables are taken; array elements are named like ``TABLE%(3)``.
+    Memory does not grow with the recording.
 
     Raises:
         BagError: the recording cannot be read or has no common memory, a name in ``watch`` is unknown, or the output
