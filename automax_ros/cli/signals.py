@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a flag that a loop looks at: a run ends cleanly, however often they come."""
+"""Ctrl-C, SIGTERM and the loss of the terminal (SIGHUP) as a flag that a loop looks at: a run ends cleanly, however often they come."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class StopRequest:
 
 @contextmanager
 def stop_signals() -> Iterator[StopRequest]:
-    """Note SIGINT and SIGTERM while the block lasts.
+    """Note SIGINT, SIGTERM and SIGHUP while the block lasts.
 
-    Once one has come, both stay without effect: a second Ctrl-C must not turn the clean end into another.
+    Once one has come, all stay without effect: a second Ctrl-C must not turn the clean end into another.
     """
     stop = StopRequest()
 
     def note(_: int, __: FrameType | None) -> None:
         stop.requested = True
 
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         yield stop
     finally:

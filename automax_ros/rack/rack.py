@@ -210,6 +210,7 @@ class Rack:
         self.stop()
         self.memory.now_ns = self.now_ns
         self.memory.clear(PRESET_WRITER)
+        self._write_batteries()
         self._tell_writes()
         for observer in self._observers:
             observer.all_stopped(reason, self.now_ns)
@@ -247,16 +248,17 @@ class Rack:
         for view, variable in enumerate(self.config.variables):
             for element, value in enumerate(variable.presets):
                 self.memory.write_from_outside(view, value, PRESET_WRITER, element)
-            if variable.name in self._batteries:
-                self.memory.write_from_outside(view, True, PRESET_WRITER)
+        self._write_batteries()
 
-    @property
-    def _batteries(self) -> set[str]:
-        """The pre-defined BATTERYSTATUSn@ of the slots that hold a module with a battery (2.4.6)."""
+    def _write_batteries(self) -> None:
+        """Set the pre-defined BATTERYSTATUSn@ of the slots that hold a module with a battery (2.4.6)."""
         slots = [processor.slot for processor in self.config.processors]
         if self.config.common_memory is not None:
             slots.append(self.config.common_memory.slot)
-        return {f"BATTERYSTATUS{slot}@" for slot in slots}
+        present = {f"BATTERYSTATUS{slot}@" for slot in slots}
+        for view, variable in enumerate(self.config.variables):
+            if variable.name in present:
+                self.memory.write_from_outside(view, True, PRESET_WRITER)
 
     def _start(self, task: Task, now_ns: int) -> None:
         record = task.run(now_ns)

@@ -234,6 +234,7 @@ def test_fault_stops_all_tasks_and_zeroes_volatile_commons(build):
     assert stopped == ("all_stopped", reason, 10_000_000)
     assert rack.value("KEPT!") == 7
     assert (rack.value("REF%"), rack.value("SUM%"), rack.value("GO@")) == (0, 0, False)
+    assert rack.value("BATTERYSTATUS1@") is True, "a battery does not fail with a task"
     told = len(notes.events)
     rack.run(1.0)
     assert len(notes.events) == told, "nothing scans after STOP ALL"
