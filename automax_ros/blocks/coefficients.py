@@ -51,7 +51,8 @@ def integrator_range(coefficient: float) -> float:
 def bounds_of(limit: Limit, period_s: float, values: Mapping[str, float]) -> tuple[float, float]:
     """Return the smallest and the largest value that a parameter may have.
 
-    A REAL holds 24 bits, so the REAL nearest to a limit counts as the limit itself: WM=0.01 is not below 0.01 (decision).
+    A REAL holds 24 bits, so the REAL nearest to a limit counts as the limit itself: WM=0.01 is not below 0.01
+    (decision).
     """
     low, high = limit.low(period_s, values), limit.high(period_s, values)
     return min(low, stored_real(low)[0]), max(high, stored_real(high)[0])

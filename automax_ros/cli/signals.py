@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and the loss of the terminal (SIGHUP) as a flag that a loop looks at: a run ends cleanly, however often they come."""
+"""Ctrl-C, SIGTERM and SIGHUP as a flag that a loop looks at: a run ends cleanly, however often they come."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def check_call(context: Context, call: Call) -> None:
         value = checked_value(context, block, parameter, argument)
         if value is not None:
             values[keyword] = value
-    if _check_keywords(context, block, call, given.keys()):
+    if _check_keywords(context, block, call, given.keys()) and len(given) == len(call.arguments):
         _check_rules(context, block, call, given)
     check_coefficients(context, block, values, given.keys())
     if len(context.diagnostics) == before:

@@ -128,7 +128,7 @@ def _check_unary(context: Context, expression: Unary) -> DataType | None:
         if kind is DataType.BOOLEAN:
             hint = "write NOT; a minus sign inverts a boolean only in the parameters of a block"
         context.report("AMX2004", f"a sign cannot stand before a {kind.word}", expression.span, hint)
-    return DataType.BOOLEAN if kind is DataType.BOOLEAN else None
+    return None
 
 
 def _check_chain(context: Context, expression: Binary) -> DataType | None:
