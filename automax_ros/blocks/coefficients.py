@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from automax_ros.blocks.declaration import Block, Bound, Coefficients, Limit
+from automax_ros.blocks.declaration import Block, Bound, Coefficients
 from automax_ros.core.numbers import stored_real
 
 TWO_TO_MINUS_18 = 2.0**-18
@@ -48,14 +48,12 @@ def integrator_range(coefficient: float) -> float:
     return 16383.0 if coefficient < 0.25 else 32767.0
 
 
-def bounds_of(limit: Limit, period_s: float, values: Mapping[str, float]) -> tuple[float, float]:
-    """Return the smallest and the largest value that a parameter may have.
+def is_within(value: float, low: float, high: float) -> bool:
+    """Return whether a REAL lies within limits, both allowed.
 
-    A REAL holds 24 bits, so the REAL nearest to a limit counts as the limit itself: WM=0.01 is not below 0.01
-    (decision).
+    A REAL holds 24 bits, so the REAL nearest to a limit counts as the limit: WM=0.01 is not below 0.01 (decision).
     """
-    low, high = limit.low(period_s, values), limit.high(period_s, values)
-    return min(low, stored_real(low)[0]), max(high, stored_real(high)[0])
+    return low <= value <= high or value in (stored_real(low)[0], stored_real(high)[0])
 
 
 def limited(declared: Coefficients, period_s: float, given: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
@@ -70,9 +68,9 @@ def limited(declared: Coefficients, period_s: float, given: Mapping[str, float])
     for limit in declared.limits:
         if limit.parameter not in given:
             continue
-        low, high = bounds_of(limit, period_s, values)
+        low, high = limit.low(period_s, values), limit.high(period_s, values)
         value = values[limit.parameter]
-        if not low <= value <= high:
+        if not is_within(value, low, high):
             values[limit.parameter] = high if value > high else low
             moved.append(limit.parameter)
     return values, moved

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from automax_ros.blocks.coefficients import bounds_of
+from automax_ros.blocks.coefficients import is_within
 from automax_ros.blocks.declaration import Block, Limit
 from automax_ros.language.check_context import Context
 from automax_ros.language.tree import Expression, RealLiteral
@@ -28,7 +28,7 @@ def check_coefficients(
         if not isinstance(value, RealLiteral) or not all(name in known for name in limit.uses):
             continue
         bounds = _bounds(limit, period, known)
-        if bounds is not None and not bounds[0] <= value.value <= bounds[1]:
+        if bounds is not None and not is_within(value.value, *bounds):
             _report(context, limit, value, bounds, period)
             del known[limit.parameter]
 
@@ -36,7 +36,7 @@ def check_coefficients(
 def _bounds(limit: Limit, period: float, values: dict[str, float]) -> tuple[float, float] | None:
     """Return the limits as numbers, None where a parameter without limits of its own makes them no numbers."""
     try:
-        return bounds_of(limit, period, values)
+        return limit.low(period, values), limit.high(period, values)
     except (ArithmeticError, ValueError):
         return None
 

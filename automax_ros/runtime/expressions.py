@@ -130,10 +130,10 @@ def clamped(emitter: Emitter, value: Lowered, kind: DataType, code: int) -> Lowe
 
 
 def _lower_unary(emitter: Emitter, expression: Unary) -> Lowered:
-    if expression.operator == "-" and isinstance(expression.operand, IntegerLiteral):
+    literal = expression.operand
+    if expression.operator == "-" and isinstance(literal, IntegerLiteral) and literal.value >= 0:
         # the sign belongs to the constant: -2147483648 is one, 2147483648 is none
-        value = clamp32(-expression.operand.value)
-        return Lowered(build.constant(value), DataType.DOUBLE, value, value)
+        return Lowered(build.constant(-literal.value), DataType.DOUBLE, -literal.value, -literal.value)
     operand = lower(emitter, expression.operand)
     return _shallow(emitter, _signed(emitter, expression, operand), operand)
 

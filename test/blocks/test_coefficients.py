@@ -7,6 +7,7 @@ import pytest
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.coefficients import evaluate, integrator_range, limited
 from automax_ros.blocks.coefficients import mapping_constant as mapped
+from automax_ros.core.numbers import stored_real
 
 from .support import mapping_constant, run
 
@@ -45,6 +46,16 @@ def test_each_limit_at_its_edges_from_both_sides(block, limit, period):
         far = edge - 1e6 if outward < 0 else edge * 1e6
         assert limited(block.coefficients, period, parameters(block, limit, period, far))[0][limit.parameter] == edge
     assert evaluate(block, period, parameters(block, limit, period, (low + high) / 2))[1] is False
+
+
+def test_the_real_nearest_to_a_limit_counts_as_the_limit():
+    """0.01 as a REAL is 0.0099999998: neither a CALL that writes WM=0.01 nor one beside a variable KI is at fault."""
+    stored = stored_real(0.01)[0]
+    assert stored < 0.01
+    assert evaluate(CATALOGUE["INTEGRATE"], 0.0055, {"KI": 1.0, "WM": stored})[1] is False
+    beyond = stored_real(stored - 1e-9)[0]
+    assert beyond < stored
+    assert evaluate(CATALOGUE["INTEGRATE"], 0.0055, {"KI": 1.0, "WM": beyond})[1] is True
 
 
 TICKS = 4

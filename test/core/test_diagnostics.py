@@ -49,6 +49,25 @@ def test_a_caret_never_leaves_its_line_by_more_than_one() -> None:
     assert rendered[-1] == "     ^^^^"
 
 
+def test_of_a_long_line_only_the_part_around_the_fault_is_shown() -> None:
+    source = SourceText("x", "A" * 300 + "BAD" + "C" * 1_000_000)
+    place, excerpt, caret = render(Diagnostic("AMX0036", "x", Span(1, 301, 304)), source).splitlines()
+    assert place == "x:1:301: error[AMX0036]: x"
+    assert len(excerpt) < 300
+    assert excerpt[caret.index("^") : caret.index("^") + 3] == "BAD"
+    assert caret.count("^") == 3
+    assert excerpt.startswith("  ...A")
+    assert excerpt.endswith("C...")
+
+
+def test_carets_of_a_long_fault_stay_below_the_part_that_is_shown() -> None:
+    source = SourceText("x", "A" * 1000)
+    for column in (1, 500, 1000):
+        _, excerpt, caret = render(Diagnostic("AMX0005", "x", Span(1, column, 1001)), source).splitlines()
+        assert len(caret) <= len(excerpt)
+        assert excerpt[caret.index("^")] == "A"
+
+
 def test_control_characters_do_not_reach_the_terminal() -> None:
     source = SourceText("x", "10 A$ = '\x1b[2J'")
     assert "\x1b" not in render(Diagnostic("AMX0004", "x", Span(1, 10, 11)), source)

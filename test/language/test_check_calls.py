@@ -70,7 +70,9 @@ def bound(text: str) -> BoundCall:
         ("LAG(INPUT=A%, WLG=1.0, RESET=-E@, OUTPUT=B%)", "AMX4001"),
         ("AND(INPUT1=X@, INPUT2=Y@, OUTPUT=-Y@)", "AMX4079"),
         ("AND(INPUT1=X@, INPUT3=Y@, OUTPUT=Y@)", "AMX4081"),
+        ("INTEGRATE(INPUT=A%, KI=1.0, WM=0.0099999, OUTPUT=B%)", "AMX4084"),
         ("LATCH(SET=X@, OUTPUT=Y@)", "AMX4082"),
+        ("LATCH(SET=X@, SET=X@, OUTPUT=Y@)", "AMX4073"),
     ],
 )
 def test_each_is_one_error(text: str, code: str) -> None:
@@ -86,6 +88,9 @@ def test_each_is_one_error(text: str, code: str) -> None:
         "DIFFERENCE(INPUT1=0FFFFFFFFH, INPUT2=7FFFH, OUTPUT=T%(A%))",
         "DIFFERENCE(INPUT1=T%(3), INPUT2=T%(A% + 1), OUTPUT=C%)",
         "LAG(INPUT=A%, WLG=R, OUTPUT=B%)",
+        "INTEGRATE(INPUT=A%, KI=1.0, WM=0.01, OUTPUT=B%)",
+        "PROP_INT(INPUT=A%, KP=0.001, WLD=2.0, OUTPUT=B%)",
+        "PROP_INT(INPUT=A%, KP=128.0, WLD=2.0, OUTPUT=B%)",
         "LAG(INPUT=A%, WLG=Q(1), RESET=-X@, INITIAL_VALUE=-5, OUTPUT=B%)",
         "LAG(INPUT=A%, WLG=1.5E1, RESET=-Z@(1), OUTPUT=B%)",
         "AND(INPUT1=TRUE, INPUT2=OFF, OUTPUT=Z@(3))",
@@ -190,6 +195,7 @@ def test_ticks(arguments: str, code: str) -> None:
 def test_ticks_of_a_udc() -> None:
     assert codes(loop("TICKS=20"), target=Processor.UDC, tick_ns=500_000) == []
     assert codes(loop("TICKS=21"), target=Processor.UDC, tick_ns=500_000) == ["AMX4085"]
+    assert codes(loop("TICKS=32768"), target=Processor.UDC, tick_ns=500_000) == ["AMX2007"]
     assert codes(loop("TICKS=32767")) == []
 
 

@@ -94,6 +94,9 @@ def test_limits_of_a_real_default_to_the_type() -> None:
     tuning = program(declared("LOCAL G [CURRENT=1]")).symbols["G"].tuning
     assert tuning is not None
     assert (tuning.low, tuning.high) == (-REAL_MAX, REAL_MAX)
+    widest = program(declared("LOCAL G [CURRENT=1, LOW=-9.2233717E18, HIGH=9.2233717E18]")).symbols["G"].tuning
+    assert widest is not None
+    assert (widest.low, widest.high) == (-REAL_MAX, REAL_MAX)
     assert isinstance(tuning.current, float)
     assert isinstance(tuning.step, float)
     assert tuning.step > 0

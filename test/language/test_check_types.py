@@ -45,6 +45,9 @@ from .check_support import codes, one, program, task
         ("R = LN(0)", "AMX2019"),
         ("S$ = CHR$(256)", "AMX2019"),
         ("A% = SHIFTL%(A%, 32)", "AMX2019"),
+        ("A% = ROTATER%(A%, 16)", "AMX2019"),
+        ("A% = BIT_SET%(A%, 16)", "AMX2019"),
+        ("A% = -X@", "AMX2004"),
         ("IOWRITE R, 1, 2", "AMX2009"),
     ],
 )

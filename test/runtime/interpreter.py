@@ -342,7 +342,7 @@ class Interpreter(Functions):
             return (not operand) if isinstance(operand, bool) else -1 - operand
         if node.operator == "+":
             return operand
-        if isinstance(node.operand, tree.IntegerLiteral) or isinstance(operand, float):
+        if isinstance(operand, float):
             return -operand
         return self.fitted(-operand)
 

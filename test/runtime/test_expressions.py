@@ -75,7 +75,7 @@ def test_compiled_expressions_are_those_of_the_interpreter(data, statement):
 
 @pytest.mark.soak
 @given(st.data(), statements())
-@repeatable(5000)
+@repeatable(2000)
 def test_compiled_expressions_are_those_of_the_interpreter_long(data, statement):
     agree_on_statement(data, statement)
 
@@ -168,6 +168,7 @@ def test_integers(expression, value):
         ("D! = -2147483648 - A%", "D!", LOW, 7023),
         ("D! = -(-2147483648 * A%)", "D!", HIGH, 7023),
         ("D! = ABS(-2147483648 * A%)", "D!", HIGH, 7023),
+        ("D! = -80000000H", "D!", HIGH, 7023),
         ("D! = -2147483648 / (-A%)", "D!", HIGH, 7023),
         ("D! = (A% + 1) ** 31", "D!", HIGH, 7023),
         ("D! = (-A% - 2) ** 21", "D!", LOW, 7023),
