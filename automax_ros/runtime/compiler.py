@@ -33,7 +33,6 @@ from automax_ros.runtime.cost import CostModel
 from automax_ros.runtime.emitter import Emitter
 from automax_ros.runtime.functions import BUILTINS, OPERATIONS
 from automax_ros.runtime.layout import Field, Layout, Role, StateValue
-from automax_ros.runtime.liveness import read_first
 from automax_ros.runtime.memory import Latched
 from automax_ros.runtime.pynames import block_prefix, latched_name, variable_name
 from automax_ros.runtime.statements import STOPPED, StatementLowering
@@ -229,19 +228,6 @@ class _Compilation:
         body, emitter.body = emitter.body, outer
         return body
 
-    def _loads(self, body: list[ast.stmt], *, all_fields: bool) -> list[ast.stmt]:
-        """Return the loads of the fields whose value on entry counts: one by one while they are the smaller part."""
-        if not self._fields:
-            return []
-        needed = frozenset(self._fields) if all_fields else read_first(body, self._fields)
-        if 2 * len(needed) > len(self._fields):
-            return [build.assign_all(list(self._fields), build.name("state"))]
-        return [
-            build.assign(name, build.item("state", build.constant(position)))
-            for position, name in enumerate(self._fields)
-            if name in needed
-        ]
-
     def _stores(self, body: list[ast.stmt]) -> list[ast.stmt]:
         """Return the stores of the fields that the body sets: one by one, which is faster than all at once."""
         assigned = _assigned(body)
@@ -256,8 +242,8 @@ class _Compilation:
     ) -> ast.FunctionDef:
         """Return the whole function: load the state, bind what is used, the body, store the state."""
         opening: list[ast.stmt] = []
-        safe = lowering.counts_steps or emitter.modeled
-        opening.extend(self._loads(body, all_fields=safe))
+        if self._fields:
+            opening.append(build.assign_all(list(self._fields), build.name("state")))
         store = self._stores(body)
         if "gosub_depth" in self._fields:
             opening.append(build.assign("gosub_depth", build.constant(0)))
@@ -268,7 +254,7 @@ class _Compilation:
         if emitter.modeled:
             opening.append(build.assign("cost", build.constant(0)))
         ending: list[ast.stmt] = [ast.Return(build.name(STOPPED) if lowering.can_stop else build.constant(False))]
-        if safe:
+        if lowering.counts_steps or emitter.modeled:
             body = [ast.Try(body=body or [ast.Pass()], handlers=[], orelse=[], finalbody=store or [ast.Pass()])]
         else:
             body = [*body, *store]
