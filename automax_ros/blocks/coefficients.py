@@ -83,3 +83,16 @@ def evaluate(block: Block, period_s: float, given: Mapping[str, float]) -> tuple
         return (), False
     values, moved = limited(declared, period_s, given)
     return declared.compute(period_s, values), bool(moved)
+
+
+def evaluate_noting(block: Block, period_s: float, given: Mapping[str, float]) -> tuple[tuple[float, ...], int]:
+    """Return the same, with a bit for each limit, in their order, that a parameter had to be moved to.
+
+    So a second parameter that goes out of its limits is noticed while the first still is.
+    """
+    declared = block.coefficients
+    if declared is None:
+        return (), 0
+    values, moved = limited(declared, period_s, given)
+    bits = sum(1 << number for number, limit in enumerate(declared.limits) if limit.parameter in moved)
+    return declared.compute(period_s, values), bits

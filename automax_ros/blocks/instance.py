@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 
-from automax_ros.blocks.coefficients import evaluate, limited
+from automax_ros.blocks.coefficients import evaluate_noting, limited
 from automax_ros.blocks.declaration import COEFFICIENT_LIMITED, Block, Form, Input
 from automax_ros.core.types import DataType, Value
 
@@ -44,7 +44,7 @@ class Instance:
         self.error = 0
         self._given: dict[str, float] | None = None
         self._coefficients: dict[str, float] = {}
-        self._limited = False
+        self._limited = 0
 
     def scan(self, **inputs: Value) -> dict[str, Value]:
         """Run the block once with the inputs that are variables in the CALL, and return its outputs by name.
@@ -116,8 +116,8 @@ class Instance:
         given = _reals(values, declared.parameters)
         if given == self._given:
             return 0
-        results, moved = evaluate(self.block, self.period_s, given)
-        newly_out = moved and not self._limited
+        results, moved = evaluate_noting(self.block, self.period_s, given)
+        newly_out = moved & ~self._limited
         self._given, self._limited = given, moved
         self._coefficients = dict(zip(declared.names, results, strict=True))
         return COEFFICIENT_LIMITED if newly_out else 0

@@ -226,11 +226,6 @@ class Rack:
         compiled = {}
         for task_config, source, result in checked:
             assert result.program is not None
-            if result.program.event is not None:
-                raise RackError(
-                    f"{source.name}: the scan waits for the event {result.program.event}, "
-                    "but no module of this rack raises one"
-                )
             self.sources[task_config.name] = source
             if result.diagnostics:
                 self.warnings.append((source, result.diagnostics))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, in_order
 from automax_ros.language.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
 from automax_ros.rack.config import ProcessorConfig, RackConfig, TaskConfig
@@ -55,4 +56,16 @@ def _checked(
         gone = Diagnostic("AMX6306", f"the source {task.file.name} of task {task.name} {fault}", Span(task.line, 1, 2))
         return CheckedTask(task, place, CheckResult(None, [gone]))
     result = check(source, name=task.name, catalogue=CATALOGUE, tick_ns=processor.tick_ns, commons=commons)
-    return CheckedTask(task, source, result)
+    return CheckedTask(task, source, _with_events_checked(result))
+
+
+def _with_events_checked(result: CheckResult) -> CheckResult:
+    """Return a check's result, with an error if the scan waits for an event: no module of a rack raises one."""
+    program = result.program
+    if program is None or program.event is None:
+        return result
+    event = next(event for event in program.events if event.name == program.event)
+    message = f"the scan waits for the event {event.name}, but no module of this rack raises one"
+    hint = "leave EVENT= out of SCAN_LOOP: the clock starts the scans then"
+    found = Diagnostic("AMX6700", message, event.span, event.number, hint)
+    return replace(result, program=None, diagnostics=in_order([*result.diagnostics, found]))

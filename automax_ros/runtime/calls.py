@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from automax_ros.blocks.coefficients import evaluate
+from automax_ros.blocks.coefficients import evaluate, evaluate_noting
 from automax_ros.blocks.declaration import Block, Output
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
@@ -53,7 +53,7 @@ class BlockInstance:
         if self.variable_coefficients and block.coefficients is not None:
             entries += [(f"seen_{name.lower()}", DataType.REAL, math.inf) for name in self.variable_coefficients]
             entries += [(name, DataType.REAL, 0.0) for name in block.coefficients.names]
-            entries.append(("limited", DataType.BOOLEAN, False))
+            entries.append(("limited", DataType.DOUBLE, 0))
         return [
             (self.prefix + name, Field(f"{self.label}.{name}", kind, Role.BLOCK, initial))
             for name, kind, initial in entries
@@ -212,7 +212,8 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, bindings: dict
     )
     was, targets = f"{prefix}was_limited", [prefix + name for name in declared.names]
     changed = [build.compare(build.name(old), "<>", new) for old, new in zip(seen, now, strict=True)]
-    news = build.both(build.name(f"{prefix}limited"), build.inverse(build.name(was)))
+    not_before = ast.UnaryOp(ast.Invert(), build.name(was))
+    news = build.binary(build.name(f"{prefix}limited"), "AND", not_before)
     recompute: list[ast.stmt] = [
         *(build.assign(old, new) for old, new in zip(seen, now, strict=True)),
         build.assign(was, build.name(f"{prefix}limited")),
@@ -225,11 +226,11 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, bindings: dict
 
 def coefficient_function(
     block: Block, period_s: float, literals: dict[str, float], variable: tuple[str, ...]
-) -> Callable[..., tuple[float | bool, ...]]:
-    """Return what computes a block's coefficients from its variable parameters, and whether one is limited."""
+) -> Callable[..., tuple[float, ...]]:
+    """Return what computes a block's coefficients from its variable parameters, and a bit for each that is limited."""
 
-    def coefficients(*values: float) -> tuple[float | bool, ...]:
-        results, limited = evaluate(block, period_s, {**literals, **dict(zip(variable, values, strict=True))})
+    def coefficients(*values: float) -> tuple[float, ...]:
+        results, limited = evaluate_noting(block, period_s, {**literals, **dict(zip(variable, values, strict=True))})
         return (*results, limited)
 
     return coefficients

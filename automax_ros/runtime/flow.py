@@ -58,15 +58,8 @@ def is_jumping(statement: Statement, targets: frozenset[int]) -> bool:
 
 
 def count_statements(statements: tuple[Statement, ...]) -> int:
-    """Return how many statements execute at most in one pass, for the limit of a scan."""
-    total = 0
-    for statement in statements:
-        total += not isinstance(statement, Label)
-        if isinstance(statement, If):
-            total += max(count_statements(statement.then), count_statements(statement.otherwise))
-        elif isinstance(statement, For):
-            total += count_statements(statement.body)
-    return total
+    """Return how many statements stand in a suite, those inside its IF and FOR not included."""
+    return sum(not isinstance(statement, Label) for statement in statements)
 
 
 @dataclass

@@ -158,10 +158,18 @@ class CommonMemory:
         self._forced.discard((view, element))
         self._store(view, element, fit, writer, WriteKind.OUTSIDE)
         self._forced.add((view, element))
+        self._show_forcing(writer)
 
-    def release(self, view: int, element: int = 0) -> None:
+    def release(self, view: int, element: int = 0, writer: int = 0) -> None:
         """End a force; the value stays until the next write (semantics, Scan, memory, tasks)."""
         self._forced.discard((view, element))
+        self._show_forcing(writer)
+
+    def _show_forcing(self, writer: int) -> None:
+        """Keep the pre-defined FORCINGSTATUS@ TRUE while anything is forced (2.4.6)."""
+        view = self._index.get("FORCINGSTATUS@")
+        if view is not None and self._cells[view] is not bool(self._forced):
+            self._store(view, 0, bool(self._forced), writer, WriteKind.OUTSIDE)
 
     @property
     def forced(self) -> frozenset[tuple[int, int]]:

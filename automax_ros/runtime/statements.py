@@ -56,6 +56,7 @@ class StatementLowering:
     fields: dict[str, Field] = field(default_factory=dict)
     counts_steps: bool = False
     can_stop: bool = False
+    _repeating: int = 0
     _targets: frozenset[int] = frozenset()
     _loops: dict[int, int] = field(default_factory=dict)
 
@@ -83,10 +84,17 @@ class StatementLowering:
     def _straight_if(self, statement: If) -> None:
         condition = self._condition(statement.condition, statement)
         with self.emitter.suite() as then:
-            self._lower_straight(statement.then)
+            self._branch(statement.then)
         with self.emitter.suite() as otherwise:
-            self._lower_straight(statement.otherwise)
+            self._branch(statement.otherwise)
         self.emitter.emit(build.when(condition, then, otherwise))
+
+    def _branch(self, statements: tuple[Statement, ...]) -> None:
+        """Emit a branch of an IF; where the way through may repeat, it counts its own statements."""
+        number = count_statements(statements)
+        if self._repeating and number:
+            self.emitter.emit(build.add_to(STEPS, build.constant(number)))
+        self._lower_straight(statements)
 
     def _straight_for(self, statement: For) -> None:
         emitter, line = self.emitter, self.emitter.line
@@ -99,7 +107,9 @@ class StatementLowering:
                 emitter.book_cost()
                 emitter.emit(build.when(build.inverse(test), [ast.Break()]))
             emitter.emit(*self._count(count_statements(statement.body) + 1, line))
+            self._repeating += 1
             self._lower_straight(statement.body)
+            self._repeating -= 1
             with emitter.statement(emitter.line):
                 overflowed = end_turn(emitter, loop)
             if overflowed is not None:
@@ -129,6 +139,7 @@ class StatementLowering:
 
     def _lower_blocks(self, statements: tuple[Statement, ...]) -> None:
         self.counts_steps = True
+        self._repeating += 1
         flow = Flow()
         outer = self.emitter.body
         self._begin_block(flow)

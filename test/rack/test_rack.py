@@ -275,8 +275,10 @@ def test_errors_of_all_tasks_are_found_before_any_starts(build):
 def test_task_that_waits_for_an_event_is_refused(build):
     waiting = "10 COMMON REF%\n20 EVENT NAME=GO, INTERRUPT_STATUS=REF%, TIMEOUT=6\n"
     waiting += "100 CALL SCAN_LOOP(TICKS=2, EVENT=GO)\n120 END\n"
-    with pytest.raises(RackError, match="waits for the event GO, but no module of this rack raises one"):
+    with pytest.raises(RackError) as caught:
         build(ALPHA=waiting)
+    ((_, (found,)),) = caught.value.findings
+    assert (found.code, found.span.line) == ("AMX6700", 2)
 
 
 # Measuring and identity

@@ -53,3 +53,14 @@ def test_old_bytes_in_a_remark(tmp_path):
     config = good(tmp_path, HEAD)
     (tmp_path / "LINE.BLK").write_bytes(b"5 ! 20 \xf8C\r\n10 CALL SCAN_LOOP(TICKS=1)\r\n20 END\r\n")
     assert findings(config) == []
+
+
+def test_task_that_waits_for_an_event_of_no_module(tmp_path):
+    config = good(tmp_path, f"{HEAD}common:\n  ISCR%:\n")
+    event = "7 EVENT NAME=GO, INTERRUPT_STATUS=ISCR%, TIMEOUT=6\n"
+    text = f"5 COMMON ISCR%\n{event}10 CALL SCAN_LOOP(TICKS=1, EVENT=GO)\n20 END\n"
+    (tmp_path / "LINE.BLK").write_text(text)
+    ((_, _, result),) = check_tasks(config)
+    assert result.program is None
+    (found,) = result.diagnostics
+    assert (found.code, found.statement, found.span.line) == ("AMX6700", 7, 2)

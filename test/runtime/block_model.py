@@ -81,7 +81,7 @@ class ModelBlock:
         fixed = {name: text for name, text in self.inputs.items() if text.lstrip("-")[0] not in "LK"}
         self.fixed = {name: Model({}).read(text) for name, text in fixed.items()}
         self.instance = Instance(call.block, TICKS * TICK, **self.fixed)
-        self.was_limited = False
+        self.were_limited: set[str] = set()
 
     def scan(self, model: Model) -> None:
         given_now = {name: model.read(text) for name, text in self.inputs.items() if name not in self.fixed}
@@ -103,7 +103,7 @@ class ModelBlock:
             return
         everything = {**self.fixed, **given_now}
         reals = {name: everything[name.lower()] for name in declared.parameters if name.lower() in everything}
-        moved = bool(limited(declared, TICKS * TICK / 1e9, reals)[1])
-        if moved and not self.was_limited:
+        moved = set(limited(declared, TICKS * TICK / 1e9, reals)[1])
+        if moved - self.were_limited:
             model.codes.append(7004)
-        self.was_limited = moved
+        self.were_limited = moved

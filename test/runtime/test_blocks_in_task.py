@@ -312,3 +312,14 @@ def test_a_helper_that_fails_on_literals_stays_behind_its_test(made, monkeypatch
     monkeypatch.setitem(CATALOGUE, block.name, block)
     call = Programmed(block, {"INPUT": "5", "DIVISOR": "0", "SELECT": "L1%", "OUTPUT": "L2%"})
     compare([call], [{"L1%": 0, "L2%": 1}], False)
+
+
+def test_a_second_coefficient_out_of_its_limits_is_logged_while_the_first_still_is():
+    task = ran("CALL PROP_INT(INPUT=A%, KP=R, WLD=Q, OUTPUT=B%)", scans=0)
+    task.record_scans()
+    logged = []
+    for wld, kp in ((36.0, 1.0), (36.0, 200.0), (1000.0, 200.0), (1000.0, 1.0)):
+        task.state[task.compiled.layout.index("Q")] = wld
+        task.state[task.compiled.layout.index("R")] = kp
+        logged.append([code for _, code in task.scan(0).errors])
+    assert logged == [[], [7004], [7004], []]

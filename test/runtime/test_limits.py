@@ -213,3 +213,17 @@ def test_compiled_source_is_what_runs():
     assert names == ["startup", "scan", "scan_steps"]
     assert compiled.source == compiled_of(FULL).source
     assert len(views_of(compiled.program)) == 3
+
+
+def test_statements_that_do_not_execute_do_not_count_towards_the_limit():
+    rare = [f"{60 + number} B% = {number}" for number in range(60)]
+    task = ran("40 FOR D! = 1 TO 20000", "50 IF D! = 3 THEN", *rare, "130 END_IF", "140 NEXT D!")
+    assert (task.status, task.value("D!")) == (Status.RUNNING, 20001)
+
+
+@pytest.mark.parametrize("jump", ["", "GOTO 500"])
+def test_branches_of_an_if_inside_a_loop_count_when_they_execute(jump):
+    inner = [f"{60 + number} B% = {number}" for number in range(60)]
+    tail = [f"400 {jump}", "500 A% = 1"] if jump else []
+    task = ran("40 FOR D! = 1 TO 20000", "50 IF D! > 0 THEN", *inner, "130 END_IF", "140 NEXT D!", *tail)
+    assert task.status is Status.FAULTED

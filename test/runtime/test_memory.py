@@ -247,3 +247,11 @@ def test_memory_against_a_plain_model(work):
     twin = CommonMemory(VIEWS)
     twin.load_image((entry.view, entry.element, entry.value) for entry in entries)
     assert twin.image() == memory.image()
+
+
+def test_forcing_status_tells_that_something_is_forced():
+    memory = CommonMemory([ViewSpec("REF%", DataType.INTEGER), ViewSpec("FORCINGSTATUS@", DataType.BOOLEAN)])
+    memory.force(0, 5)
+    assert memory.read_now(1) is True
+    memory.release(0)
+    assert memory.read_now(1) is False

@@ -56,6 +56,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6413", "array of strings on ROS 2"),
     Problem("AMX6414", "rate limit without a topic", Severity.WARNING),
     # recordings
+    Problem("AMX6700", "event that no module of the rack raises"),
     Problem("AMX6800", "folder for a recording exists already"),
     Problem("AMX6801", "recording cannot be written"),
     Problem("AMX6802", "message cannot be recorded"),
