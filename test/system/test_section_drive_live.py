@@ -27,8 +27,9 @@ def test_operator_runs_the_section(ros_domain_id, tmp_path):
         (tuned,) = client.result(parameters.set_parameters([Parameter("SPEED.KP_SPEED", value=20.0)])).results
         assert tuned.successful, tuned.reason
 
+        reference = client.listen(Int16, "/pm1/common/LINE_REF", latched=True)
+        client.until(lambda: len(reference) > 5, "the reference moves")
         client.send(Bool, "/pm1/common/STOP_PB/set", Bool(data=True))
-        reference = client.listen(Int16, "/pm1/common/LINE_REF", latched=True, depth=1)
         client.until(lambda: len(reference) > 5 and reference[-1].data < max(item.data for item in reference))
         ended = process.end(signal.SIGINT)
     assert (ended.code, ended.err) == (0, "")
