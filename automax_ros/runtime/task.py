@@ -195,7 +195,15 @@ class Task:
         if self.status is not _RUNNING:
             return None
         self.scan_number += 1
-        return self._execute(self._scan, now_ns, skipped)
+        if self._recording:
+            return self._execute(self._scan, now_ns, skipped)
+        self.memory.now_ns = now_ns
+        try:
+            if self._scan(self.state, self._io):
+                self.status = Status.ENDED
+        except ScanTooLong as error:
+            self._too_long(error)
+        return None
 
     def scan_modeled(self, now_ns: int, skipped: int = 0) -> Generator[int, int | None, ScanRecord | None]:
         """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
