@@ -137,12 +137,12 @@ def _groups(fields: Sequence[Field]) -> Iterator[tuple[str, int, list[Field]]]:
 
 def _group(index: int, field: Field) -> tuple[str, int]:
     if field.array not in {"", "[]"} or field.bound is not None or field.kind == "wstring":
-        raise NotImplementedError(f"no CDR for {field.kind}{field.array}")
+        raise TypeError(f"no CDR for {field.kind}{field.array}")
     if field.kind in _CODES:
         return ("sequences" if field.array else "numbers"), -1
     if field.kind == TIME:
         if field.array or index:
-            raise NotImplementedError("no CDR for a time that is not the first field")
+            raise TypeError("no CDR for a time that is not the first field")
         return "numbers", -1
     if field.kind == "string":
         return ("strings" if field.array else "string"), index
