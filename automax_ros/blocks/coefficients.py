@@ -78,11 +78,8 @@ def limited(declared: Coefficients, period_s: float, given: Mapping[str, float])
 
 def evaluate(block: Block, period_s: float, given: Mapping[str, float]) -> tuple[tuple[float, ...], bool]:
     """Return the coefficients of a block in the order of their names, and whether a parameter was out of limits."""
-    declared = block.coefficients
-    if declared is None:
-        return (), False
-    values, moved = limited(declared, period_s, given)
-    return declared.compute(period_s, values), bool(moved)
+    results, bits = evaluate_noting(block, period_s, given)
+    return results, bool(bits)
 
 
 def evaluate_noting(block: Block, period_s: float, given: Mapping[str, float]) -> tuple[tuple[float, ...], int]:
