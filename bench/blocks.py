@@ -6,8 +6,6 @@ it, all outputs are wired. The cost of the empty scan is taken off.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from _harness import scan_ns, task_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
@@ -15,9 +13,10 @@ from automax_ros.blocks.declaration import Block, Form, Input, Time
 from automax_ros.blocks.scan_loop import END_TIMES
 from automax_ros.core.types import DataType
 
-COPIES = 20
+COPIES = 100
 COEFFICIENTS = {"KP": "0.5", "KI": "0.5", "WLD": "2.0", "WLG": "10.0", "WM": "20.0"}
 LITERALS = {"WORD_SIZE": "12", "ABS_RAMP": "TRUE", "SCALE": "100"}
+INPUTS = ("IN_W%", "LOW_W%", "HIGH_W%", "IN_B@", "OFF_B@")
 VALUES = (0, 1200, -700, 4095, 90, -4095, 2000, 3)
 
 
@@ -51,29 +50,30 @@ def call_text(block: Block, number: int) -> tuple[str, list[str]]:
 
 def block_ns(block: Block) -> float:
     """Return the time of one call in ns."""
-    calls, names = [], ["IN_W%", "LOW_W%", "HIGH_W%", "IN_B@", "OFF_B@"]
+    calls, names = [], [*INPUTS]
     for number in range(COPIES):
         text, outputs = call_text(block, number)
         calls.append(text)
         names += outputs
-    lines = [f"{100 + n} LOCAL {name}" for n, name in enumerate(names)]
+    lines = [f"{100 + n} {'COMMON' if name in INPUTS else 'LOCAL'} {name}" for n, name in enumerate(names)]
     lines += ["1000 CALL SCAN_LOOP(TICKS=2)"]
-    empty, _ = task_of("\n".join([*lines, "9999 END"]))
-    full, _ = task_of("\n".join([*lines, *(f"{1001 + n} {call}" for n, call in enumerate(calls)), "9999 END"]))
-    return (scan_ns(full, varier(full)) - scan_ns(empty, varier(empty))) / COPIES
+    empty = _varied_ns("\n".join([*lines, "9999 END"]))
+    full = _varied_ns("\n".join([*lines, *(f"{1001 + n} {call}" for n, call in enumerate(calls)), "9999 END"]))
+    return (full - empty) / COPIES
 
 
-def varier(task: object) -> Callable[[int], None]:
-    """Return what changes the inputs between scans."""
-    layout, state = task.compiled.layout, task.state  # type: ignore[attr-defined]
-    word, flag = layout.index("IN_W%"), layout.index("IN_B@")
-    state[layout.index("LOW_W%")], state[layout.index("HIGH_W%")] = -4000, 4000
+def _varied_ns(text: str) -> float:
+    """Return the time of one scan of a task whose inputs change from scan to scan."""
+    task, memory = task_of(text)
+    word, low, high, flag = (memory.view(name) for name in ("IN_W%", "LOW_W%", "HIGH_W%", "IN_B@"))
+    memory.write_now(low, -4000, 1)
+    memory.write_now(high, 4000, 1)
 
     def vary(number: int) -> None:
-        state[word] = VALUES[number & 7]
-        state[flag] = number & 3 == 1
+        memory.write_now(word, VALUES[number & 7], 1)
+        memory.write_now(flag, number & 3 == 1, 1)
 
-    return vary
+    return scan_ns(task, vary)
 
 
 def manual_us(block: Block) -> float:

@@ -66,6 +66,11 @@ def loop(test: ast.expr, body: list[ast.stmt]) -> ast.While:
     return ast.While(test, body or [ast.Pass()], [])
 
 
+def finally_do(body: list[ast.stmt], last: list[ast.stmt]) -> ast.Try:
+    """Return ``try: body finally: last``."""
+    return ast.Try(body=body or [ast.Pass()], handlers=[], orelse=[], finalbody=last or [ast.Pass()])
+
+
 _COMPARE: dict[str, type[ast.cmpop]] = {
     "=": ast.Eq,
     "<>": ast.NotEq,

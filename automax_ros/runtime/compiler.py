@@ -1,14 +1,16 @@
-"""The compiler: a checked program becomes one Python function a scan.
+"""The compiler: a checked program becomes Python functions.
 
 Three functions come from one lowering of the same tree:
 
 - ``startup(state, io)``: the statements before SCAN_LOOP;
-- ``scan(state, io)``: one scan from SCAN_LOOP to END, at one instant;
-- ``scan_steps(state, io)``: the same as a generator, which yields the modeled time in ns that has passed before each
+- ``scans(state, io)``: a generator; each ``next`` is one scan from SCAN_LOOP to END, at one instant;
+- ``scan_steps(state, io)``: one scan as a generator, which yields the modeled time in ns that has passed before each
   read or write of actual memory, for execution with modeled times.
 
-Each returns True if the task executed STOP. ``state`` is the list of the layout's fields: loaded into locals at the
-start, stored back at the end, also when the scan is broken off. ``io`` is what a scan may touch: see ``ScanIo``.
+``startup`` and ``scan_steps`` return, and ``scans`` yields, True if the task executed STOP. ``state`` is the list of
+the layout's fields: loaded into locals at the start, stored back at the end, also when a scan is broken off. ``scans``
+ends when it is closed: between scans its locals hold the state, so that a scan neither loads nor stores it. ``io`` is
+what a scan may touch: see ``ScanIo``.
 
 ``scan_steps`` and the printed source are made when they are first asked for: most runs need neither.
 """
@@ -93,7 +95,8 @@ class ScanIo(Protocol):
         ...
 
 
-Scan = Callable[[State, ScanIo], bool]
+Startup = Callable[[State, ScanIo], bool]
+Scans = Callable[[State, ScanIo], Generator[bool, None, None]]
 ScanSteps = Callable[[State, ScanIo], Generator[int, None, bool]]
 
 
@@ -104,19 +107,19 @@ class CompiledTask:
     program: Program
     layout: Layout
     latched: tuple[str, ...]
-    startup: Scan
-    scan: Scan
+    startup: Startup
+    scans: Scans
     _compilation: _Compilation = field(repr=False, compare=False)
 
     @cached_property
     def scan_steps(self) -> ScanSteps:
-        """The scan as a generator."""
+        """One scan in steps of modeled time."""
         return cast(ScanSteps, self._compilation.functions("scan_steps")["scan_steps"])
 
     @cached_property
     def source(self) -> str:
         """The three functions as text."""
-        definitions = self._compilation.definitions("startup", "scan", "scan_steps")
+        definitions = self._compilation.definitions("startup", "scans", "scan_steps")
         return "\n\n\n".join(ast.unparse(ast.fix_missing_locations(item)) for item in definitions) + "\n"
 
 
@@ -143,13 +146,13 @@ class _Compilation:
 
     def result(self) -> CompiledTask:
         """Compile the task."""
-        made = self.functions("startup", "scan")
+        made = self.functions("startup", "scans")
         return CompiledTask(
             program=self._program,
             layout=Layout(tuple(self._fields.values())),
             latched=self._latched,
-            startup=cast(Scan, made["startup"]),
-            scan=cast(Scan, made["scan"]),
+            startup=cast(Startup, made["startup"]),
+            scans=cast(Scans, made["scans"]),
             _compilation=self,
         )
 
@@ -163,7 +166,7 @@ class _Compilation:
         return made
 
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
-        """Lower some of the three functions; the state's fields are known when ``scan`` was among them."""
+        """Lower some of the three functions; the state's fields are known when ``scans`` was among them."""
         parts = [self._function(name) for name in names]
         return [self._wrapped(*part) for part in parts]
 
@@ -241,31 +244,36 @@ class _Compilation:
         self, name: str, body: list[ast.stmt], emitter: Emitter, lowering: StatementLowering
     ) -> ast.FunctionDef:
         """Return the whole function: load the state, bind what is used, the body, store the state."""
+        self._globals.update(_called(emitter))
+        self._globals.update(emitter.extra_globals)
         opening: list[ast.stmt] = []
         if self._fields:
             opening.append(build.assign_all(list(self._fields), build.name("state")))
-        store = self._stores(body)
-        if "gosub_depth" in self._fields:
-            opening.append(build.assign("gosub_depth", build.constant(0)))
-        if lowering.counts_steps:
-            opening.append(build.assign("steps", build.constant(0)))
-        if lowering.can_stop:
-            opening.append(build.assign(STOPPED, build.constant(False)))
-        if emitter.modeled:
-            opening.append(build.assign("cost", build.constant(0)))
-        ending: list[ast.stmt] = [ast.Return(build.name(STOPPED) if lowering.can_stop else build.constant(False))]
+        if lowering.block_lines:
+            lines: list[ast.expr] = [build.constant(line) for line in lowering.block_lines]
+            opening.append(build.assign("block_lines", ast.Tuple(lines, ast.Load())))
+        stores = self._stores(body)
+        body = [*self._start_values(emitter, lowering), *body]
+        stopped = build.name(STOPPED) if lowering.can_stop else build.constant(False)
+        if name == "scans":
+            body.append(build.do(ast.Yield(stopped)))
+            forever = build.loop(build.constant(True), body)
+            return build.function(name, ["state", "io"], [*opening, build.finally_do([forever], stores)])
         if lowering.counts_steps or emitter.modeled:
-            body = [ast.Try(body=body or [ast.Pass()], handlers=[], orelse=[], finalbody=store or [ast.Pass()])]
+            body = [build.finally_do(body, stores)]
         else:
-            body = [*body, *store]
-        self._globals.update(_called(emitter))
-        extra = dict(emitter.extra_globals)
-        if "block_lines" in extra:
-            lines = extra.pop("block_lines")
-            assert isinstance(lines, tuple)
-            opening.append(build.assign("block_lines", ast.Tuple([build.constant(line) for line in lines], ast.Load())))
-        self._globals.update(extra)
-        return build.function(name, ["state", "io"], [*opening, *body, *ending])
+            body += stores
+        return build.function(name, ["state", "io"], [*opening, *body, ast.Return(stopped)])
+
+    def _start_values(self, emitter: Emitter, lowering: StatementLowering) -> list[ast.stmt]:
+        """Return what each execution begins with: an empty GOSUB stack, no statements counted, no STOP, no time."""
+        values = {
+            "gosub_depth": (0, "gosub_depth" in self._fields),
+            "steps": (0, lowering.counts_steps),
+            STOPPED: (False, lowering.can_stop),
+            "cost": (0, emitter.modeled),
+        }
+        return [build.assign(name, build.constant(value)) for name, (value, used) in values.items() if used]
 
 
 @contextmanager

@@ -77,7 +77,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Layout:
-    """The fields of a task's state, in the order in which the scan function loads and stores them."""
+    """The fields of a task's state, in the order in which compiled code loads and stores them."""
 
     fields: tuple[Field, ...]
 

@@ -49,13 +49,17 @@ STOPPED = "stopped"
 
 @dataclass
 class StatementLowering:
-    """Lowers the statements of one function into an emitter; ``instances`` are the blocks by the CALL's span."""
+    """Lowers the statements of one function into an emitter; ``instances`` are the blocks by the CALL's span.
+
+    Afterwards ``block_lines`` holds the BASIC line of each basic block, if there are any.
+    """
 
     emitter: Emitter
     instances: dict[object, BlockInstance]
     fields: dict[str, Field] = field(default_factory=dict)
     counts_steps: bool = False
     can_stop: bool = False
+    block_lines: tuple[int, ...] = ()
     _repeating: int = 0
     _targets: frozenset[int] = frozenset()
     _loops: dict[int, int] = field(default_factory=dict)
@@ -147,7 +151,7 @@ class StatementLowering:
         self.emitter.book_cost()
         self.emitter.emit(flow.to_end())
         self.emitter.body = outer
-        self.emitter.extra_globals["block_lines"] = (*flow.lines, self.emitter.line)
+        self.block_lines = (*flow.lines, self.emitter.line)
         self.emitter.emit(*flow.assemble(STATEMENT_LIMIT))
 
     def _begin_block(self, flow: Flow) -> None:

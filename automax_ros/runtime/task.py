@@ -151,12 +151,12 @@ class Task:
         self.slot = slot
         self.priority = priority
         self.plan = memory.plan([memory.view(name) for name in compiled.latched])
-        self.state: State = compiled.layout.fresh()
+        self._state: State = compiled.layout.fresh()
+        self._scans: Generator[bool, None, None] | None = None
         self.errors = ErrorLog()
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
         self.status = Status.STOPPED
         self.scan_number = 0
-        self._scan = compiled.scan
         self._recording = False
         self._io: TaskIo = TaskIo(self)
 
@@ -176,8 +176,18 @@ class Task:
         log = Field("ERROR LOG", DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
         return Layout((*self.compiled.layout.fields, log))
 
+    @property
+    def state(self) -> State:
+        """The state, field by field as ``compiled.layout`` has it.
+
+        Between scans the compiled scan holds it, so ask again after each scan: a list got earlier is out of date.
+        """
+        self._put_down()
+        return self._state
+
     def record_scans(self, *, on: bool = True) -> None:
         """Begin or end to keep a record of each scan."""
+        self._put_down()
         self._io = RecordingIo(self) if on else TaskIo(self)
         self._recording = on
 
@@ -188,22 +198,34 @@ class Task:
         """
         self.compiled.layout.restart(self.state)
         self.status, self.scan_number = Status.RUNNING, 0
-        return self._execute(self.compiled.startup, now_ns, 0)
+        record = self._begin_record(now_ns, 0)
+        self.memory.now_ns = now_ns
+        try:
+            if self.compiled.startup(self.state, self._io):
+                self.status = Status.ENDED
+        except ScanTooLong as error:
+            self._too_long(error)
+        return record
 
     def scan(self, now_ns: int, skipped: int = 0) -> ScanRecord | None:
         """Execute one scan at an instant; ``skipped`` deadlines were missed before it. Returns its record, if kept."""
         if self.status is not _RUNNING:
             return None
         self.scan_number += 1
-        if self._recording:
-            return self._execute(self._scan, now_ns, skipped)
+        record = self._begin_record(now_ns, skipped) if self._recording else None
         self.memory.now_ns = now_ns
+        if self._scans is None:
+            self._scans = self.compiled.scans(self._state, self._io)
         try:
-            if self._scan(self.state, self._io):
+            if next(self._scans):
                 self.status = Status.ENDED
-        except ScanTooLong as error:
+        except BaseException as error:
+            # The scans have stored the state and ended: the next one begins from it.
+            self._scans = None
+            if not isinstance(error, ScanTooLong):
+                raise
             self._too_long(error)
-        return None
+        return record
 
     def scan_modeled(self, now_ns: int, skipped: int = 0) -> Generator[int, int | None, ScanRecord | None]:
         """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
@@ -289,17 +311,14 @@ class Task:
             raise ValueError(f"{name} = {value:.8g} lies outside {low:.8g} to {high:.8g}")
         return stored
 
-    def _execute(self, part: Callable[..., bool], now_ns: int, skipped: int) -> ScanRecord | None:
-        record = self._begin_record(now_ns, skipped) if self._recording else None
-        self.memory.now_ns = now_ns
-        try:
-            if part(self.state, self._io):
-                self.status = Status.ENDED
-        except ScanTooLong as error:
-            self._too_long(error)
-        return record
+    def _put_down(self) -> None:
+        """Let the compiled scan store the state that it holds."""
+        if self._scans is not None:
+            self._scans.close()
+            self._scans = None
 
     def _begin_record(self, now_ns: int, skipped: int) -> ScanRecord | None:
+        """Return the new record of a scan, or None if none is kept."""
         if not isinstance(self._io, RecordingIo):
             return None
         self._io.record = ScanRecord(now_ns, self.scan_number, skipped=skipped)

@@ -15,7 +15,7 @@ def test_compile_prints_python_functions(automax):
     result = automax("compile", automax.write("TASK.BLK", TASK))
     assert (result.code, result.err) == (0, "")
     functions = [node.name for node in ast.parse(result.out).body if isinstance(node, ast.FunctionDef)]
-    assert functions == ["startup", "scan", "scan_steps"]
+    assert functions == ["startup", "scans", "scan_steps"]
     assert "OUT_i" in result.out
 
 

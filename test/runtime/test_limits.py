@@ -190,7 +190,7 @@ FULL = """10 COMMON K%, KR, KT%(3)
 
 def test_generated_code_knows_nothing_but_its_own_helpers():
     compiled = compiled_of(FULL)
-    scope = compiled.scan.__globals__
+    scope = compiled.scans.__globals__
     assert scope["__builtins__"] == {}
     called = set()
     for node in ast.walk(ast.parse(compiled.source)):
@@ -210,7 +210,7 @@ def test_compiled_source_is_what_runs():
     """``automax compile`` prints the function: it parses, and both forms stand in it."""
     compiled = compiled_of(FULL)
     names = [node.name for node in ast.parse(compiled.source).body]
-    assert names == ["startup", "scan", "scan_steps"]
+    assert names == ["startup", "scans", "scan_steps"]
     assert compiled.source == compiled_of(FULL).source
     assert len(views_of(compiled.program)) == 3
 

@@ -88,6 +88,25 @@ def agree_in_both_forms(text: str, history) -> None:
         assert (in_steps.printed, in_steps.status) == (at_once.printed, at_once.status)
 
 
+def asking_changes_nothing(text: str, history) -> None:
+    """Between scans the compiled code holds the state: whether anybody looks must make no difference."""
+    program = checked(text)
+    (asked, memory), (left_alone, other) = installed(program), installed(program)
+    left_alone.record_scans(on=False)
+    asked.run(0)
+    left_alone.run(0)
+    for now, writes in enumerate(history * 3, 1):
+        for name, value in writes.items():
+            memory.write_from_outside(memory.view(name), value, OTHER)
+            other.write_from_outside(other.view(name), value, OTHER)
+        asked.scan(now)
+        asked.snapshot()
+        left_alone.scan(now)
+    assert other.drain() == memory.drain()
+    assert list(map(bits, left_alone.snapshot())) == list(map(bits, asked.snapshot()))
+    assert (left_alone.printed, left_alone.status) == (asked.printed, asked.status)
+
+
 @given(tasks(), HISTORY)
 @repeatable(40)
 def test_compiled_tasks_do_what_the_interpreter_does(text, history):
@@ -98,6 +117,12 @@ def test_compiled_tasks_do_what_the_interpreter_does(text, history):
 @repeatable(25)
 def test_both_forms_of_a_scan_agree(text, history):
     agree_in_both_forms(text, history)
+
+
+@given(tasks(), HISTORY)
+@repeatable(25)
+def test_asking_for_the_state_changes_nothing(text, history):
+    asking_changes_nothing(text, history)
 
 
 @pytest.mark.soak
@@ -112,6 +137,13 @@ def test_compiled_tasks_do_what_the_interpreter_does_long(text, history):
 @repeatable(1500)
 def test_both_forms_of_a_scan_agree_long(text, history):
     agree_in_both_forms(text, history)
+
+
+@pytest.mark.soak
+@given(tasks(4), HISTORY)
+@repeatable(1500)
+def test_asking_for_the_state_changes_nothing_long(text, history):
+    asking_changes_nothing(text, history)
 
 
 @given(tasks(), HISTORY, st.integers(0, 2))

@@ -245,7 +245,8 @@ def test_stop_before_scan_loop_ends_the_task():
 
 def test_remarks_behind_end_do_not_make_a_task_jump():
     task, _ = task_of(lines("A% = A% + 1") + "31000 REM THE END\n31010 ! OF ALL\n")
-    assert "while" not in task.compiled.source
+    assert "pc = " not in task.compiled.source
+    assert "pc = " in task_of(lines("A% = A% + 1", "GOTO 30000"))[0].compiled.source
     run_scans(task, 2)
     assert task.value("A%") == 2
 

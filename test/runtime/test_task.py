@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.runtime.error_log import LOG_NUMBERS, ErrorLog, LogEntry
-from automax_ros.runtime.memory import WriteKind
+from automax_ros.runtime.memory import CommonMemory, WriteKind
 from automax_ros.runtime.task import Status
 
 from .support import OTHER, WRITER, lines, logged, run_scans, scan_in_steps, task_of
@@ -235,3 +235,75 @@ def test_printed_lines_are_bounded():
     task, _ = task_of(lines("FOR A% = 1 TO 1500", "PRINT A%", "NEXT A%"))
     run_scans(task, 1)
     assert (len(task.printed), task.printed[-1]) == (1000, "1500")
+
+
+ENDLESS = """10 LOCAL N%, M%
+20 CALL SCAN_LOOP(TICKS=4)
+30 N% = N% + 1
+40 IF N% < 3 THEN GOTO 60
+50 GOTO 50
+60 M% = N%
+70 END
+"""
+
+
+def test_a_scan_that_is_broken_off_keeps_what_it_reached():
+    task, _ = task_of(ENDLESS)
+    run_scans(task, 5)
+    assert (task.status, task.scan_number) == (Status.FAULTED, 3)
+    assert [task.value(name) for name in ("N%", "M%")] == [3, 2]
+    task.run()
+    task.scan(9)
+    assert (logged(task)[-1], task.value("N%"), task.value("M%")) == ((50, 7040), 4, 2)
+
+
+def test_what_is_set_between_scans_is_what_the_next_scan_works_with():
+    task, _ = task_of(COUNTING)
+    run_scans(task, 2)
+    task.state[task.compiled.layout.index("N%")] = 100
+    task.scan(3)
+    task.scan(4)
+    assert task.value("N%") == 102
+    saved = task.snapshot()
+    task.scan(5)
+    task.restore(saved)
+    task.scan(6)
+    assert [task.value(name) for name in ("N%", "OUT%")] == [103, 50]
+
+
+class Refusing(CommonMemory):
+    """A memory whose commit fails while ``refuses`` is set, as no real one does."""
+
+    refuses = False
+
+    def commit(self, changes, writer):
+        if self.refuses:
+            raise KeyboardInterrupt
+        super().commit(changes, writer)
+
+
+def test_a_task_goes_on_after_a_scan_was_interrupted():
+    """Ctrl-C may come in the middle of a scan: the state is whole, and the next scan begins from it."""
+    task, memory = task_of(
+        "10 COMMON OUT%\n20 LOCAL N%\n30 CALL SCAN_LOOP(TICKS=4)\n40 N% = N% + 1\n"
+        "50 CALL SUMMER(INPUT1=N%, INPUT2=0, OUTPUT=OUT%)\n60 END\n",
+        Refusing,
+    )
+    run_scans(task, 2)
+    memory.refuses = True
+    with pytest.raises(KeyboardInterrupt):
+        task.scan(3)
+    memory.refuses = False
+    assert (task.value("N%"), memory.read_now(memory.view("OUT%"))) == (3, 2)
+    task.scan(4)
+    assert (task.value("N%"), memory.read_now(memory.view("OUT%"))) == (4, 4)
+
+
+def test_records_may_begin_and_end_while_a_task_runs():
+    task, _ = task_of(COUNTING)
+    run_scans(task, 2)
+    task.record_scans()
+    assert task.scan(3).scan == 3
+    task.record_scans(on=False)
+    assert task.scan(4) is None
+    assert task.value("N%") == 4
