@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Processor
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.core.types import DataType
 from automax_ros.language.checker import check
@@ -19,10 +20,10 @@ REPEATS = 60
 """Short runs of which the fastest counts, so that other work on the machine disturbs little."""
 
 
-def task_of(text: str) -> tuple[Task, CommonMemory]:
+def task_of(text: str, target: Processor = Processor.AUTOMAX) -> tuple[Task, CommonMemory]:
     """Return a task in RUN with a common memory of just the variables that it declares."""
     source = SourceText("BENCH.BLK", text)
-    result = check(source, name="BENCH", catalogue=CATALOGUE)
+    result = check(source, name="BENCH", catalogue=CATALOGUE, target=target)
     if result.program is None:
         raise SystemExit(render_all(result.diagnostics, source))
     commons = [symbol for symbol in result.program.symbols.values() if symbol.scope is Scope.COMMON]

@@ -78,18 +78,30 @@ def limited(declared: Coefficients, period_s: float, given: Mapping[str, float])
 
 def evaluate(block: Block, period_s: float, given: Mapping[str, float]) -> tuple[tuple[float, ...], bool]:
     """Return the coefficients of a block in the order of their names, and whether a parameter was out of limits."""
-    results, bits = evaluate_noting(block, period_s, given)
+    results, _, bits = evaluate_noting(block, period_s, given)
     return results, bool(bits)
 
 
-def evaluate_noting(block: Block, period_s: float, given: Mapping[str, float]) -> tuple[tuple[float, ...], int]:
-    """Return the same, with a bit for each limit, in their order, that a parameter had to be moved to.
+def evaluate_noting(
+    block: Block, period_s: float, given: Mapping[str, float], kept: tuple[float, ...] = ()
+) -> tuple[tuple[float, ...], tuple[float, ...], int]:
+    """Return the coefficients, what to keep for the next evaluation, and what was out of limits as bits of a number.
 
-    So a second parameter that goes out of its limits is noticed while the first still is.
+    There is a bit for each limit, in their order, that a parameter had to be moved to, and one for the relation; so a
+    second parameter that goes out of its limits is noticed while the first still is. ``kept`` is what the last
+    evaluation gave to keep: the parameters of the relation, 0 as long as there was none.
     """
     declared = block.coefficients
     if declared is None:
-        return (), 0
+        return (), (), 0
     values, moved = limited(declared, period_s, given)
     bits = sum(1 << number for number, limit in enumerate(declared.limits) if limit.parameter in moved)
-    return declared.compute(period_s, values), bits
+    relation = declared.relation
+    if relation is None:
+        return declared.compute(period_s, values), (), bits
+    if not relation.holds(values):
+        bits |= 1 << len(declared.limits)
+        last_good = dict(zip(relation.parameters, kept, strict=True)) if any(kept) else relation.first(values)
+        values = {**values, **last_good}
+    keep = tuple(float(values[name]) for name in relation.parameters)
+    return declared.compute(period_s, values), keep, bits

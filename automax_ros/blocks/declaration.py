@@ -7,9 +7,12 @@ The step function is pure. Its parameters are named after the declaration, in lo
 states, in any order, and only those it uses. An output named there too (one that ``holds``) brings the value the output
 variable has. It returns one tuple of plain names: the outputs, then the new states, both in the order of the
 declaration, and, where the block has ``logs``, last the number of the problem (0 for none). Its body is straight
-assignments, ``if`` and one ``return`` at the end; it uses integers, floats, booleans, comparisons, numeric constants of
-its module and the helpers of ``HELPERS``. So it can be called as it stands, inlined by the compiler from its syntax
-tree, and compiled to machine code.
+assignments, ``if``, ``while`` and one ``return`` at the end; it uses integers, floats, booleans, comparisons, numeric
+constants of its module and the helpers of ``HELPERS``. So it can be called as it stands, inlined by the compiler from
+its syntax tree, and compiled to machine code.
+
+Long data are buffers that a step reads by index: a table of the CALL, or a state with a ``size``, which it also writes
+in place. A step may take the ``CALL_FACTS`` besides, which are integers known when the task is compiled.
 
 Three habits keep the inlined code fast. Inputs and coefficients are never assigned, so that a literal can stand in
 their place. An optional output is assigned whole (``rate = a if c else b``) and never read, so that it vanishes where
@@ -24,7 +27,7 @@ import enum
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import floor
-from typing import Protocol
+from typing import Any, Protocol
 
 from automax_ros.core.numbers import clamp16, clamp32, round_count, sign_extended, truncated_quotient
 from automax_ros.core.types import DataType, Value
@@ -52,6 +55,8 @@ DIVIDED_BY_ZERO = 7003
 """Number for AMX7003."""
 COEFFICIENT_LIMITED = 7004
 """Number for AMX7004, which no step function returns: it is logged where coefficients are computed."""
+NO_SUCH_COLUMN = 7005
+"""Number for AMX7005."""
 
 
 class Processor(enum.Enum):
@@ -63,6 +68,8 @@ class Processor(enum.Enum):
 
 
 EVERYWHERE = frozenset(Processor)
+NOT_ON_UDC = frozenset({Processor.AUTOMAX, Processor.PC3000})
+UDC_ONLY = frozenset({Processor.UDC})
 
 
 class Form(enum.Enum):
@@ -74,9 +81,24 @@ class Form(enum.Enum):
 
 
 class Special(enum.Enum):
-    """Parameters that are not values: the name of an event."""
+    """Parameters that are not values: the name of an event, of an array, of a data structure."""
 
     EVENT = "event name"
+    TABLE = "INTEGER array"
+    BITS = "BOOLEAN data structure"
+    WORDS = "INTEGER data structure"
+
+    @property
+    def is_structure(self) -> bool:
+        """The name of a data structure (sections 23, 24, 30, 31, 39 and 40)."""
+        return self in (Special.BITS, Special.WORDS)
+
+    @property
+    def element(self) -> DataType | None:
+        """The type that the name's type character tells, None for an event."""
+        return {Special.TABLE: DataType.INTEGER, Special.WORDS: DataType.INTEGER, Special.BITS: DataType.BOOLEAN}.get(
+            self
+        )
 
 
 ParameterType = DataType | Special
@@ -87,8 +109,10 @@ class Input:
     """An input parameter (3.1: required, default or optional).
 
     ``default`` None with ``required`` False makes it optional: the block does without. ``low`` and ``high`` bound a
-    literal (both ends allowed); ``symbol`` is the abbreviation in the manual's graphic; ``text`` says what it does.
-    ``runs_on`` names the processors whose tasks may program it.
+    literal (both ends allowed), ``one_of`` lists the values it may have; ``symbol`` is the abbreviation in the manual's
+    graphic, the name itself where the manual prints none; ``text`` says what it does. ``also`` is a second type that a
+    variable may have. ``runs_on`` names the processors whose tasks may program it. ``wants_common``: the manual wants a
+    COMMON variable there. ``sample`` stands in a template, where that is not the default.
     """
 
     name: str
@@ -100,7 +124,11 @@ class Input:
     form: Form = Form.ANY
     low: int | float | None = None
     high: int | float | None = None
+    one_of: tuple[int, ...] = ()
+    also: DataType | None = None
     runs_on: frozenset[Processor] = EVERYWHERE
+    wants_common: bool = False
+    sample: Value | None = None
 
     @property
     def variable(self) -> str:
@@ -122,6 +150,7 @@ class Output:
     text: str
     required: bool = True
     holds: bool = False
+    wants_common: bool = False
 
     @property
     def variable(self) -> str:
@@ -133,12 +162,31 @@ class Output:
 class State:
     """A value that a block keeps from scan to scan: ``initial`` at its first execution since RUN.
 
-    INTEGER states are ints of any width the step function keeps to, REAL states double precision.
+    INTEGER states are ints of any width the step function keeps to, REAL states double precision. A state with a
+    ``size`` is a buffer: the number of its elements comes from the facts of the CALL, by lower-case name: its literals
+    and defaults, and the ``CALL_FACTS``.
     """
 
     name: str
     type: DataType
     initial: Value
+    size: Callable[[Mapping[str, Value]], int] | None = None
+
+
+CALL_FACTS = ("elements", "channels", "max_columns", "programmed")
+"""What a step function may ask of its CALL: the elements of TABLE1, channels and columns of the data structure, and
+which of the inputs INPUT1, INPUT2 ... are programmed, as the bits 0, 1 ... of a number."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a rule sees of a parameter that a CALL gives: a literal's ``value``, a one-dimensional array's ``size``.
+
+    Both are None for other variables; the size also for an array whose declaration is at fault.
+    """
+
+    value: Value | None = None
+    size: int | None = None
 
 
 @dataclass(frozen=True)
@@ -147,6 +195,7 @@ class Fault:
 
     message: str
     keyword: str | None = None
+    code: str = "AMX4082"
 
 
 class Rule(Protocol):
@@ -157,7 +206,7 @@ class Rule(Protocol):
         """The rule as a sentence for the documentation."""
         ...
 
-    def faults(self, given: Mapping[str, object]) -> list[Fault]:
+    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
         """Return what is wrong with the given parameters, by keyword in the order in which they stand."""
         ...
 
@@ -182,13 +231,28 @@ class Limit:
 
 
 @dataclass(frozen=True)
+class Relation:
+    """A rule between parameters that are each within their limits.
+
+    Where ``holds`` is not met the last values that met it stay in force (36, 44.1). ``first(values)`` gives what is in
+    force as long as there are none. No parameter of a relation may be 0.
+    """
+
+    parameters: tuple[str, ...]
+    holds: Callable[[Mapping[str, float]], bool]
+    first: Callable[[Mapping[str, float]], Mapping[str, float]]
+    text: str
+
+
+@dataclass(frozen=True)
 class Coefficients:
     """What a dynamic block computes outside its step function, once and again when a variable parameter changes.
 
-    ``parameters`` are the REAL inputs they come from; ``names`` the values handed to the step function;
-    ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that depends on the period
-    where it is not programmed (WM) is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits
-    is limited and logs AMX7004.
+    ``parameters`` are the inputs they come from; ``names`` the values handed to the step function;
+    ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that is not programmed,
+    such as WM, is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits is limited and
+    logs AMX7004. A literal beyond them is an error of the task, unless ``limits_literals``: then it is limited and
+    logged too.
     """
 
     parameters: tuple[str, ...]
@@ -196,13 +260,23 @@ class Coefficients:
     limits: tuple[Limit, ...]
     defaults: Callable[[float], Mapping[str, float]]
     compute: Callable[[float, Mapping[str, float]], tuple[float, ...]]
+    relation: Relation | None = None
+    limits_literals: bool = False
+
+
+class Access(enum.Enum):
+    """What a block does with the data structure that its STRUCTURE_NAME names."""
+
+    MAKES = "makes"
+    USES = "uses"
 
 
 @dataclass(frozen=True)
 class Time:
     """An execution time in microseconds: ``base`` plus a term for each letter of the manual's tables 4 to 6.
 
-    n outputs, k input pairs, j inputs, p input/output pairs, m elements searched, o order of the filter;
+    n outputs, k input pairs, j inputs of numbered channels, p input/output pairs, m elements searched (the whole table,
+    as these are maximum times: decision), o order of the filter;
     t, i, b, d: common variables referenced (all latched ones, INTEGER, BOOLEAN, DOUBLE INTEGER). ``alone`` is added
     where only one task runs on a UDC module (x and z of table 5).
     """
@@ -231,7 +305,7 @@ class Times:
     pc3000: Time | None
 
 
-Step = Callable[..., tuple[Value, ...]]
+Step = Callable[..., tuple[Any, ...]]
 
 
 @dataclass(frozen=True)
@@ -239,7 +313,9 @@ class Block:
     """A control block. ``function`` is its equation in one or a few lines, ``notes`` what a user must know besides.
 
     ``step`` is None for SCAN_LOOP alone, which the task itself carries out. ``logs`` are the problems whose number
-    the step function returns.
+    the step function returns. ``structure`` tells what the block does with a data structure: the states of the block
+    that makes it are the structure's, and the step functions of those that use it take them too, to read, or to write
+    a buffer in place.
     """
 
     name: str
@@ -254,6 +330,7 @@ class Block:
     coefficients: Coefficients | None = None
     rules: tuple[Rule, ...] = ()
     logs: tuple[str, ...] = ()
+    structure: Access | None = None
     runs_on: frozenset[Processor] = EVERYWHERE
     notes: tuple[str, ...] = ()
 

@@ -43,7 +43,7 @@ def description(block: Block) -> str:
 def template(block: Block) -> str:
     """Return a CALL with every keyword, as in TEMPLATE.BLK: ``nnnnn`` and the names are to be replaced.
 
-    A literal-only parameter has its default, or ``nnnnn`` and ``nnn.n`` where it has none.
+    A literal-only parameter has its sample or default, or ``nnnnn`` and ``nnn.n`` where it has neither.
     """
     head = f"nnnnn CALL {block.name}("
     arguments = [f"{item.name}={_place_holder(item)}" for item in block.parameters]
@@ -60,9 +60,10 @@ def templates(blocks: Iterable[Block]) -> str:
 
 def _place_holder(item: Input | Output) -> str:
     if isinstance(item.type, Special):
-        return "event_name"
+        return "event_name" if item.type.element is None else item.variable + item.type.element.value
     if isinstance(item, Input) and item.form is Form.LITERAL:
-        return _PLACE_HOLDERS.get(item.type, "nnnnn") if item.default is None else _literal(item.default)
+        value = item.default if item.sample is None else item.sample
+        return _PLACE_HOLDERS.get(item.type, "nnnnn") if value is None else _literal(value)
     return item.variable + item.type.value
 
 
@@ -72,12 +73,15 @@ def _literal(value: Value) -> str:
 
 
 def _type_word(item: Input | Output) -> str:
-    return item.type.value if isinstance(item.type, Special) else item.type.word
+    if isinstance(item.type, Special):
+        return item.type.value if item.type.element is None else item.type.element.word
+    also = item.also if isinstance(item, Input) else None
+    return item.type.word if also is None else f"{also.word}/DOUBLE"
 
 
 def _input_rows(block: Block) -> list[tuple[str, ...]]:
     return [
-        (item.name, item.symbol, _type_word(item), _need(item), _form(item), _remarks(block, item))
+        (item.name, _symbol(block, item), _type_word(item), _need(item), _form(item), _remarks(block, item))
         for item in block.inputs
     ]
 
@@ -89,28 +93,42 @@ def _need(item: Input) -> str:
 
 
 def _form(item: Input) -> str:
-    return "name only" if isinstance(item.type, Special) else item.form.value
+    if isinstance(item.type, Special):
+        words = {Special.EVENT: "name only", Special.TABLE: "array only"}
+        return words.get(item.type, "structure name")
+    return item.form.value
+
+
+def _symbol(block: Block, item: Input | Output) -> str:
+    """Return the manual's abbreviation, nothing in a block for which it prints none."""
+    return item.symbol if any(other.symbol != other.name for other in block.parameters) else ""
 
 
 def _remarks(block: Block, item: Input) -> str:
     text = item.text
+    if item.one_of:
+        text += f" ({', '.join(str(value) for value in item.one_of)})"
     if item.low is not None or item.high is not None:
         text += f" ({item.low} to {item.high})"
-    if item.runs_on < block.runs_on:
+    if not block.runs_on <= item.runs_on:
         text += f" ({', '.join(sorted(processor.value for processor in item.runs_on))} only)"
     return text
 
 
 def _output_rows(block: Block) -> list[tuple[str, ...]]:
     return [
-        (item.name, item.symbol, _type_word(item), "required" if item.required else "optional", item.text)
+        (item.name, _symbol(block, item), _type_word(item), "required" if item.required else "optional", item.text)
         for item in block.outputs
     ]
 
 
 def _limit_rows(block: Block) -> list[tuple[str, ...]]:
     assert block.coefficients is not None
+    rows: list[tuple[str, ...]]
     rows = [(limit.parameter, limit.low_text, "to", limit.high_text) for limit in block.coefficients.limits]
+    formulas = {part for row in rows for text in row[1:] for part in text.split()}
+    if not formulas & {"T", "T)", "C"}:
+        return rows
     return [*rows, ("", "with T the scan period in s, C = WM / tan(WM T / 2)")]
 
 

@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from automax_ros.blocks.channels import MOST_CHANNELS, programmed_channels
 from automax_ros.blocks.coefficients import evaluate_noting, limited
-from automax_ros.blocks.declaration import COEFFICIENT_LIMITED, Block, Form, Input
+from automax_ros.blocks.declaration import (
+    COEFFICIENT_LIMITED,
+    Access,
+    Block,
+    Form,
+    Input,
+    Special,
+    State,
+)
 from automax_ros.core.types import DataType, Value
+
+Given = Value | Sequence[int]
+"""What an input may be given: a value, a table's elements."""
 
 NS_PER_S = 1e9
 
@@ -21,32 +33,48 @@ class Instance:
 
     ``outputs`` and ``state`` are the values of its output variables and hidden states after the last scan, ``error`` is
     the number of the last problem that the last scan logged, 0 for none. Writing into ``outputs`` stands for a write of
-    the variable by another: a block that holds an output sees it.
+    the variable by another: a block that holds an output sees it. A table is any sequence of numbers. The name of a
+    data structure is not given: READ and WRITE blocks get the instance of the SHIFT block that makes theirs.
     """
 
-    def __init__(self, block: Block, period_ns: int, **literals: Value) -> None:
+    def __init__(self, block: Block, period_ns: int, structure: Instance | None = None, /, **literals: Value) -> None:
         """Take the parameters that are literals in the CALL, by lower-case keyword, and the scan period.
 
+        ``structure`` is the SHIFT block whose data structure a READ or WRITE block uses. A SHIFT block may be told its
+        ``channels``; without it has all eight.
+
         Raises:
-            InstanceError: no parameter of that name, a literal outside its limits, or SCAN_LOOP.
+            InstanceError: no parameter of that name, a literal outside its limits, no or the wrong structure, or
+                SCAN_LOOP.
         """
         if block.step is None:
             raise InstanceError(f"{block.name} has no step function: the task carries it out")
+        if (block.structure is Access.USES) != (structure is not None):
+            raise InstanceError(f"{block.name}: the instance of a SHIFT block is missing, or given where none is used")
         self.block = block
         self.period_s = period_ns / NS_PER_S
         self._step = block.step
         self._wanted = tuple(inspect.signature(block.step).parameters)
         self._inputs = {item.variable: item for item in block.inputs}
+        self._channels = int(literals.pop("channels", MOST_CHANNELS)) if block.structure is Access.MAKES else 0
         self._literals = dict(literals)
         self._check_literals()
+        self._facts: dict[str, int] = {"channels": self._channels} if structure is None else structure.shape
         self.outputs: dict[str, Value] = {item.variable: item.type.zero for item in block.outputs}
-        self.state: dict[str, Value] = {item.name: item.initial for item in block.states}
+        self.state: dict[str, Value | list[Value]] = {item.name: self._initial(item) for item in block.states}
+        self._structure = {} if structure is None else structure.state
         self.error = 0
         self._given: dict[str, float] | None = None
         self._coefficients: dict[str, float] = {}
+        self._kept: tuple[float, ...] = ()
         self._limited = 0
 
-    def scan(self, **inputs: Value) -> dict[str, Value]:
+    @property
+    def shape(self) -> dict[str, int]:
+        """Columns and channels of the data structure that the block makes."""
+        return {"max_columns": int(self._literals.get("max_columns", 0)), "channels": self._channels}
+
+    def scan(self, **inputs: Given) -> dict[str, Value]:
         """Run the block once with the inputs that are variables in the CALL, and return its outputs by name.
 
         Raises:
@@ -55,6 +83,9 @@ class Instance:
         values = self._values(inputs)
         self.error = self._update_coefficients({**self._literals, **inputs})
         values.update(self._coefficients)
+        values.update(self._facts)
+        values.update(self._facts_of(inputs))
+        values.update(self._structure)
         values.update(self.state)
         values.update((item.variable, self.outputs[item.variable]) for item in self.block.outputs if item.holds)
         result = self._step(**{name: values[name] for name in self._wanted})
@@ -64,6 +95,19 @@ class Instance:
             self.error = int(result[-1])
         return dict(self.outputs)
 
+    def _initial(self, state: State) -> Value | list[Value]:
+        size = 0 if state.size is None else state.size({**self._literals, **self._facts})
+        return state.initial if state.size is None else [state.initial] * size
+
+    def _facts_of(self, inputs: Mapping[str, Given]) -> dict[str, int]:
+        """Return the facts that depend on which inputs are programmed, and on the tables."""
+        given = {*inputs, *self._literals}
+        table = inputs.get("table1")
+        facts = {"programmed": programmed_channels(name.upper() for name in given)}
+        if isinstance(table, Sequence):
+            facts["elements"] = len(table)
+        return facts
+
     def _check_literals(self) -> None:
         for name, value in self._literals.items():
             item = self._input(name)
@@ -71,12 +115,14 @@ class Instance:
                 raise InstanceError(f"{self.block.name}: {item.name} must be a variable")
             if isinstance(value, (int, float)) and not isinstance(value, bool):
                 low, high = item.low, item.high
+                if item.one_of and value not in item.one_of:
+                    raise InstanceError(f"{self.block.name}: {item.name} must be one of {item.one_of}, not {value}")
                 if (low is not None and value < low) or (high is not None and value > high):
                     raise InstanceError(
                         f"{self.block.name}: {item.name} must lie between {low} and {high}, not {value}"
                     )
         declared = self.block.coefficients
-        if declared is None:
+        if declared is None or declared.limits_literals:
             return
         given = _reals(self._literals, declared.parameters)
         if given.keys() >= {item.name for item in self.block.inputs if item.type is DataType.REAL and item.required}:
@@ -89,26 +135,30 @@ class Instance:
             raise InstanceError(f"{self.block.name} has no input {name.upper()}")
         return self._inputs[name]
 
-    def _values(self, inputs: Mapping[str, Value]) -> dict[str, Value]:
+    def _values(self, inputs: Mapping[str, Given]) -> dict[str, object]:
         for name in inputs:
             item = self._input(name)
             if item.form is Form.LITERAL:
                 raise InstanceError(f"{self.block.name}: {item.name} must be a literal")
             if name in self._literals:
                 raise InstanceError(f"{self.block.name}: {item.name} is given as a literal already")
-        values: dict[str, Value] = {}
+        values: dict[str, object] = {}
         for name, item in self._inputs.items():
             if name in inputs:
                 values[name] = inputs[name]
             elif name in self._literals:
                 values[name] = self._literals[name]
-            elif item.required:
+            elif item.type is Special.TABLE:
+                values[name] = ()
+            elif item.required and not isinstance(item.type, Special):
                 raise InstanceError(f"{self.block.name} needs {item.name}")
             elif item.default is not None:
                 values[name] = item.default
+            elif isinstance(item.type, DataType):
+                values[name] = item.type.zero
         return values
 
-    def _update_coefficients(self, values: Mapping[str, Value]) -> int:
+    def _update_coefficients(self, values: Mapping[str, Given]) -> int:
         """Recompute the coefficients where a parameter changed; return the problem of one that just left its limits."""
         declared = self.block.coefficients
         if declared is None:
@@ -116,13 +166,14 @@ class Instance:
         given = _reals(values, declared.parameters)
         if given == self._given:
             return 0
-        results, moved = evaluate_noting(self.block, self.period_s, given)
+        results, self._kept, moved = evaluate_noting(self.block, self.period_s, given, self._kept)
         newly_out = moved & ~self._limited
         self._given, self._limited = given, moved
         self._coefficients = dict(zip(declared.names, results, strict=True))
         return COEFFICIENT_LIMITED if newly_out else 0
 
 
-def _reals(values: Mapping[str, Value], names: tuple[str, ...]) -> dict[str, float]:
-    """Return the REAL parameters that are among the values, by keyword."""
-    return {name: float(values[name.lower()]) for name in names if name.lower() in values}
+def _reals(values: Mapping[str, Given], names: tuple[str, ...]) -> dict[str, float]:
+    """Return the parameters of coefficients that are among the values, by keyword."""
+    found = {name: values.get(name.lower()) for name in names}
+    return {name: float(value) for name, value in found.items() if isinstance(value, (int, float))}

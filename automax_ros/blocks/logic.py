@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.channels import input_channels
+from automax_ros.blocks.channels import MOST_CHANNELS, input_channels
 from automax_ros.blocks.declaration import Block, Form, Input, Output, State, Time, Times
 from automax_ros.blocks.rules import AtLeast, Contiguous
 from automax_ros.core.types import DataType
-
-MOST_INPUTS = 8
-"""Largest number of inputs of AND and OR."""
 
 
 def and_step(
@@ -31,9 +28,9 @@ AND = Block(
     section="8",
     title="And",
     function="OUTPUT = INPUT1 AND ... INPUTn",
-    inputs=input_channels("INPUT", MOST_INPUTS, DataType.BOOLEAN, "I", "signal input", required=1, unused=True),
+    inputs=input_channels("INPUT", MOST_CHANNELS, DataType.BOOLEAN, "I", "signal input", required=1, unused=True),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "TRUE if all inputs programmed are TRUE"),),
-    rules=(Contiguous(("INPUT",), MOST_INPUTS),),
+    rules=(Contiguous(("INPUT",), MOST_CHANNELS),),
     times=Times(Time(10.80, j=1.88), Time(41.0, j=8.3), Time(10.60, j=1.45), Time(7.56, j=1.32)),
     step=and_step,
 )
@@ -59,9 +56,9 @@ OR = Block(
     section="19",
     title="Or",
     function="OUTPUT = INPUT1 OR ... INPUTn",
-    inputs=input_channels("INPUT", MOST_INPUTS, DataType.BOOLEAN, "I", "signal input", required=1, unused=False),
+    inputs=input_channels("INPUT", MOST_CHANNELS, DataType.BOOLEAN, "I", "signal input", required=1, unused=False),
     outputs=(Output("OUTPUT", DataType.BOOLEAN, "O", "TRUE if any of the inputs programmed is TRUE"),),
-    rules=(Contiguous(("INPUT",), MOST_INPUTS),),
+    rules=(Contiguous(("INPUT",), MOST_CHANNELS),),
     times=Times(Time(10.24, j=1.88), Time(41.0, j=8.3), Time(8.90, j=1.45), Time(7.16, j=1.32)),
     step=or_step,
 )

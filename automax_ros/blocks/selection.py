@@ -1,8 +1,10 @@
-"""LIMIT, SCALE and SWITCH: what passes of a signal (sections 16, 28 and 34)."""
+"""LIMIT, MOVE, SCALE and SWITCH: what passes of a signal (sections 16, 17, 28 and 34)."""
 
 from __future__ import annotations
 
+from automax_ros.blocks.channels import MOST_CHANNELS, input_channels, output_channels
 from automax_ros.blocks.declaration import CLAMPED, DIVIDED_BY_ZERO, Block, Form, Input, Output, Time, Times
+from automax_ros.blocks.rules import Contiguous
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
@@ -54,7 +56,7 @@ def scale_step(
         if value > input_max:
             value = input_max
     product = (value - input_min) * (output_imax - output_imin)
-    error = 0
+    problem = 0
     if input_max > input_min:
         if product >= 0:
             output = product // (input_max - input_min) + output_imin
@@ -66,15 +68,15 @@ def scale_step(
         else:
             output = output_imin - product // (input_min - input_max)
     else:
-        error = DIVIDED_BY_ZERO
+        problem = DIVIDED_BY_ZERO
         output = INT16_MAX if product > 0 else INT16_MIN if product < 0 else 0
     if output > INT16_MAX:
         output = INT16_MAX
-        error = CLAMPED
+        problem = CLAMPED
     elif output < INT16_MIN:
         output = INT16_MIN
-        error = CLAMPED
-    return output, error
+        problem = CLAMPED
+    return output, problem
 
 
 SCALE = Block(
@@ -122,4 +124,55 @@ SWITCH = Block(
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the selected signal"),),
     times=Times(Time(11.52), Time(47.0), Time(12.55), Time(8.08)),
     step=switch_step,
+)
+
+
+def move_step(
+    enable: bool,
+    input1: int,
+    input2: int,
+    input3: int,
+    input4: int,
+    input5: int,
+    input6: int,
+    input7: int,
+    input8: int,
+    output1: int,
+    output2: int,
+    output3: int,
+    output4: int,
+    output5: int,
+    output6: int,
+    output7: int,
+    output8: int,
+) -> tuple[int, int, int, int, int, int, int, int]:
+    """Pass the inputs on while enabled; otherwise the output variables keep what they have, whoever wrote it (17)."""
+    output1 = input1 if enable else output1
+    output2 = input2 if enable else output2
+    output3 = input3 if enable else output3
+    output4 = input4 if enable else output4
+    output5 = input5 if enable else output5
+    output6 = input6 if enable else output6
+    output7 = input7 if enable else output7
+    output8 = input8 if enable else output8
+    return output1, output2, output3, output4, output5, output6, output7, output8
+
+
+MOVE = Block(
+    name="MOVE",
+    section="17",
+    title="Move",
+    function="OUTPUT1 = INPUT1, ... OUTPUTn = INPUTn if ENABLE, else unchanged",
+    inputs=(
+        Input("ENABLE", DataType.BOOLEAN, "EN", "FALSE leaves all outputs as they are", default=True),
+        *input_channels("INPUT", MOST_CHANNELS, DataType.INTEGER, "I", "signal input", required=1, unused=0),
+    ),
+    outputs=output_channels("OUTPUT", MOST_CHANNELS, DataType.INTEGER, "O", "data output", required=1, holds=True),
+    rules=(Contiguous(("INPUT", "OUTPUT"), MOST_CHANNELS),),
+    times=Times(Time(10.40, p=2.32), Time(39.0, p=11.0), Time(10.40, p=1.80), Time(7.28, p=1.64)),
+    notes=(
+        "The block has no copy of its own: an output forced and released while ENABLE is FALSE keeps the forced value.",
+        "The order in which the pairs are written does not matter.",
+    ),
+    step=move_step,
 )

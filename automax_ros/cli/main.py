@@ -19,6 +19,7 @@ SUBCOMMANDS: dict[str, str] = {
     "trace": "run a task scan by scan on a CSV table",
     "compile": "print the function that a task becomes",
     "run": "run a rack",
+    "compare": "run a block beside the Logix instruction it becomes",
     "export": "write common memory of a recording to a CSV table",
     "blocks": "describe the control blocks",
     "explain": "say what a problem code means and how to cure it",

@@ -10,16 +10,18 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
+from automax_ros.cli.csv_table import CsvFault
 from automax_ros.cli.lone_task import LoneTask, LoneVariable, UnknownVariableError
+from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
 from automax_ros.cli.terminal import count_of, print_diagnostics
-from automax_ros.cli.trace_input import CsvFault, InputTable
+from automax_ros.cli.trace_input import InputTable
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
 from automax_ros.core.decimal_text import real_text, seconds_text
@@ -62,12 +64,15 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     lone = LoneTask(result.program)
     watched = _watched(lone, watch_list(arguments.watch))
-    _require_different_files(arguments)
+    require_different_files(
+        {"FILE": arguments.file, "--input": arguments.input},
+        {"--output": arguments.output, "--errors": arguments.errors},
+    )
     try:
         with ExitStack() as files:
             table = files.enter_context(InputTable(arguments.input, lone))
-            output = files.enter_context(_output(arguments.output))
-            errors = files.enter_context(_output(arguments.errors)) if arguments.errors else None
+            output = files.enter_context(opened_for_writing(arguments.output))
+            errors = files.enter_context(opened_for_writing(arguments.errors)) if arguments.errors else None
             bar = files.enter_context(ProgressBar("trace", table.size, wanted=arguments.output is not None))
             _Trace(lone, watched, output, errors).run(table, bar)
     except CsvFault as fault:
@@ -133,44 +138,6 @@ def _watched(lone: LoneTask, names: list[str] | None) -> list[LoneVariable]:
     except UnknownVariableError as fault:
         raise UsageError(f"--watch: {fault}", fault.hint) from fault
     return list({item.label: item for item in found}.values())
-
-
-def _require_different_files(arguments: argparse.Namespace) -> None:
-    """Refuse to write over what is read, or twice to one file."""
-    read = {"FILE": arguments.file, "--input": arguments.input}
-    written = {key: path for key, path in {"--output": arguments.output, "--errors": arguments.errors}.items() if path}
-    for key, path in written.items():
-        for other, its_path in {**read, **written}.items():
-            if key != other and _is_same_file(path, its_path):
-                raise UsageError(f"{key} and {other} are the same file, {path}")
-
-
-def _is_same_file(one: Path, other: Path) -> bool:
-    """Whether two paths lead to one regular file, or would if it existed; two times /dev/null does no harm."""
-    try:
-        if one.exists() and other.exists():
-            return one.is_file() and one.samefile(other)
-        return one.resolve() == other.resolve()
-    except (OSError, ValueError, RuntimeError):
-        return False
-
-
-@contextmanager
-def _output(path: Path | None) -> Iterator[TextIO]:
-    """Open a table for writing, standard output without a path.
-
-    Raises:
-        UsageError: it cannot be written.
-    """
-    if path is None:
-        yield sys.stdout
-        return
-    try:
-        stream = path.open("w", encoding="utf-8", newline="")
-    except (OSError, ValueError) as error:
-        raise UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
-    with stream:
-        yield stream
 
 
 def _conclusion(lone: LoneTask, *, all_told: bool) -> int:

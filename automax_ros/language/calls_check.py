@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from automax_ros.blocks.catalogue import NOT_YET
-from automax_ros.blocks.declaration import Block, Input, Output, Processor
-from automax_ros.blocks.rules import Contiguous
+from automax_ros.blocks.declaration import Block, Given, Input, Output, Processor, Special
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.ticks import MAX_TICKS, UDC_MAX_TICKS
 from automax_ros.language.check_context import Context
 from automax_ros.language.coefficients_check import check_coefficients
+from automax_ros.language.constant_values import literal_of
 from automax_ros.language.expressions_check import check_variable
 from automax_ros.language.parameters_check import checked_value
 from automax_ros.language.program import BoundCall
+from automax_ros.language.structures_check import check_channels, structure_of
+from automax_ros.language.tables_check import elements_of
 from automax_ros.language.tree import Argument, Call, Expression, IntegerLiteral, Variable
 from automax_ros.language.walk import variables_in
 
-Given = dict[str, "tuple[Input | Output, Argument]"]
+Arguments = dict[str, "tuple[Input | Output, Argument]"]
 """The arguments of a CALL by keyword, with their parameters."""
 
 
@@ -32,7 +34,7 @@ def check_call(context: Context, call: Call) -> None:
             hint = "`automax blocks` lists those it has"
         context.report("AMX4070", message, context.place_of(call.block, call.span), hint)
         return
-    before = len(context.diagnostics)
+    before = context.errors
     if context.target not in block.runs_on:
         message = f"{block.name} cannot be used in a {context.target.value.upper()} task"
         context.report("AMX4071", message, context.place_of(call.block, call.span))
@@ -43,13 +45,23 @@ def check_call(context: Context, call: Call) -> None:
         if value is not None:
             values[keyword] = value
     if _check_keywords(context, block, call, given.keys()) and len(given) == len(call.arguments):
-        _check_rules(context, block, call, given)
+        _check_rules(context, block, call, given, values)
+    check_channels(context, block, call, given.keys())
     check_coefficients(context, block, values, given.keys())
-    if len(context.diagnostics) == before:
+    if context.errors == before:
         defaults = {
             item.name: item.default for item in block.inputs if item.default is not None and item.name not in values
         }
-        context.calls[call.span] = BoundCall(call, block, context.line or 0, values, defaults)
+        structure = structure_of(context, call) if block.structure is not None else None
+        elements = _elements(context, block, values)
+        context.calls[call.span] = BoundCall(call, block, context.line or 0, values, defaults, structure, elements)
+
+
+def _elements(context: Context, block: Block, values: Mapping[str, Expression]) -> int:
+    """Return the number of elements of a block's tables, 0 without one."""
+    tables = [values[item.name] for item in block.inputs if item.type is Special.TABLE and item.name in values]
+    sizes = [elements_of(context, table) for table in tables if isinstance(table, Variable)]
+    return sizes[0] or 0 if sizes else 0
 
 
 def check_scan_loop(context: Context, call: Call) -> None:
@@ -71,9 +83,9 @@ def event_name(call: Call) -> str | None:
     return getattr(value, "name", None)
 
 
-def _arguments_by_keyword(context: Context, block: Block, call: Call) -> Given:
+def _arguments_by_keyword(context: Context, block: Block, call: Call) -> Arguments:
     """Return the arguments with a known keyword and report those given twice."""
-    given: Given = {}
+    given: Arguments = {}
     for argument in call.arguments:
         parameter = block.parameter(argument.keyword)
         if argument.keyword in given:
@@ -117,10 +129,20 @@ def _missing_hint(block: Block, name: str) -> str | None:
     return f"{name}: {parameter.text}"
 
 
-def _check_rules(context: Context, block: Block, call: Call, given: Given) -> None:
+def _check_rules(
+    context: Context, block: Block, call: Call, given: Arguments, values: Mapping[str, Expression]
+) -> None:
+    """Report what breaks the block's rules; they see nothing of a parameter that is at fault itself."""
     block_name = context.place_of(call.block, call.span)
+    seen = {keyword: _seen_by_rules(context, values.get(keyword)) for keyword in given}
     for rule in block.rules:
-        for fault in rule.faults({keyword: argument.value for keyword, (_, argument) in given.items()}):
+        for fault in rule.faults(seen):
             at_fault = given[fault.keyword][1].span if fault.keyword in given else None
-            code = "AMX4081" if isinstance(rule, Contiguous) else "AMX4082"
-            context.report(code, f"{block.name}: {fault.message}", at_fault or block_name, rule.text)
+            context.report(fault.code, f"{block.name}: {fault.message}", at_fault or block_name, rule.text)
+
+
+def _seen_by_rules(context: Context, value: Expression | None) -> Given:
+    literal = None if value is None else literal_of(value)
+    if literal is not None:
+        return Given(value=literal.value)
+    return Given(size=elements_of(context, value) if isinstance(value, Variable) else None)

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 
 from automax_ros.blocks.declaration import Block, Processor
 from automax_ros.core.diagnostics import Diagnostic, Note, Span
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.problems.problem import Severity
 from automax_ros.language.broken_lines import BrokenLines
-from automax_ros.language.program import BoundCall, CommonSpec, Symbol
+from automax_ros.language.program import BoundCall, CommonSpec, DataStructure, Symbol
 from automax_ros.language.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
 from automax_ros.language.suggestions import Suggester
 from automax_ros.language.tree import Data, Event
@@ -20,6 +22,7 @@ class Context:
     """One check of one task.
 
     ``lines`` are the physical lines of its text; ``line`` is the BASIC line number in force, None before the first.
+    ``structures`` are the data structures by name, with the span of the name where its SHIFT block makes it.
     """
 
     target: Processor
@@ -33,6 +36,7 @@ class Context:
     events: dict[str, Event] = field(default_factory=dict)
     data: list[tuple[int, Data]] = field(default_factory=list)
     calls: dict[Span, BoundCall] = field(default_factory=dict)
+    structures: dict[str, tuple[DataStructure, Span]] = field(default_factory=dict)
     suggest: Suggester = field(default_factory=Suggester)
     line: int | None = None
     ticks: int | None = None
@@ -48,6 +52,11 @@ class Context:
         if len(self.diagnostics) >= DIAGNOSTIC_LIMIT:
             raise TooManyProblemsError
         self.diagnostics.append(Diagnostic(code, message, span, self.line, hint, notes))
+
+    @property
+    def errors(self) -> int:
+        """The number of errors found so far, warnings left out."""
+        return sum(PROBLEMS[item.code].severity is Severity.ERROR for item in self.diagnostics)
 
     def place_of(self, word: str, span: Span) -> Span:
         """Return where a word stands in a stretch of the text, the stretch itself where it is not on its first line."""

@@ -12,18 +12,20 @@ from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.language.broken_lines import broken_lines
 from automax_ros.language.calls_check import check_call, check_scan_loop, event_name
 from automax_ros.language.check_context import Context
-from automax_ros.language.declarations_check import check_declarations
+from automax_ros.language.declarations_check import check_declarations, check_storage
 from automax_ros.language.flow_check import check_flow
 from automax_ros.language.parser import parse
 from automax_ros.language.program import CommonSpec, Program
 from automax_ros.language.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
 from automax_ros.language.sharing_check import check_sharing
 from automax_ros.language.statements_check import check_reads, check_statement, data_pool
+from automax_ros.language.structures_check import find_structures
 from automax_ros.language.task_layout import TaskLayout, find_layout
 from automax_ros.language.tree import Call, Declaration, Module, Read, Statement
 from automax_ros.language.unconfirmed_check import find_unconfirmed
 
 AUTOMAX = Processor.AUTOMAX
+THERMAL_OVERLOAD = "THERMAL_OVERLOAD"
 _TOO_LARGE, _TOO_MANY = "AMX0001", "AMX0002"
 _NOT_READ = (_TOO_LARGE, _TOO_MANY)
 """Findings of the parser after which the tree is not the whole task."""
@@ -80,6 +82,7 @@ def check(
 def _check_module(context: Context, module: Module) -> TaskLayout:
     layout = find_layout(context, module)
     check_declarations(context, layout)
+    find_structures(context, layout)
     if layout.scan_loop is not None:
         context.line = layout.scan_loop_line
         check_scan_loop(context, layout.scan_loop)
@@ -92,10 +95,24 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
             check_statement(context, statement)
             if isinstance(statement, Read):
                 reads.append((statement, line))
+    check_storage(context)
     check_reads(context, reads)
     check_flow(context, layout)
     check_sharing(context, layout)
+    _check_protection(context, layout)
     return layout
+
+
+def _check_protection(context: Context, layout: TaskLayout) -> None:
+    """Warn of a UDC task without THERMAL_OVERLOAD, which section 36 requires unless hardware protects the motor."""
+    loop = layout.scan_loop
+    if context.target is not Processor.UDC or loop is None or THERMAL_OVERLOAD not in context.catalogue:
+        return
+    calls = {statement.block for statement, _, _ in layout.numbered() if isinstance(statement, Call)}
+    if THERMAL_OVERLOAD not in calls and THERMAL_OVERLOAD not in context.broken.words:
+        context.line = layout.scan_loop_line
+        hint = "it protects the motor, unless a hardware device does (36)"
+        context.report("AMX4097", "the task has no THERMAL_OVERLOAD block", loop.span, hint)
 
 
 def _program(context: Context, layout: TaskLayout, name: str, source: SourceText) -> Program:

@@ -7,7 +7,9 @@ from collections.abc import Collection, Mapping
 from automax_ros.blocks.coefficients import is_within
 from automax_ros.blocks.declaration import Block, Limit
 from automax_ros.language.check_context import Context
-from automax_ros.language.tree import Expression, RealLiteral
+from automax_ros.language.tree import Expression, IntegerLiteral, RealLiteral
+
+_NUMBERS = (IntegerLiteral, RealLiteral)
 
 
 def check_coefficients(
@@ -22,15 +24,23 @@ def check_coefficients(
     if block.coefficients is None or period is None:
         return
     known = {name: value for name, value in block.coefficients.defaults(period).items() if name not in given}
-    known.update({name: item.value for name, item in values.items() if isinstance(item, RealLiteral)})
+    known.update({name: float(item.value) for name, item in values.items() if isinstance(item, _NUMBERS)})
     for limit in block.coefficients.limits:
         value = values.get(limit.parameter)
-        if not isinstance(value, RealLiteral) or not all(name in known for name in limit.uses):
+        if not isinstance(value, _NUMBERS) or not all(name in known for name in limit.uses):
             continue
         bounds = _bounds(limit, period, known)
         if bounds is not None and not is_within(value.value, *bounds):
-            _report(context, limit, value, bounds, period)
+            if block.coefficients.limits_literals:
+                _report_limited(context, limit, value, bounds)
+            else:
+                _report(context, limit, value, bounds, period)
             del known[limit.parameter]
+    relation = block.coefficients.relation
+    if relation is not None and all(name in known for name in relation.parameters) and not relation.holds(known):
+        last = next((values[name] for name in reversed(relation.parameters) if name in values), None)
+        if last is not None:
+            context.report("AMX4098", f"{block.name}: {relation.text}", last.span, "it is logged at run time")
 
 
 def _bounds(limit: Limit, period: float, values: dict[str, float]) -> tuple[float, float] | None:
@@ -41,7 +51,16 @@ def _bounds(limit: Limit, period: float, values: dict[str, float]) -> tuple[floa
         return None
 
 
-def _report(context: Context, limit: Limit, value: RealLiteral, bounds: tuple[float, float], period: float) -> None:
+def _report_limited(
+    context: Context, limit: Limit, value: IntegerLiteral | RealLiteral, bounds: tuple[float, float]
+) -> None:
+    message = f"{limit.parameter} = {value.value:g} is limited to {bounds[0]:g} to {bounds[1]:g} and logged at run time"
+    context.report("AMX4098", message, value.span)
+
+
+def _report(
+    context: Context, limit: Limit, value: IntegerLiteral | RealLiteral, bounds: tuple[float, float], period: float
+) -> None:
     above = value.value > bounds[1]
     side, bound = ("above its high", bounds[1]) if above else ("below its low", bounds[0])
     formula = limit.high_text if above else limit.low_text

@@ -22,7 +22,7 @@ from automax_ros.language.tree import Declaration, Declared, Event, Scope
 from automax_ros.language.tunables_check import tuning_limits
 
 MAX_TASK_ELEMENTS = 4_000_000
-"""Most values that the variables of one task hold together (decision: a bound on memory for untrusted sources)."""
+"""Most values that the variables and blocks of a task hold together (decision: a bound on memory for any source)."""
 MAX_TIMEOUT = 32767
 
 
@@ -111,6 +111,23 @@ def _length(context: Context, declared: Declared) -> int:
         )
         return DEFAULT_STRING_LENGTH
     return length
+
+
+def check_storage(context: Context) -> None:
+    """Report the block whose samples or data structure make the task's data too large (25, 30, 31)."""
+    total = sum(min(symbol.elements, MAX_ARRAY_ELEMENTS) for symbol in context.symbols.values())
+    if total > MAX_TASK_ELEMENTS:
+        return
+    for call in context.calls.values():
+        facts = call.facts
+        total += sum(state.size(facts) for state in call.block.states if state.size is not None)
+        if total > MAX_TASK_ELEMENTS:
+            context.line = call.line
+            message = (
+                f"with this {call.block.name} the task's variables and blocks hold more than {MAX_TASK_ELEMENTS} values"
+            )
+            context.report("AMX4009", message, call.call.span)
+            return
 
 
 def _check_total(context: Context) -> None:

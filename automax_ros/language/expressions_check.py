@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 
+from automax_ros.core.diagnostics import Note
 from automax_ros.core.numbers import INT32_MAX
 from automax_ros.core.types import DataType, bare_name
 from automax_ros.language.check_context import Context
@@ -62,12 +63,21 @@ _LITERAL_TYPES: dict[type, DataType] = {
 }
 
 
+def _report_structure(context: Context, target: Variable | Element) -> None:
+    message = f"{target.name} is a data structure: only SHIFT, READ and WRITE blocks can use it"
+    note = Note("it is made here", context.structures[target.name][1])
+    context.report("AMX4093", message, target.span, notes=(note,))
+
+
 def check_variable(context: Context, target: Variable | Element) -> DataType | None:
     """Report a variable that is not declared or not used as what it was declared, and return its type.
 
     The type counts as not known where a whole array stands for a value, and where the variable is not declared but one
     with another type character is: that one was meant.
     """
+    if target.name in context.structures:
+        _report_structure(context, target)
+        return target.type
     symbol = context.symbols.get(target.name)
     for subscript in target.subscripts if isinstance(target, Element) else ():
         if symbol is None:

@@ -8,6 +8,8 @@ from automax_ros.language.check_context import Context
 from automax_ros.language.constant_values import fits, hex_hint, literal_of, range_text
 from automax_ros.language.expressions_check import check_expression, check_variable
 from automax_ros.language.statements_check import check_written
+from automax_ros.language.structures_check import checked_structure
+from automax_ros.language.tables_check import checked_table
 from automax_ros.language.tree import (
     Argument,
     BooleanLiteral,
@@ -15,6 +17,7 @@ from automax_ros.language.tree import (
     Expression,
     IntegerLiteral,
     RealLiteral,
+    Scope,
     StringLiteral,
     Unary,
     Variable,
@@ -28,18 +31,22 @@ def checked_value(context: Context, block: Block, parameter: Input | Output, arg
 
     None stands for a value at fault.
     """
-    before = len(context.diagnostics)
+    before = context.errors
     if isinstance(parameter, Output):
         value: Expression | None = _checked_output(context, parameter, argument)
     elif context.target not in parameter.runs_on:
         message = f"{parameter.name} of {block.name} cannot be used in a {context.target.value.upper()} task"
         context.report("AMX4027", message, argument.span)
         return None
-    elif isinstance(parameter.type, Special):
+    elif parameter.type is Special.EVENT:
         value = _checked_event(context, argument)
+    elif parameter.type is Special.TABLE:
+        value = checked_table(context, parameter, argument)
+    elif isinstance(parameter.type, Special):
+        value = checked_structure(context, block, parameter, argument)
     else:
         value = _checked_input(context, parameter, parameter.type, argument)
-    return value if len(context.diagnostics) == before else None
+    return value if context.errors == before else None
 
 
 def _checked_input(context: Context, parameter: Input, kind: DataType, argument: Argument) -> Expression | None:
@@ -95,9 +102,16 @@ def _checked_event(context: Context, argument: Argument) -> Expression | None:
 def _check_type(
     context: Context, parameter: Input | Output, wanted: DataType, kind: DataType | None, variable: Variable | Element
 ) -> None:
-    if kind is not None and kind is not wanted:
-        message = f"{parameter.name} is {wanted.word}, {variable.name} is {kind.word}"
+    also = parameter.also if isinstance(parameter, Input) else None
+    if kind is not None and kind is not wanted and kind is not also:
+        words = wanted.word if also is None else f"{wanted.word} or {also.word}"
+        message = f"{parameter.name} is {words}, {variable.name} is {kind.word}"
         context.report("AMX2015", message, variable.span, _type_hint(wanted))
+        return
+    symbol = context.symbols.get(variable.name)
+    if parameter.wants_common and symbol is not None and symbol.scope is not Scope.COMMON:
+        message = f"{parameter.name} should be a COMMON variable, {variable.name} is LOCAL"
+        context.report("AMX4096", message, variable.span, "the rack's other tasks and the drive use it")
 
 
 def _check_literal(context: Context, parameter: Input, kind: DataType, literal: _Constant, written: Expression) -> None:
@@ -123,6 +137,9 @@ def _check_range(context: Context, parameter: Input, literal: _Constant, written
     value = literal.value
     if isinstance(value, (bool, str)):
         return
+    if parameter.one_of:
+        _check_choice(context, parameter, value, written)
+        return
     low, high = parameter.low, parameter.high
     if (low is None or low <= value) and (high is None or value <= high):
         return
@@ -131,6 +148,15 @@ def _check_range(context: Context, parameter: Input, literal: _Constant, written
     else:
         bounds = f"{low} or more" if low is not None else f"{high} or less"
     context.report("AMX4080", f"{parameter.name} = {value} is out of range: {bounds}", written.span)
+
+
+def _check_choice(context: Context, parameter: Input, value: float, written: Expression) -> None:
+    if value in parameter.one_of:
+        return
+    near = sorted(parameter.one_of, key=lambda item: abs(item - value))[:2]
+    hint = f"the nearest are {' and '.join(str(item) for item in sorted(near))}"
+    message = f"{parameter.name} = {value} is none of {', '.join(str(item) for item in parameter.one_of)}"
+    context.report("AMX4080", message, written.span, hint)
 
 
 def _report_expression(context: Context, parameter: Input | Output, kind: object, value: Expression) -> None:
@@ -144,6 +170,10 @@ def _report_expression(context: Context, parameter: Input | Output, kind: object
             hint = f"write -{operand.name}"
     check_expression(context, value if operand is None else operand)
     what = "a variable" if isinstance(parameter, Output) else "a variable or a constant"
+    if isinstance(parameter, Input) and parameter.form is Form.LITERAL:
+        what, hint = "a constant only", "write the value as a number"
+    elif isinstance(parameter, Input) and parameter.form is Form.VARIABLE:
+        what = "a variable"
     context.report("AMX4077", f"{parameter.name} takes {what}, no expression", value.span, hint)
 
 

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from automax_ros.blocks.channels import programmed_channels
 from automax_ros.blocks.declaration import Block
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.tree import Call, Event, Expression, Scope, Statement
+from automax_ros.language.tree import (
+    BooleanLiteral,
+    Call,
+    Event,
+    Expression,
+    IntegerLiteral,
+    RealLiteral,
+    Scope,
+    Statement,
+)
 
 
 @dataclass(frozen=True)
@@ -63,12 +73,23 @@ class CommonSpec:
 
 
 @dataclass(frozen=True)
+class DataStructure:
+    """A data structure that a SHIFT block makes: ``columns`` from 0 (input) on, each of ``channels`` from 1 on."""
+
+    name: str
+    type: DataType
+    columns: int
+    channels: int
+
+
+@dataclass(frozen=True)
 class BoundCall:
     """A CALL whose block and keywords are known and checked.
 
     ``arguments`` has the given parameters by keyword (a literal keeps its node, rounded and checked);
     ``defaults`` has the value of every other input that has a default. Optional parameters without a default that
-    were not given are in neither. ``line`` is the BASIC line number.
+    were not given are in neither. ``line`` is the BASIC line number. ``structure`` is the data structure that the block
+    makes or uses; ``elements`` the number of elements of its tables, 0 without one.
     """
 
     call: Call
@@ -76,6 +97,21 @@ class BoundCall:
     line: int
     arguments: dict[str, Expression]
     defaults: dict[str, Value]
+    structure: DataStructure | None = None
+    elements: int = 0
+
+    @property
+    def facts(self) -> dict[str, Value]:
+        """What the CALL fixes for the block, by lower-case name: literals, defaults, and the ``CALL_FACTS``."""
+        facts: dict[str, Value] = {name.lower(): value for name, value in self.defaults.items()}
+        for name, given in self.arguments.items():
+            if isinstance(given, (IntegerLiteral, RealLiteral, BooleanLiteral)):
+                facts[name.lower()] = given.value
+        facts["programmed"] = programmed_channels(self.arguments)
+        facts["elements"] = self.elements
+        if self.structure is not None:
+            facts["max_columns"], facts["channels"] = self.structure.columns, self.structure.channels
+        return facts
 
 
 @dataclass(frozen=True)

@@ -327,7 +327,7 @@ def _instances(program: Program) -> dict[object, BlockInstance]:
         bound = program.calls[call.span]
         occurrence = occurrences.get(bound.line, 0)
         occurrences[bound.line] = occurrence + 1
-        instances[call.span] = instance_of(bound, block_prefix(bound.line, occurrence), occurrence)
+        instances[call.span] = instance_of(bound, block_prefix(bound.line, occurrence), occurrence, program.period_ns)
     return instances
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Input, Time, Times
+from automax_ros.blocks.declaration import Time, Times
 from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES
 from automax_ros.core.ticks import NS_PER_US
 from automax_ros.core.types import DataType
@@ -95,10 +95,12 @@ def _to_ns(microseconds: float) -> int:
 
 
 def _programmed(bound: BoundCall) -> dict[str, int]:
-    inputs = sum(isinstance(bound.block.parameter(keyword), Input) for keyword in bound.arguments)
-    outputs = len(bound.arguments) - inputs
-    pairs = sum(keyword.startswith("INPUT") for keyword in bound.arguments)
-    return {"n": outputs, "j": inputs, "k": pairs, "p": pairs}
+    """Return the numbers of what is programmed, by the letters of the manual's tables."""
+    block = bound.block
+    outputs = sum(item.name in bound.arguments for item in block.outputs)
+    channels = sum(item.name in bound.arguments and item.name[-1].isdigit() for item in block.inputs)
+    pairs = sum(item.name in bound.arguments and item.name.startswith("INPUT") for item in block.inputs)
+    return {"n": outputs, "j": channels, "k": pairs, "p": pairs, "m": bound.elements}
 
 
 def _commons(symbols: Iterable[Symbol]) -> dict[str, int]:

@@ -7,7 +7,7 @@ statements before the statement that uses it; so expressions are pure and both f
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -134,6 +134,13 @@ class Emitter:
         result = self.temporary()
         self.emit(build.assign(result, build.call(self.member("read_now"), *arguments)))
         return build.name(result)
+
+    def element_reader(self, name: str) -> Callable[[ast.expr], ast.expr]:
+        """Return what makes the expression that reads an array's element of a flat index, which must be in range."""
+        if self.symbol(name).scope is Scope.LOCAL:
+            return lambda index: build.item(variable_name(name), index)
+        view = build.constant(self.views[name])
+        return lambda index: build.call(self.member("read_now"), view, index)
 
     def write(self, name: str, value: ast.expr, element: ast.expr | None = None) -> None:
         """Emit the store of a value, already within the type, into a variable for a BASIC statement."""

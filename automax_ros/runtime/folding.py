@@ -1,4 +1,7 @@
-"""Constant folding and removal of dead code in Python syntax trees that come from step functions."""
+"""Constant folding and removal of dead code in Python syntax trees that come from step functions.
+
+A name may also be bound to a table: ``Fold`` then asks for the expression of each of its elements.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,12 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
+    ast.FloorDiv: operator.floordiv,
+    ast.BitAnd: operator.and_,
 }
+TableReader = Callable[[ast.expr], ast.expr]
+"""Gives the expression that reads a table's element of an index."""
+
 _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
@@ -43,10 +51,23 @@ class Fold(ast.NodeTransformer):
     ``helpers`` may be called with constant arguments while folding.
     """
 
-    def __init__(self, bindings: Mapping[str, ast.expr], helpers: Mapping[str, Callable[..., object]]) -> None:
-        """Take the expression for each name that is to be replaced."""
+    def __init__(
+        self,
+        bindings: Mapping[str, ast.expr],
+        helpers: Mapping[str, Callable[..., object]],
+        tables: Mapping[str, TableReader] | None = None,
+    ) -> None:
+        """Take the expression for each name that is to be replaced, and what reads each name that is a table."""
         self._bindings = bindings
         self._helpers = helpers
+        self._tables = tables or {}
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """Read the element of a table; of a buffer just replace the names."""
+        index = self.visit(node.slice)
+        if isinstance(node.value, ast.Name) and node.value.id in self._tables:
+            return self._tables[node.value.id](index)
+        return ast.Subscript(self.visit(node.value), index, node.ctx)
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         """Replace a bound name, wherever it is read or written."""
@@ -81,7 +102,8 @@ class Fold(ast.NodeTransformer):
         left, right = value_of(node.left), value_of(node.right)
         fold = _BINARY.get(type(node.op))
         if fold is not None and left is not None and right is not None:
-            return build.constant(fold(left, right))
+            with contextlib.suppress(ArithmeticError):
+                return build.constant(fold(left, right))
         if right == 0 and type(right) is int and isinstance(node.op, (ast.Add, ast.Sub)):
             return node.left
         return node
@@ -146,13 +168,23 @@ def fold_body(body: Iterable[ast.stmt], fold: Fold) -> list[ast.stmt]:
             then, otherwise = fold_body(statement.body, fold), fold_body(statement.orelse, fold)
             if then or otherwise:
                 folded.append(_if(test, then, otherwise))
+        elif isinstance(statement, ast.While):
+            folded.append(build.loop(fold.visit(statement.test), fold_body(statement.body, fold)))
         elif isinstance(statement, ast.Assign):
-            folded.append(ast.Assign([fold.visit(target) for target in statement.targets], fold.visit(statement.value)))
+            assigned = ast.Assign([fold.visit(target) for target in statement.targets], fold.visit(statement.value))
+            if not _does_nothing(assigned):
+                folded.append(assigned)
         elif isinstance(statement, ast.AugAssign):
             folded.append(ast.AugAssign(fold.visit(statement.target), statement.op, fold.visit(statement.value)))
         elif not isinstance(statement, ast.Pass):
             raise TypeError(f"a step function may not contain {type(statement).__name__}")
     return folded
+
+
+def _does_nothing(statement: ast.Assign) -> bool:
+    """Return whether an assignment gives a name its own value: what is left of ``total = total + 0``."""
+    target, value = statement.targets[0], statement.value
+    return isinstance(target, ast.Name) and isinstance(value, ast.Name) and target.id == value.id
 
 
 def _if(test: ast.expr, then: list[ast.stmt], otherwise: list[ast.stmt]) -> ast.If:
@@ -164,20 +196,33 @@ def _if(test: ast.expr, then: list[ast.stmt], otherwise: list[ast.stmt]) -> ast.
 def without_dead_stores(body: list[ast.stmt], needed: set[str]) -> list[ast.stmt]:
     """Return statements without assignments to names that nothing reads; ``needed`` are read afterwards.
 
-    A name that is read anywhere in the body counts as read: safe, and enough for step functions.
+    A name that is read anywhere in the body, but for its own new value, counts as read: safe, and enough for step
+    functions.
     """
     while True:
-        read = needed | {
-            node.id for part in body for node in ast.walk(part) if isinstance(node, ast.Name) and _reads(node)
-        }
+        read = needed | _read(body)
         pruned = _prune(body, read)
         if _count(pruned) == _count(body):
             return pruned
         body = pruned
 
 
-def _reads(node: ast.Name) -> bool:
-    return isinstance(node.ctx, ast.Load)
+def _read(body: Iterable[ast.stmt]) -> set[str]:
+    """Return the names that statements read, each for another purpose than its own new value."""
+    found: set[str] = set()
+    for statement in body:
+        if isinstance(statement, (ast.If, ast.While)):
+            found |= _names_read(statement.test) | _read(statement.body) | _read(statement.orelse)
+            continue
+        names = _names_read(statement)
+        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+            names.discard(statement.targets[0].id)
+        found |= names
+    return found
+
+
+def _names_read(node: ast.AST) -> set[str]:
+    return {item.id for item in ast.walk(node) if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Load)}
 
 
 def _count(body: list[ast.stmt]) -> int:
@@ -191,6 +236,10 @@ def _prune(body: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
             then, otherwise = _prune(statement.body, read), _prune(statement.orelse, read)
             if then or otherwise:
                 kept.append(_if(statement.test, then, otherwise))
+        elif isinstance(statement, ast.While):
+            turn = _prune(statement.body, read | _names_read(statement.test))
+            if turn:
+                kept.append(build.loop(statement.test, turn))
         elif isinstance(statement, (ast.Assign, ast.AugAssign)):
             targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
             if any(node.id in read for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)):

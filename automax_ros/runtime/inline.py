@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declaration import HELPERS, Block
 from automax_ros.runtime import build
-from automax_ros.runtime.folding import Fold, fold_body, value_of, without_dead_stores
+from automax_ros.runtime.folding import Fold, TableReader, fold_body, value_of, without_dead_stores
 from automax_ros.runtime.simplify import carry_on
 
 
@@ -27,6 +27,21 @@ class StepTree:
     body: tuple[ast.stmt, ...]
     results: tuple[ast.expr, ...]
     assigned: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Binding:
+    """What the names of a step function stand for in one CALL.
+
+    ``values`` has an expression, simple or without side effects, for each input, coefficient and fact of the CALL that
+    is programmed; ``states`` the Python name of each state, a data structure's included; ``tables`` what reads each
+    table; ``prefix`` begins the name of every local.
+    """
+
+    prefix: str
+    values: Mapping[str, ast.expr]
+    states: Mapping[str, str]
+    tables: Mapping[str, TableReader]
 
 
 @dataclass(frozen=True)
@@ -102,38 +117,21 @@ class _Constants(ast.NodeTransformer):
         return self._values.get(node.id, node) if isinstance(node.ctx, ast.Load) else node
 
 
-def inline(
-    block: Block, prefix: str, bindings: Mapping[str, ast.expr], wanted: Mapping[str, str], free: frozenset[str]
-) -> Inlined:
+def inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: frozenset[str]) -> Inlined:
     """Return the statements of one call of a block.
 
     Args:
         block: the declaration.
-        prefix: begins every local's name, such as ``b1030_``.
-        bindings: an expression, simple or without side effects, for each parameter but the states.
+        binding: what the step's names stand for.
         wanted: for each programmed output its target: the Python name it may be computed in directly, or "" where the
             result has to stand in a local of its own.
         free: targets of ``wanted`` that no binding reads, so that they may be assigned before the block is through.
     """
     tree = step_tree(block)
-    states = {state.name for state in block.states}
+    prefix = binding.prefix
     results = dict(zip([output.variable for output in block.outputs], tree.results, strict=False))
-    opening: list[ast.stmt] = []
-    names: dict[str, ast.expr] = {}
-    for parameter in tree.parameters:
-        if parameter in states:
-            names[parameter] = build.name(prefix + parameter)
-        elif parameter in tree.assigned:
-            target = _direct_target(parameter, results, wanted, free)
-            names[parameter] = build.name(target or prefix + parameter)
-            given = bindings[parameter]
-            if not (isinstance(given, ast.Name) and given.id == target):
-                opening.append(build.assign(target or prefix + parameter, given))
-        else:
-            names[parameter] = bindings[parameter]
-    for local in sorted(tree.assigned - set(tree.parameters)):
-        names[local] = build.name(_direct_target(local, results, wanted, free) or prefix + local)
-    fold = Fold(names, HELPERS)
+    names, opening = _names(tree, binding, results, wanted, free)
+    fold = Fold(names, HELPERS, binding.tables)
     body = opening + fold_body(tree.body, fold)
     outputs = {output.name: fold.visit(results[output.variable]) for output in block.outputs if output.name in wanted}
     state_results = tree.results[len(block.outputs) : len(block.outputs) + len(block.states)]
@@ -144,23 +142,50 @@ def inline(
             copy = f"{prefix}out_{output.variable}"
             body.append(build.assign(copy, outputs[output.name]))
             outputs[output.name] = build.name(copy)
-    body.extend(_store_states(block, prefix, [fold.visit(result) for result in state_results]))
+    body.extend(_store_states(block, binding.states, [fold.visit(result) for result in state_results]))
     error = fold.visit(tree.results[-1]) if _can_log_in_step(block) else None
     if error is not None and value_of(error) == 0:
         error = None
+    states = {binding.states[state.name] for state in block.states}
     own = frozenset(prefix + local for local in tree.assigned - set(tree.parameters))
     results_now = {**outputs, **({"": error} if error is not None else {})}
-    body, results_now = carry_on(body, results_now, own - {prefix + state.name for state in block.states})
+    body, results_now = carry_on(body, results_now, own - states)
     error = results_now.pop("", None)
     outputs = results_now
-    needed = {prefix + state.name for state in block.states}
-    needed |= {
+    needed = states | {
         node.id
         for part in [*outputs.values(), *([error] if error else [])]
         for node in ast.walk(part)
         if isinstance(node, ast.Name)
     }
     return Inlined(without_dead_stores(body, needed), outputs, error)
+
+
+def _names(
+    tree: StepTree,
+    binding: Binding,
+    results: Mapping[str, ast.expr],
+    wanted: Mapping[str, str],
+    free: frozenset[str],
+) -> tuple[dict[str, ast.expr], list[ast.stmt]]:
+    """Return the expression for each name of a step, and the statements that give assigned parameters their value."""
+    prefix = binding.prefix
+    opening: list[ast.stmt] = []
+    names: dict[str, ast.expr] = {}
+    for parameter in tree.parameters:
+        if parameter in binding.states:
+            names[parameter] = build.name(binding.states[parameter])
+        elif parameter in tree.assigned:
+            target = _direct_target(parameter, results, wanted, free)
+            names[parameter] = build.name(target or prefix + parameter)
+            given = binding.values[parameter]
+            if not (isinstance(given, ast.Name) and given.id == target):
+                opening.append(build.assign(target or prefix + parameter, given))
+        elif parameter not in binding.tables:
+            names[parameter] = binding.values[parameter]
+    for local in sorted(tree.assigned - set(tree.parameters)):
+        names[local] = build.name(_direct_target(local, results, wanted, free) or prefix + local)
+    return names, opening
 
 
 def _direct_target(
@@ -190,12 +215,12 @@ def _fleeting(block: Block, tree: StepTree, *, several_outputs: bool) -> set[str
     return changing | inputs
 
 
-def _store_states(block: Block, prefix: str, results: Sequence[ast.expr]) -> list[ast.stmt]:
+def _store_states(block: Block, places: Mapping[str, str], results: Sequence[ast.expr]) -> list[ast.stmt]:
     """Return the assignments of those states that are not already computed in place, all at once."""
     pairs = [
-        (prefix + state.name, result)
+        (places[state.name], result)
         for state, result in zip(block.states, results, strict=True)
-        if not (isinstance(result, ast.Name) and result.id == prefix + state.name)
+        if not (isinstance(result, ast.Name) and result.id == places[state.name])
     ]
     if not pairs:
         return []

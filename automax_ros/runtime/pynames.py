@@ -29,3 +29,8 @@ def latched_name(full_name: str) -> str:
 def block_prefix(line: int, occurrence: int) -> str:
     """Return what begins the names of a block's locals; ``occurrence`` counts the calls of one line from 0."""
     return f"b{line}_" if occurrence == 0 else f"b{line}_{occurrence + 1}_"
+
+
+def structure_prefix(full_name: str) -> str:
+    """Return what begins the names of a data structure's states: ``QUEUE%`` gives ``QUEUE_i_``."""
+    return f"{variable_name(full_name)}_"

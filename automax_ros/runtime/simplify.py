@@ -60,6 +60,8 @@ def _without(body: list[ast.stmt], names: Mapping[str, ast.expr]) -> list[ast.st
     for statement in body:
         if isinstance(statement, ast.If):
             kept.append(ast.If(statement.test, _without(statement.body, names), _without(statement.orelse, names)))
+        elif isinstance(statement, ast.While):
+            kept.append(build.loop(statement.test, _without(statement.body, names)))
         elif not (
             isinstance(statement, ast.Assign)
             and isinstance(statement.targets[0], ast.Name)
@@ -95,6 +97,8 @@ def _most_errors(body: list[ast.stmt], name: str) -> int:
     for statement in body:
         if isinstance(statement, ast.If):
             most += max(_most_errors(statement.body, name), _most_errors(statement.orelse, name))
+        elif isinstance(statement, ast.While):
+            most += 2 * _most_errors(statement.body, name)
         elif isinstance(statement, ast.Assign) and _sets(statement, name):
             most += value_of(statement.value) != 0
     return most

@@ -16,6 +16,10 @@ from .check_support import codes, one, problems, program, task
 DECLARE = "LOCAL A%, B%, C%, D!, R, X@, Y@, S$, T%(10), Z@(3), Q(2)"
 
 
+UNPROTECTED = "AMX4097"
+"""The warning that a UDC task has no THERMAL_OVERLOAD."""
+
+
 def call(text: str) -> str:
     return task(f"CALL {text}", declare=DECLARE)
 
@@ -193,15 +197,15 @@ def test_ticks(arguments: str, code: str) -> None:
 
 
 def test_ticks_of_a_udc() -> None:
-    assert codes(loop("TICKS=20"), target=Processor.UDC, tick_ns=500_000) == []
-    assert codes(loop("TICKS=21"), target=Processor.UDC, tick_ns=500_000) == ["AMX4085"]
-    assert codes(loop("TICKS=32768"), target=Processor.UDC, tick_ns=500_000) == ["AMX2007"]
+    assert codes(loop("TICKS=20"), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED]
+    assert codes(loop("TICKS=21"), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX4085"]
+    assert codes(loop("TICKS=32768"), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX2007"]
     assert codes(loop("TICKS=32767")) == []
 
 
 @pytest.mark.parametrize("statement", ["A% = IOREAD%(5, 0)", "IOWRITE 5, 0, A%"])
 def test_io_of_a_udc(statement: str) -> None:
-    assert codes(task(statement), target=Processor.UDC, tick_ns=500_000) == ["AMX4027"]
+    assert codes(task(statement), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX4027"]
     assert codes(task(statement), target=Processor.PC3000) == []
 
 

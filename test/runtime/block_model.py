@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 
 from automax_ros.blocks.coefficients import limited
-from automax_ros.blocks.declaration import Block
+from automax_ros.blocks.declaration import Access, Block, Special
 from automax_ros.blocks.instance import Instance
-from automax_ros.core.types import type_of_name
+from automax_ros.core.types import DataType, type_of_name
 
 from .support import TICK
 
@@ -68,11 +68,13 @@ class Model:
 
 
 class ModelBlock:
-    def __init__(self, call: Programmed) -> None:
+    """A block by its step function; ``structures`` holds the SHIFT blocks so far, by the name of what they make."""
+
+    def __init__(self, call: Programmed, structures: dict[str, Instance]) -> None:
         self.call = call
-        self.inputs = {
-            item.variable: call.parameters[item.name] for item in call.block.inputs if item.name in call.parameters
-        }
+        given = [item for item in call.block.inputs if item.name in call.parameters]
+        self.inputs = {item.variable: call.parameters[item.name] for item in given if isinstance(item.type, DataType)}
+        self.tables = {item.variable: call.parameters[item.name] for item in given if item.type is Special.TABLE}
         self.outputs = {
             item.variable: (call.parameters[item.name], item.holds)
             for item in call.block.outputs
@@ -80,11 +82,22 @@ class ModelBlock:
         }
         fixed = {name: text for name, text in self.inputs.items() if text.lstrip("-")[0] not in "LK"}
         self.fixed = {name: Model({}).read(text) for name, text in fixed.items()}
-        self.instance = Instance(call.block, TICKS * TICK, **self.fixed)
+        self.instance = self._instance(structures)
         self.were_limited: set[str] = set()
+
+    def _instance(self, structures: dict[str, Instance]) -> Instance:
+        block, name = self.call.block, self.call.parameters.get("STRUCTURE_NAME", "")
+        if block.structure is Access.USES:
+            return Instance(block, TICKS * TICK, structures[name], **self.fixed)
+        if block.structure is None:
+            return Instance(block, TICKS * TICK, **self.fixed)
+        channels = sum(keyword.startswith("INPUT") for keyword in self.call.parameters)
+        structures[name] = Instance(block, TICKS * TICK, channels=channels, **self.fixed)
+        return structures[name]
 
     def scan(self, model: Model) -> None:
         given_now = {name: model.read(text) for name, text in self.inputs.items() if name not in self.fixed}
+        given_now.update({name: list(model.values[text]) for name, text in self.tables.items()})
         before = {}
         for name, (text, holds) in self.outputs.items():
             if holds:
@@ -103,7 +116,10 @@ class ModelBlock:
             return
         everything = {**self.fixed, **given_now}
         reals = {name: everything[name.lower()] for name in declared.parameters if name.lower() in everything}
-        moved = set(limited(declared, TICKS * TICK / 1e9, reals)[1])
+        values, out = limited(declared, TICKS * TICK / 1e9, reals)
+        moved = set(out)
+        if declared.relation is not None and not declared.relation.holds(values):
+            moved.add("the relation")
         if moved - self.were_limited:
             model.codes.append(7004)
         self.were_limited = moved

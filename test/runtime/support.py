@@ -5,6 +5,7 @@ from __future__ import annotations
 from hypothesis import settings
 
 from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Processor
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.core.types import Value
 from automax_ros.language.checker import check
@@ -24,10 +25,10 @@ def repeatable(examples: int) -> settings:
     return settings(deadline=None, derandomize=True, max_examples=examples, database=None)
 
 
-def program_of(text: str, name: str = "TASK") -> Program:
-    """The checked program of a task; fails on an error, not on a warning."""
+def program_of(text: str, name: str = "TASK", target: Processor = Processor.AUTOMAX) -> Program:
+    """The checked program of a task; fails on an error, not on a warning. Every Processor has the same tick here."""
     source = SourceText("task.blk", text)
-    result = check(source, name=name, catalogue=CATALOGUE, tick_ns=TICK)
+    result = check(source, name=name, catalogue=CATALOGUE, tick_ns=TICK, target=target)
     assert result.program is not None, render_all(result.diagnostics, source)
     return result.program
 
@@ -40,14 +41,16 @@ def views_of(program: Program) -> list[ViewSpec]:
     ]
 
 
-def compiled_of(text: str, cost_model: CostModel | None = None) -> CompiledTask:
-    program = program_of(text)
+def compiled_of(text: str, cost_model: CostModel | None = None, target: Processor = Processor.AUTOMAX) -> CompiledTask:
+    program = program_of(text, target=target)
     return compile_program(program, {spec.name: view for view, spec in enumerate(views_of(program))}, cost_model)
 
 
-def task_of(text: str, memory_class=CommonMemory, cost_model=None, **commons: Value) -> tuple[Task, CommonMemory]:
+def task_of(
+    text: str, memory_class=CommonMemory, cost_model=None, target=Processor.AUTOMAX, **commons: Value
+) -> tuple[Task, CommonMemory]:
     """A task and a memory made of its own COMMON statements; ``commons`` by name, such as ``**{"REF%": 5}``."""
-    compiled = compiled_of(text, cost_model)
+    compiled = compiled_of(text, cost_model, target)
     memory = memory_class(views_of(compiled.program))
     for name, value in commons.items():
         memory.write_from_outside(memory.view(name), value, OTHER)

@@ -6,11 +6,13 @@ import dataclasses
 from collections import Counter
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Block, Form
+from automax_ros.blocks.declaration import Access, Block, Form, Given, Output, Processor, Special
+from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.rules import AtLeast, Contiguous, Needs, NumberTrue
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, type_of_name
 
@@ -18,9 +20,11 @@ from .block_model import SIZE, TICKS, Model, ModelBlock, Programmed
 from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_in_steps, task_of
 
 BLOCKS = [block for block in CATALOGUE.values() if block.step is not None]
+ON_A_RACK = [block for block in BLOCKS if Processor.AUTOMAX in block.runs_on]
 EDGES = st.sampled_from([-32768, -32767, -1, 0, 1, 32766, 32767])
 VALUES = {
     DataType.INTEGER: EDGES | st.integers(-32768, 32767) | st.integers(-50, 50),
+    DataType.DOUBLE: st.sampled_from([-(2**31), 2**31 - 1, 2**31 - 32768, 0, 1]) | st.integers(-(2**31), 2**31 - 1),
     DataType.BOOLEAN: st.booleans(),
     DataType.REAL: st.sampled_from([0.0, -1.0, 1e-7, 0.5, 2.0, 3.7, 10.0, 63.0, 200.0, 1e6]).map(
         lambda value: stored_real(value)[0]
@@ -29,22 +33,30 @@ VALUES = {
 REAL_LITERALS = ("0.5", "2.0", "10.0")
 """Inside the limits of every coefficient at this scan period."""
 SIMPLE = {
+    DataType.DOUBLE: ["L1!", "K1!"],
     DataType.INTEGER: ["L1%", "L2%", "K1%", "K2%"],
-    DataType.BOOLEAN: ["L1@", "L2@", "K1@", "K2@"],
+    DataType.BOOLEAN: ["L1@", "L2@", "K1@", "K2@", "L3@", "K3@"],
     DataType.REAL: ["L1", "L2", "K1", "K2"],
 }
 ARRAYS = {
+    DataType.DOUBLE: ["LT!", "KT!"],
     DataType.INTEGER: ["LT%", "KT%"],
     DataType.BOOLEAN: ["LT@", "KT@"],
     DataType.REAL: ["LT", "KT"],
 }
+SMALL = ("MAX_COLUMNS", "REQUIRED_SAMPLES")
+"""Literals that size a buffer: small, so that a few scans fill it."""
+TABLES = ["LF%", "KF%"]
+"""Arrays of 3 = 2**1 + 1 elements, a size that every table may have."""
+TABLE_SIZE = 3
 INDEXES = ["LJ%", "KJ%", "0", "3"]
 ALL_SIMPLE = [*(name for names in SIMPLE.values() for name in names), "LJ%", "KJ%"]
 ALL_ARRAYS = [name for names in ARRAYS.values() for name in names]
+SIZES = {**dict.fromkeys(ALL_ARRAYS, SIZE), **dict.fromkeys(TABLES, TABLE_SIZE)}
 
 
 def declarations() -> str:
-    names = [*ALL_SIMPLE, *(f"{name}({SIZE - 1})" for name in ALL_ARRAYS)]
+    names = [*ALL_SIMPLE, *(f"{name}({size - 1})" for name, size in SIZES.items())]
     local = ", ".join(name for name in names if name.startswith("L"))
     common = ", ".join(name for name in names if name.startswith("K"))
     return f"10 LOCAL {local}\n11 COMMON {common}\n"
@@ -62,30 +74,109 @@ def literals(item) -> st.SearchStrategy[str]:
         return st.sampled_from(REAL_LITERALS)
     if item.type is DataType.BOOLEAN:
         return st.sampled_from(["TRUE", "FALSE"])
+    if item.one_of:
+        return st.sampled_from([str(value) for value in item.one_of])
+    if item.name in SMALL:
+        return st.sampled_from(["1", "2", "3", "5"])
     low, high = (-32768 if item.low is None else item.low), (32767 if item.high is None else item.high)
     return (st.integers(low, high) | st.sampled_from([low, high, max(low, min(high, 1))])).map(str)
 
 
 @st.composite
-def calls(draw, block: Block) -> Programmed:
+def inputs(draw, block: Block, everything: bool) -> dict[str, str]:
     parameters = {}
-    everything = draw(st.booleans())
     for item in block.inputs:
         if not (item.required or everything or draw(st.booleans())):
             continue
-        choices = [] if item.form is Form.VARIABLE else [literals(item)]
-        if item.form is not Form.LITERAL:
-            choices.append(variables(item.type))
-            if item.type is DataType.BOOLEAN:
-                choices.append(variables(item.type).map(lambda name: f"-{name}"))
-        parameters[item.name] = draw(st.one_of(choices))
-    if any(rule.faults(parameters) for rule in block.rules):
-        for item in block.inputs:
-            parameters.setdefault(item.name, draw(variables(item.type)))
+        if item.type is Special.TABLE:
+            parameters[item.name] = draw(st.sampled_from(TABLES))
+        elif isinstance(item.type, Special):
+            parameters[item.name] = f"QUEUE{item.type.element.value}"
+        else:
+            choices = [] if item.form is Form.VARIABLE else [literals(item)]
+            if item.form is not Form.LITERAL:
+                choices.append(variables(item.type))
+                if item.also is not None:
+                    choices.append(variables(item.also))
+                if item.type is DataType.BOOLEAN:
+                    choices.append(variables(item.type).map(lambda name: f"-{name}"))
+            parameters[item.name] = draw(st.one_of(choices))
+    return parameters
+
+
+def targets(block: Block, output: Output) -> st.SearchStrategy[str]:
+    """Variables for an output.
+
+    Where outputs hold, each output has one of its own: what a block leaves as it is must not be another's target.
+    """
+    if not any(item.holds and item.name[-1].isdigit() for item in block.outputs):
+        return variables(output.type)
+    if not output.holds:
+        return st.sampled_from(["L3@", "K3@"])
+    own, mark = int(output.name[-1]) - 1, output.type.value
+    return st.sampled_from(
+        [f"LT{mark}({own})", f"KT{mark}({own})"] if own < SIZE else [SIMPLE[output.type][own - SIZE]]
+    )
+
+
+@st.composite
+def calls(draw, block: Block) -> Programmed:
+    """A CALL that breaks no rule of the block."""
+    everything = draw(st.booleans())
+    parameters = draw(inputs(block, everything))
     for output in block.outputs:
         if output.required or everything or draw(st.booleans()):
-            parameters[output.name] = draw(variables(output.type))
+            parameters[output.name] = draw(targets(block, output))
+    for rule in block.rules:
+        if any(rule.faults(seen_by_rules(parameters))):
+            _mend(draw, block, rule, parameters)
+    assume(not any(rule.faults(seen_by_rules(parameters)) for rule in block.rules))
     return Programmed(block, parameters)
+
+
+def _mend(draw, block: Block, rule, parameters: dict[str, str]) -> None:
+    """Program what a rule asks for besides: channels without a gap, one of a group, tables that go together."""
+    wanted: list[str] = []
+    if isinstance(rule, Contiguous):
+        last = max((int(name[-1]) for name in parameters if name[-1].isdigit()), default=0)
+        wanted = [f"{stem}{channel}" for channel in range(1, last + 1) for stem in rule.stems]
+    elif isinstance(rule, AtLeast):
+        wanted = draw(st.lists(st.sampled_from(rule.group), min_size=rule.count, max_size=rule.count, unique=True))
+    elif isinstance(rule, Needs):
+        wanted = [rule.other]
+    elif isinstance(rule, NumberTrue):
+        chosen = draw(st.lists(st.sampled_from(rule.group), min_size=rule.low, max_size=rule.high, unique=True))
+        parameters.update({name: str(name in chosen).upper() for name in rule.group})
+    for name in wanted:
+        item = block.parameter(name)
+        if name not in parameters:
+            choice = st.sampled_from(TABLES) if item.type is Special.TABLE else variables(item.type)
+            parameters[name] = draw(targets(block, item) if isinstance(item, Output) else choice)
+
+
+def seen_by_rules(parameters: dict[str, str]) -> dict[str, Given]:
+    words = {"TRUE": True, "FALSE": False}
+    seen = {}
+    for keyword, text in parameters.items():
+        value = words.get(text, int(text) if text.lstrip("-").isdigit() else None)
+        seen[keyword] = Given(value, SIZES.get(text))
+    return seen
+
+
+@st.composite
+def with_its_structure(draw, block: Block) -> list[Programmed]:
+    """A CALL, behind the SHIFT block that makes the data structure that it uses."""
+    call = draw(calls(block))
+    if block.structure is not Access.USES:
+        return [call]
+    shift = CATALOGUE[f"SHIFT_{block.name.partition('_')[2]}"]
+    kind = DataType.BOOLEAN if block.name.endswith("BITS") else DataType.INTEGER
+    parameters = {"STRUCTURE_NAME": f"QUEUE{kind.value}", "MAX_COLUMNS": draw(st.sampled_from(["1", "2", "3"]))}
+    parameters["SHIFT"] = draw(variables(DataType.BOOLEAN))
+    for channel in range(1, 9):
+        parameters[f"INPUT{channel}"] = draw(variables(kind))
+        parameters[f"OUTPUT{channel}"] = draw(targets(shift, shift.parameter(f"OUTPUT{channel}")))
+    return [Programmed(shift, parameters), call]
 
 
 @st.composite
@@ -112,16 +203,19 @@ def used(programmed: list[Programmed]) -> list[str]:
 
 def compare(programmed: list[Programmed], changes, in_steps: bool) -> None:
     body = "\n".join(call.text(100 + number) for number, call in enumerate(programmed))
-    task, memory = task_of(f"{declarations()}20 CALL SCAN_LOOP(TICKS={TICKS})\n{body}\n999 END\n")
+    target = Processor.AUTOMAX if all(call.block in ON_A_RACK for call in programmed) else Processor.UDC
+    task, memory = task_of(f"{declarations()}20 CALL SCAN_LOOP(TICKS={TICKS})\n{body}\n999 END\n", target=target)
     task.record_scans()
     task.run()
     model = Model(
         {
             **{name: type_of_name(name).zero for name in ALL_SIMPLE},
-            **{name: [type_of_name(name).zero] * SIZE for name in ALL_ARRAYS},
+            **{name: [type_of_name(name).zero] * size for name, size in SIZES.items()},
         }
     )
-    blocks = [ModelBlock(call) for call in programmed]
+    structures: dict[str, Instance] = {}
+    blocks = [ModelBlock(call, structures) for call in programmed]
+    fill_tables(task, memory, model)
     for now, change in enumerate(changes):
         for name, value in change.items():
             model.values[name] = value
@@ -144,15 +238,26 @@ def compare(programmed: list[Programmed], changes, in_steps: bool) -> None:
         assert Counter(code for _, code in task._io.record.errors) == Counter(model.codes)
 
 
+def fill_tables(task, memory, model: Model) -> None:
+    """Put numbers into the tables, so that looking up finds some."""
+    for name, values in (("LF%", [-300, 50, 20000]), ("KF%", [0, 7, -32768])):
+        model.values[name] = list(values)
+        for index, value in enumerate(values):
+            if name.startswith("L"):
+                task.value(name)[index] = value
+            else:
+                memory.write_from_outside(memory.view(name), value, OTHER, index)
+
+
 def actual_values(task, memory) -> dict[str, object]:
     values = {}
-    for name in [*ALL_SIMPLE, *ALL_ARRAYS]:
+    for name in [*ALL_SIMPLE, *SIZES]:
         if name.startswith("L"):
             values[name] = task.value(name)
         elif name in ALL_SIMPLE:
             values[name] = memory.read_now(memory.view(name))
         else:
-            values[name] = [memory.read_now(memory.view(name), index) for index in range(SIZE)]
+            values[name] = [memory.read_now(memory.view(name), index) for index in range(SIZES[name])]
     return values
 
 
@@ -164,8 +269,8 @@ def type_of(value: object) -> object:
 @given(data=st.data())
 @repeatable(40)
 def test_a_compiled_block_is_its_step_function(block, data):
-    call = data.draw(calls(block))
-    compare([call], data.draw(scans(used([call]), 5)), data.draw(st.booleans()))
+    programmed = data.draw(with_its_structure(block))
+    compare(programmed, data.draw(scans(used(programmed), 5)), data.draw(st.booleans()))
 
 
 @pytest.mark.soak
@@ -173,15 +278,16 @@ def test_a_compiled_block_is_its_step_function(block, data):
 @given(data=st.data())
 @repeatable(400)
 def test_a_compiled_block_is_its_step_function_long(block, data):
-    call = data.draw(calls(block))
-    compare([call], data.draw(scans(used([call]), 12)), data.draw(st.booleans()))
+    programmed = data.draw(with_its_structure(block))
+    compare(programmed, data.draw(scans(used(programmed), 12)), data.draw(st.booleans()))
 
 
 @given(data=st.data())
 @repeatable(60)
 def test_blocks_one_after_the_other(data):
     """They share variables, also several of one kind, each with a state of its own."""
-    chosen = data.draw(st.lists(st.sampled_from(BLOCKS), min_size=2, max_size=5))
+    several = [block for block in ON_A_RACK if block.structure is None]
+    chosen = data.draw(st.lists(st.sampled_from(several), min_size=2, max_size=5))
     programmed = [data.draw(calls(block)) for block in chosen]
     compare(programmed, data.draw(scans(used(programmed), 5)), data.draw(st.booleans()))
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Access, Block, Form, Input, Output, Processor, Special
+from automax_ros.blocks.rules import AtLeast, Contiguous, NumberTrue
+from automax_ros.core.types import DataType
 from automax_ros.runtime.cost import STATEMENT_ESTIMATES_US, CostModel, Model
 
 from .support import lines, scan_in_steps, task_of
@@ -21,8 +24,8 @@ BLOCKS = """10 COMMON A%, B%, C%, D!, X@, Y@
 """
 
 
-def times(model: Model, text: str) -> list[int]:
-    task, _ = task_of(text, cost_model=CostModel(model))
+def times(model: Model, text: str, target: Processor = Processor.AUTOMAX) -> list[int]:
+    task, _ = task_of(text, cost_model=CostModel(model), target=target)
     task.run()
     return scan_in_steps(task, 0)
 
@@ -60,23 +63,52 @@ def test_6011_has_the_times_of_6010():
     assert times(Model.MODEL_6011, BLOCKS) == times(Model.MODEL_6010, BLOCKS)
 
 
+VARIABLES = {DataType.INTEGER: "A%", DataType.DOUBLE: "D!", DataType.BOOLEAN: "X@", DataType.REAL: "R"}
+
+
+def value_of(item) -> str:
+    """What a parameter is given: a variable where it may be one."""
+    if item.type is Special.TABLE:
+        return "T%"
+    if isinstance(item.type, Special):
+        return f"QUEUE{item.type.element.value}"
+    if getattr(item, "form", None) is Form.LITERAL:
+        return str(item.sample or item.default or 3).upper()
+    return VARIABLES[item.type]
+
+
+def call_of(block: Block) -> tuple[str, list[str]]:
+    """A CALL with two channels where the block has channels, and the names of what it programs."""
+    names = [item.name for item in block.parameters if item.required]
+    for rule in block.rules:
+        if isinstance(rule, AtLeast):
+            names += [name for name in rule.group[:2] if name not in names]
+        elif isinstance(rule, Contiguous):
+            names += [f"{stem}2" for stem in rule.stems]
+        elif isinstance(rule, NumberTrue):
+            names.append(rule.group[0])
+    parameters = ", ".join(f"{name}={value_of(block.parameter(name))}" for name in names)
+    return f"CALL {block.name}({parameters})", names
+
+
 @pytest.mark.parametrize("block", [block for block in CATALOGUE.values() if block.step], ids=lambda block: block.name)
 def test_every_block_takes_its_printed_time(block):
     """The same task with and without the block differs by its time."""
-    names = {"%": "A%", "@": "X@", "": "R"}
-    inputs = [
-        f"{item.name}={names[item.type.value]}"
-        for item in block.inputs
-        if item.required and item.form.name != "LITERAL"
-    ]
-    if block.name == "LATCH":
-        inputs = ["SET=X@", "RESET=X@"]
-    outputs = [f"{item.name}={names[item.type.value]}" for item in block.outputs if item.required]
-    without = sum(times(Model.MODEL_7010, lines("REM")))
-    call = f"CALL {block.name}({', '.join([*inputs, *outputs])})"
-    printed = block.times.model_7010
-    expected = printed.base + printed.j * len(inputs)
-    assert sum(times(Model.MODEL_7010, lines(call))) - without == pytest.approx(expected * 1000, abs=1)
+    on_udc = Processor.AUTOMAX not in block.runs_on
+    model, target = (Model.UDC, Processor.UDC) if on_udc else (Model.MODEL_7010, Processor.AUTOMAX)
+    printed = block.times.udc if on_udc else block.times.model_7010
+    head = "10 LOCAL A%, D!, X@, R, T%(16)\n20 CALL SCAN_LOOP(TICKS=4)\n"
+    if block.structure is Access.USES:
+        head += f"30 {call_of(CATALOGUE['SHIFT_' + block.name.partition('_')[2]])[0]}\n"
+    call, names = call_of(block)
+    given = [block.parameter(name) for name in names]
+    outputs = sum(isinstance(item, Output) for item in given)
+    channels = sum(isinstance(item, Input) and item.name[-1].isdigit() for item in given)
+    pairs = sum(isinstance(item, Input) and item.name.startswith("INPUT") for item in given)
+    expected = printed.base + printed.n * outputs + printed.j * channels + (printed.k + printed.p) * pairs
+    expected += printed.m * 17
+    without = sum(times(model, f"{head}90 END\n", target))
+    assert sum(times(model, f"{head}40 {call}\n90 END\n", target)) - without == pytest.approx(expected * 1000, abs=1)
 
 
 def test_cost_is_yielded_before_each_access_to_actual_memory():

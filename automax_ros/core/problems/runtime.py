@@ -9,6 +9,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX7002", "32-bit overflow inside a block"),
     Problem("AMX7003", "division by zero inside a block"),
     Problem("AMX7004", "coefficient out of its limits"),
+    Problem("AMX7005", "column that the data structure does not have"),
     Problem("AMX7020", "value clamped on assignment to an INTEGER variable"),
     Problem("AMX7021", "value clamped on assignment to a DOUBLE INTEGER variable"),
     Problem("AMX7022", "value clamped on assignment to a REAL variable"),

@@ -73,6 +73,18 @@ _BLOCKS = (
     Problem("AMX4084", "coefficient outside of its limits"),
     Problem("AMX4085", "TICKS above the UDC's maximum"),
     Problem("AMX4086", "common shared by blocks and BASIC statements", Severity.WARNING),
+    Problem("AMX4087", "not the name of a data structure of that type"),
+    Problem("AMX4088", "no SHIFT block makes the data structure"),
+    Problem("AMX4089", "data structure made twice"),
+    Problem("AMX4090", "channel that the data structure does not have"),
+    Problem("AMX4091", "storage of a block too large"),
+    Problem("AMX4092", "table of the wrong size"),
+    Problem("AMX4093", "data structure and variable of one name"),
+    Problem("AMX4094", "TABLE2 is never selected", Severity.WARNING),
+    Problem("AMX4095", "name of a data structure has 16 characters", Severity.WARNING),
+    Problem("AMX4096", "variable should be COMMON", Severity.WARNING),
+    Problem("AMX4097", "UDC task without THERMAL_OVERLOAD", Severity.WARNING),
+    Problem("AMX4098", "constant is limited at run time", Severity.WARNING),
 )
 
 PROBLEMS: tuple[Problem, ...] = (*_DECLARATIONS, *_EXPRESSIONS, *_FLOW, *_EVENTS, *_BLOCKS)

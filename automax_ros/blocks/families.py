@@ -1,0 +1,69 @@
+"""The families of control blocks: what belongs together, in the order in which the documentation tells of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from automax_ros.blocks.arithmetic import ABSOLUTE_VALUE, DIFFERENCE, INVERTER, MULTIPLY_DIVIDE, SUMMER
+from automax_ros.blocks.averages import RUNNING_AVERAGE, SAMPLED_AVERAGE
+from automax_ros.blocks.bits import BIT_SELECT, PACK_BITS, UNPACK_BITS
+from automax_ros.blocks.columns import READ_BITS, READ_WORDS, WRITE_BITS, WRITE_WORDS
+from automax_ros.blocks.comparison import ALARM, COMPARE
+from automax_ros.blocks.counter import COUNTER
+from automax_ros.blocks.declaration import Block
+from automax_ros.blocks.filters import LAG
+from automax_ros.blocks.integrators import INTEGRATE, PROP_INT
+from automax_ros.blocks.logic import AND, LATCH, OR, TRANSITION
+from automax_ros.blocks.mixing import AMPLIFIER, SELECT
+from automax_ros.blocks.protection import TACHLOSS_OVERSPEED, THERMAL_OVERLOAD
+from automax_ros.blocks.pulse import PULSE_MULT
+from automax_ros.blocks.ramp import RAMP
+from automax_ros.blocks.s_curve import S_CURVE
+from automax_ros.blocks.scan_loop import SCAN_LOOP
+from automax_ros.blocks.selection import LIMIT, MOVE, SCALE, SWITCH
+from automax_ros.blocks.shift import SHIFT_BITS, SHIFT_WORDS
+from automax_ros.blocks.tables import FUNCTION, SEARCH
+
+
+@dataclass(frozen=True)
+class Family:
+    """Blocks that belong together; ``name`` is the documentation's file name, ``about`` a sentence or two."""
+
+    name: str
+    title: str
+    about: str
+    blocks: tuple[Block, ...]
+
+
+FAMILIES: tuple[Family, ...] = (
+    Family("scan", "The scan", "Every task begins its scan with SCAN_LOOP and ends it with END.", (SCAN_LOOP,)),
+    Family(
+        "arithmetic",
+        "Arithmetic",
+        "Whole numbers of 16 bits; sums and products are made in 32 bits, quotients truncate toward zero.",
+        (ABSOLUTE_VALUE, AMPLIFIER, DIFFERENCE, INVERTER, MULTIPLY_DIVIDE, SELECT, SUMMER),
+    ),
+    Family("selection", "Selection and scaling", "What passes of a signal, and how.", (LIMIT, MOVE, SCALE, SWITCH)),
+    Family("comparison", "Comparison", "Booleans from numbers.", (ALARM, COMPARE)),
+    Family("logic", "Logic", "Booleans from booleans.", (AND, LATCH, OR, TRANSITION)),
+    Family("bits", "Bits", "Sixteen booleans and the number they make.", (BIT_SELECT, PACK_BITS, UNPACK_BITS)),
+    Family("counting", "Counting", "Pulses and counts, none of which is lost.", (COUNTER, PULSE_MULT)),
+    Family("ramps", "Ramps", "Signals that move at a limited rate.", (RAMP, S_CURVE)),
+    Family("tables", "Tables", "Arrays that a block looks up.", (FUNCTION, SEARCH)),
+    Family("averages", "Averages", "Means of samples, with their extremes.", (RUNNING_AVERAGE, SAMPLED_AVERAGE)),
+    Family(
+        "data_structures",
+        "Data structures",
+        "Columns of up to eight channels. A SHIFT block makes a data structure and moves it; READ and WRITE blocks of"
+        " the task reach single columns.",
+        (READ_BITS, READ_WORDS, SHIFT_BITS, SHIFT_WORDS, WRITE_BITS, WRITE_WORDS),
+    ),
+    Family(
+        "filters",
+        "Filters and controllers",
+        "Laplace functions, whose coefficients depend on the scan period.",
+        (INTEGRATE, LAG, PROP_INT),
+    ),
+    Family("protection", "Protection of a drive", "For UDC tasks.", (TACHLOSS_OVERSPEED, THERMAL_OVERLOAD)),
+)
+"""All families; every block belongs to one."""

@@ -1,0 +1,169 @@
+"""A CSV table that a subcommand reads: a header with names of variables, then a row a scan, one line each.
+
+The table is read line by line, so that one of millions of rows takes no more memory than one of ten.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import TypeVar
+
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import printable
+from automax_ros.core.types import DataType, Value
+
+MAX_LINE = 1_000_000
+"""Longest line of a table, in bytes (decision: a bound on memory for untrusted files)."""
+
+_WHOLE = re.compile(r"([-+]?[0-9]{1,40})(\.0{0,40})?")
+"""A whole number; spreadsheets write 100.0 into columns with empty cells."""
+_DECIMAL = re.compile(r"[-+]?([0-9]{1,60}(\.[0-9]{0,60})?|\.[0-9]{1,60})([eE][-+]?[0-9]{1,4})?")
+_TRUTH = {"0": False, "FALSE": False, "OFF": False, "0.0": False, "1": True, "TRUE": True, "ON": True, "1.0": True}
+
+_Table = TypeVar("_Table", bound="CsvTable")
+
+
+class CsvFault(Exception):
+    """Something is wrong with a table: ``code`` AMX6910 to AMX6916, the line from 1, and what to do if known."""
+
+    def __init__(self, code: str, line: int, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.code = code
+        self.line = line
+        self.hint = hint
+
+    def render(self, path: Path) -> str:
+        """Return the fault as the person reads it."""
+        text = f"{path}:{self.line}: error[{self.code}]: {self}"
+        return f"{text}\n  hint: {self.hint}" if self.hint else text
+
+
+class CsvTable:
+    """An open table, closed at the end of a ``with``. ``header`` has the cells of its first line, at least one."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a table and read its header.
+
+        Raises:
+            UsageError: the file cannot be read.
+            CsvFault: the header is no line of CSV.
+        """
+        self.path = path
+        self._line = 0
+        try:
+            self._stream = path.open("rb")
+        except (OSError, ValueError) as error:
+            raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+        try:
+            self.header = self._header()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self: _Table) -> _Table:
+        """Return the table itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole table; 0 where that is not known beforehand."""
+        return os.fstat(self._stream.fileno()).st_size
+
+    @property
+    def position(self) -> int:
+        """Bytes that were read so far."""
+        return self._stream.tell() if self._stream.seekable() else 0
+
+    def numbered_rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield each row's line and its cells, as many as the header has.
+
+        Empty lines at the end are no rows; in a table of one column an empty line before is a row with an empty cell.
+
+        Raises:
+            UsageError: the file cannot be read any more.
+            CsvFault: a row is at fault.
+        """
+        last_row = self._line
+        while (cells := self._next_line()) is not None:
+            if not cells:
+                continue
+            for line in self._empty_rows(range(last_row + 1, self._line)):
+                yield line, [""]
+            last_row = self._line
+            if len(cells) != len(self.header):
+                message = f"the row has {len(cells)} cells, the header {len(self.header)}"
+                raise CsvFault("AMX6914", self._line, message)
+            yield self._line, cells
+
+    def _empty_rows(self, lines: range) -> range:
+        """Return the empty lines between two rows, as rows."""
+        if lines and len(self.header) > 1:
+            raise CsvFault(
+                "AMX6914", lines[0], "the line is empty, and rows follow", "write the commas of an empty row"
+            )
+        return lines
+
+    def _header(self) -> list[str]:
+        names = self._next_line()
+        if not names:
+            raise CsvFault("AMX6910", 1, "the first line must name the variables", "such as REF%,RUN@")
+        return names
+
+    def _next_line(self) -> list[str] | None:
+        """Return the cells of the next line, [] for an empty one, None at the end."""
+        try:
+            line = self._stream.readline(MAX_LINE + 1)
+        except OSError as error:
+            raise UsageError(f"{self.path} cannot be read: {error.strerror or error}") from error
+        if not line:
+            return None
+        self._line += 1
+        if len(line) > MAX_LINE:
+            raise CsvFault("AMX6910", self._line, f"the line has more than {MAX_LINE} bytes")
+        if self._line == 1:
+            line = line.removeprefix(codecs.BOM_UTF8)
+        return self._cells(line)
+
+    def _cells(self, line: bytes) -> list[str]:
+        try:
+            text = line.decode().rstrip("\r\n")
+        except UnicodeDecodeError as error:
+            message = f"the table is not UTF-8: here is a byte {line[error.start]:#04x}"
+            raise CsvFault("AMX6910", self._line, message, "save the table as UTF-8") from error
+        if not text.strip():
+            return []
+        try:
+            if "\0" in text:
+                raise csv.Error("a NUL character")
+            return next(csv.reader((text,), strict=True, skipinitialspace=True))
+        except csv.Error as error:
+            hint = "a cell with quotes begins and ends with them on one line"
+            raise CsvFault("AMX6910", self._line, f"not CSV: {printable(str(error))}", hint) from error
+
+
+def cell_value(text: str, kind: DataType) -> Value | None:
+    """Return what a cell that is not empty says for a variable of a type, None if it says nothing for it."""
+    if kind is DataType.STRING:
+        return text
+    if kind is DataType.BOOLEAN:
+        return _TRUTH.get(text.upper()) if len(text) <= 5 else None
+    if kind is DataType.REAL:
+        return float(text) if _DECIMAL.fullmatch(text) else None
+    match = _WHOLE.fullmatch(text)
+    return int(match[1]) if match else None

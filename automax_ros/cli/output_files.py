@@ -1,0 +1,52 @@
+"""The tables that a subcommand writes: opened so that what goes wrong is told, and never over what is read."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+
+from automax_ros.cli.usage import UsageError
+
+
+@contextmanager
+def opened_for_writing(path: Path | None) -> Iterator[TextIO]:
+    """Open a table for writing, standard output without a path.
+
+    Raises:
+        UsageError: it cannot be written.
+    """
+    if path is None:
+        yield sys.stdout
+        return
+    try:
+        stream = path.open("w", encoding="utf-8", newline="")
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
+    with stream:
+        yield stream
+
+
+def require_different_files(read: Mapping[str, Path], written: Mapping[str, Path | None]) -> None:
+    """Refuse to write over what is read, or twice to one file; the keys are the arguments' names.
+
+    Raises:
+        UsageError: two arguments mean one file.
+    """
+    outputs = {key: path for key, path in written.items() if path}
+    for key, path in outputs.items():
+        for other, its_path in {**read, **outputs}.items():
+            if key != other and _is_same_file(path, its_path):
+                raise UsageError(f"{key} and {other} are the same file, {path}")
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one regular file, or would if it existed; two times /dev/null does no harm."""
+    try:
+        if one.exists() and other.exists():
+            return one.is_file() and one.samefile(other)
+        return one.resolve() == other.resolve()
+    except (OSError, ValueError, RuntimeError):
+        return False

@@ -1,0 +1,39 @@
+"""DINT and REAL of the Logix controllers."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+from automax_ros.core.numbers import INT32_MAX, INT32_MIN
+
+_SINGLE = struct.Struct("<f")
+
+
+def require_dint(member: str, value: object) -> None:
+    """Refuse what a DINT member cannot hold: it is a whole number in 32 bits, two's complement.
+
+    Raises:
+        ValueError: ``value`` is no int or lies beyond 32 bits; the message names the member.
+    """
+    if not isinstance(value, int) or not INT32_MIN <= value <= INT32_MAX:
+        raise ValueError(f"{member} is a DINT, a whole number from {INT32_MIN} to {INT32_MAX}, not {value!r}")
+
+
+def require_real(member: str, value: object) -> None:
+    """Refuse what is no number for a REAL member; a number that is too large is Infinity there.
+
+    Raises:
+        ValueError: ``value`` is no number; the message names the member.
+    """
+    if not isinstance(value, (int, float)):
+        raise ValueError(f"{member} is a REAL, a number, not {value!r}")
+
+
+def single(value: float) -> float:
+    """Return what a REAL holds of a number: the nearest IEEE 754 single, +-Infinity beyond the largest."""
+    try:
+        held: float = _SINGLE.unpack(_SINGLE.pack(value))[0]
+    except (OverflowError, struct.error):  # the latter for an int that is too large for any float
+        return math.inf if value > 0 else -math.inf
+    return held

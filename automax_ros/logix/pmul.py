@@ -1,0 +1,176 @@
+"""PMUL, the pulse multiplier of the Logix controllers: counts/scan of a feedback module, without losing any.
+
+The source is the Logix Designer page of the instruction. Its own examples decide two misprints there: the roll-over
+edge is 2**(WordSize - 1), and "2500 => (25,000/100,000)" means a Multiplier of 25000.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from automax_ros.core.numbers import INT32_MAX, INT32_MIN, sign_extended, truncated_quotient
+from automax_ros.logix.data_types import require_dint, single
+
+GAIN_ONE = 100_000
+"""The Multiplier whose ratio of In to Out is 1."""
+MULTIPLIER_LIMIT = 1_000_000
+"""Largest magnitude of a Multiplier; what lies beyond is limited to it."""
+MIN_WORD_SIZE, MAX_WORD_SIZE = 2, 32
+EXACT_LIMIT = 2**24
+"""Largest magnitude of Out up to which a REAL holds every whole number."""
+
+_INSTRUCT_FAULT, _WORD_SIZE_INV, _OUT_OVERFLOW, _LOST_PRECISION, _MULTIPLIER_INV = (1 << bit for bit in range(5))
+
+
+@dataclass
+class PulseMultiplier:
+    """A tag of type PULSE_MULTIPLIER, with the instruction's internal registers.
+
+    Set the input members, call ``scan``, read the output members. ``scan`` refuses values that the members' types
+    cannot hold.
+
+    Input members: ``EnableIn``; ``In`` (DINT, counts); ``Initialize``; ``InitialValue`` (DINT, counts); ``Mode``, TRUE
+    for relative, FALSE for absolute; ``WordSize`` (DINT, 2 to 32 bits; relative mode only); ``Multiplier`` (DINT,
+    -1,000,000 to 1,000,000, in 1/100,000).
+
+    Output members: ``EnableOut``; ``Out`` (REAL, whole counts); ``Status`` (DINT) and its bits, which are properties.
+
+    Registers: ``previous_in`` is In(n-1), ``remainder`` is INT_Remainder, in 1/100,000 of a count and with its sign.
+
+    Decisions, where the page is silent:
+
+    - Ans has 64 bits, which it never leaves; INT_Out is a DINT. OutOverflow tells that the quotient left 32 bits:
+      Out is then Infinity of its sign, and the remainder is that of the true quotient.
+    - LostPrecision judges the integer, before it becomes a REAL; an infinite Out has lost precision too.
+    - InstructFault is set with any of the other four bits, which are the errors that its text lists.
+    - The difference keeps its low WordSize bits with their sign, as in PULSE_MULT: a change of exactly half a word
+      gives -2**(WordSize - 1) in either direction.
+    - An invalid WordSize holds Out with its status bits, In(n-1) and the remainder: a later valid WordSize counts from
+      there. In absolute mode, which does not use it, no WordSize is invalid.
+    - Initialize is stronger than an invalid WordSize. Both parameters are judged while it is set.
+    - Without EnableIn registers and Status stay as they are: the next execution sees the whole change since the last.
+    - The first scan is the first execution of a new tag or after a prescan. With Initialize set it is like any other.
+    - Absolute mode keeps In(n-1) up to date, so that a change of Mode starts from the last In.
+    """
+
+    EnableIn: bool = True
+    In: int = 0
+    Initialize: bool = False
+    InitialValue: int = 0
+    Mode: bool = True
+    WordSize: int = 14
+    Multiplier: int = GAIN_ONE
+    EnableOut: bool = field(default=False, init=False)
+    Out: float = field(default=0.0, init=False)
+    Status: int = field(default=0, init=False)
+    previous_in: int = field(default=0, init=False)
+    remainder: int = field(default=0, init=False)
+    _first_scan: bool = field(default=True, init=False, repr=False)
+    _was_initialize: bool = field(default=False, init=False, repr=False)
+
+    @property
+    def InstructFault(self) -> bool:
+        """Status.0: one of the errors below was found."""
+        return bool(self.Status & _INSTRUCT_FAULT)
+
+    @property
+    def WordSizeInv(self) -> bool:
+        """Status.1: WordSize is not 2 to 32."""
+        return bool(self.Status & _WORD_SIZE_INV)
+
+    @property
+    def OutOverflow(self) -> bool:
+        """Status.2: the internal output left 32 bits, Out is infinite."""
+        return bool(self.Status & _OUT_OVERFLOW)
+
+    @property
+    def LostPrecision(self) -> bool:
+        """Status.3: Out is beyond +-2**24, where a REAL does not hold every whole number."""
+        return bool(self.Status & _LOST_PRECISION)
+
+    @property
+    def MultiplierInv(self) -> bool:
+        """Status.4: Multiplier is beyond +-1,000,000 and was limited."""
+        return bool(self.Status & _MULTIPLIER_INV)
+
+    def prescan(self) -> None:
+        """Do what the controller does before its first scan in Run: EnableIn and EnableOut are cleared.
+
+        The next execution is a first scan. It needs EnableIn set again: by its wire in a function block diagram, by the
+        controller in structured text, by you here.
+        """
+        self.EnableIn = False
+        self.EnableOut = False
+        self._first_scan = True
+        self._was_initialize = False
+
+    def postscan(self) -> None:
+        """Do what the controller does after a sequential function chart's last scan: clear EnableIn and EnableOut."""
+        self.EnableIn = False
+        self.EnableOut = False
+
+    def scan(self) -> None:
+        """Execute the instruction once, if EnableIn is set.
+
+        Raises:
+            ValueError: In, InitialValue, WordSize or Multiplier is no DINT; nothing was executed.
+        """
+        self._require_dints()
+        self.EnableOut = bool(self.EnableIn)
+        if not self.EnableIn:
+            return
+        self._set_registers()
+        found = self._parameter_errors()
+        if self.Initialize:
+            self.Out = 0.0
+        elif found & _WORD_SIZE_INV:
+            found |= self.Status & (_OUT_OVERFLOW | _LOST_PRECISION)
+        else:
+            self.Out, errors = _out_of(self._multiplied())
+            found |= errors
+        self.Status = found | _INSTRUCT_FAULT if found else 0
+
+    def _require_dints(self) -> None:
+        require_dint("In", self.In)
+        require_dint("InitialValue", self.InitialValue)
+        require_dint("WordSize", self.WordSize)
+        require_dint("Multiplier", self.Multiplier)
+
+    def _set_registers(self) -> None:
+        """Give the registers what Initialize, its end, or a first scan demands."""
+        if self.Initialize:
+            self.previous_in = 0
+            self.remainder = 0
+        elif self._was_initialize:
+            self.previous_in = self.InitialValue
+        elif self._first_scan:
+            self.previous_in = self.In
+            self.remainder = 0
+        self._first_scan = False
+        self._was_initialize = bool(self.Initialize)
+
+    def _parameter_errors(self) -> int:
+        found = 0
+        if self.Mode and not MIN_WORD_SIZE <= self.WordSize <= MAX_WORD_SIZE:
+            found |= _WORD_SIZE_INV
+        if not -MULTIPLIER_LIMIT <= self.Multiplier <= MULTIPLIER_LIMIT:
+            found |= _MULTIPLIER_INV
+        return found
+
+    def _multiplied(self) -> int:
+        """Return INT_Out of this scan and keep what is left over."""
+        difference = sign_extended(self.In - self.previous_in, self.WordSize) if self.Mode else self.In
+        multiplier = max(-MULTIPLIER_LIMIT, min(self.Multiplier, MULTIPLIER_LIMIT))
+        answer = difference * multiplier + self.remainder
+        quotient = truncated_quotient(answer, GAIN_ONE)
+        self.remainder = answer - quotient * GAIN_ONE
+        self.previous_in = self.In
+        return quotient
+
+
+def _out_of(quotient: int) -> tuple[float, int]:
+    """Return Out and the status bits that speak of it."""
+    if not INT32_MIN <= quotient <= INT32_MAX:
+        return math.copysign(math.inf, quotient), _OUT_OVERFLOW | _LOST_PRECISION
+    return single(quotient), 0 if -EXACT_LIMIT <= quotient <= EXACT_LIMIT else _LOST_PRECISION

@@ -1,0 +1,67 @@
+"""UPDN, the up/down accumulator of the Logix controllers: as far as a position is summed up behind PMUL."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from automax_ros.logix.data_types import require_real, single
+
+
+@dataclass
+class UpDownAccumulator:
+    """A tag of type UP_DOWN_ACCUM, with the instruction's internal accumulator.
+
+    Set the input members, call ``scan``, read ``Out``. Numbers are REAL: each sum is rounded to an IEEE single, so
+    whole numbers are exact up to 2**24 = 16,777,216 and counts get lost beyond.
+
+    Covered: all eight members and the three cases of the algorithm: Initialize gives InitialValue, else Hold keeps the
+    accumulator, else it becomes accumulator + InPlus - InMinus. Not covered: the controller's math status flags.
+
+    Decisions: InPlus is added first, then InMinus is subtracted, each sum rounded. A sum that overflows is Infinity
+    with EnableOut cleared. The accumulator is 0 on a first scan: the first execution of a new tag or after a prescan.
+    """
+
+    EnableIn: bool = True
+    Initialize: bool = False
+    InitialValue: float = 0.0
+    InPlus: float = 0.0
+    InMinus: float = 0.0
+    Hold: bool = False
+    EnableOut: bool = field(default=False, init=False)
+    Out: float = field(default=0.0, init=False)
+    accumulator: float = field(default=0.0, init=False)
+    _first_scan: bool = field(default=True, init=False, repr=False)
+
+    def prescan(self) -> None:
+        """Do what the controller does before its first scan in Run: clear EnableIn and EnableOut (see PMUL)."""
+        self.EnableIn = False
+        self.EnableOut = False
+        self._first_scan = True
+
+    def postscan(self) -> None:
+        """Clear EnableIn and EnableOut."""
+        self.EnableIn = False
+        self.EnableOut = False
+
+    def scan(self) -> None:
+        """Execute the instruction once, if EnableIn is set; without it Out and the accumulator stay.
+
+        Raises:
+            ValueError: InitialValue, InPlus or InMinus is no number; nothing was executed.
+        """
+        require_real("InitialValue", self.InitialValue)
+        require_real("InPlus", self.InPlus)
+        require_real("InMinus", self.InMinus)
+        if not self.EnableIn:
+            self.EnableOut = False
+            return
+        if self._first_scan:
+            self.accumulator = 0.0
+            self._first_scan = False
+        if self.Initialize:
+            self.accumulator = single(self.InitialValue)
+        elif not self.Hold:
+            self.accumulator = single(single(self.accumulator + single(self.InPlus)) - single(self.InMinus))
+        self.Out = self.accumulator
+        self.EnableOut = math.isfinite(self.Out)
