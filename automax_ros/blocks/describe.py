@@ -25,17 +25,17 @@ def description(block: Block) -> str:
     parts = [
         f"{block.name}: {block.title} (J-3676-5, section {block.section})\n",
         textwrap.fill(block.function, WIDTH, initial_indent="    ", subsequent_indent="    ") + "\n",
-        _section("Inputs", _input_rows(block)),
+        _section("Inputs", input_rows(block)),
     ]
     if block.outputs:
-        parts.append(_section("Outputs", _output_rows(block)))
+        parts.append(_section("Outputs", output_rows(block)))
     if block.coefficients:
-        parts.append(_section("Limits", _limit_rows(block)))
+        parts.append(_section("Limits", limit_rows(block)))
     parts.append(_list("Rules", [rule.text for rule in block.rules]))
     parts.append(_list("Notes", list(block.notes)))
     parts.append(_list("Logs", [f"{code} {PROBLEMS[code].title}" for code in block.problems]))
     parts.append("Runs on: " + ", ".join(item.value for item in Processor if item in block.runs_on) + "\n")
-    parts.append(_section("Execution time, microseconds (section 53)", _time_rows(block)))
+    parts.append(_section("Execution time, microseconds (section 53)", time_rows(block)))
     parts.append("Template\n\n" + template(block))
     return "\n".join(part for part in parts if part)
 
@@ -79,7 +79,8 @@ def _type_word(item: Input | Output) -> str:
     return item.type.word if also is None else f"{also.word}/DOUBLE"
 
 
-def _input_rows(block: Block) -> list[tuple[str, ...]]:
+def input_rows(block: Block) -> list[tuple[str, ...]]:
+    """Return a row an input: name, symbol, type, need, form, meaning."""
     return [
         (item.name, _symbol(block, item), _type_word(item), _need(item), _form(item), _remarks(block, item))
         for item in block.inputs
@@ -115,14 +116,16 @@ def _remarks(block: Block, item: Input) -> str:
     return text
 
 
-def _output_rows(block: Block) -> list[tuple[str, ...]]:
+def output_rows(block: Block) -> list[tuple[str, ...]]:
+    """Return a row an output: name, symbol, type, need, meaning."""
     return [
         (item.name, _symbol(block, item), _type_word(item), "required" if item.required else "optional", item.text)
         for item in block.outputs
     ]
 
 
-def _limit_rows(block: Block) -> list[tuple[str, ...]]:
+def limit_rows(block: Block) -> list[tuple[str, ...]]:
+    """Return a row a limit of coefficients, and one that explains the formulas where there are any."""
     assert block.coefficients is not None
     rows: list[tuple[str, ...]]
     rows = [(limit.parameter, limit.low_text, "to", limit.high_text) for limit in block.coefficients.limits]
@@ -132,7 +135,8 @@ def _limit_rows(block: Block) -> list[tuple[str, ...]]:
     return [*rows, ("", "with T the scan period in s, C = WM / tan(WM T / 2)")]
 
 
-def _time_rows(block: Block) -> list[tuple[str, ...]]:
+def time_rows(block: Block) -> list[tuple[str, ...]]:
+    """Return a row for each Processor that runs the block: its name, the execution time."""
     times = block.times
     named: Mapping[str, Time | None] = {
         "7010 (57C435)": times.model_7010,

@@ -72,7 +72,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6822", "more than one run in the recording"),
     Problem("AMX6823", "gap in the write log"),
     Problem("AMX6824", "CSV file cannot be written"),
-    # the command line: files and the tables of `automax trace`
+    # the command line: files and the tables of `automax trace` and `automax compare`
     Problem("AMX6900", "file that no task can be named after", Severity.WARNING),
     Problem("AMX6910", "not a CSV table"),
     Problem("AMX6911", "column of an unknown variable"),
