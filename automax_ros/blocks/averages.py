@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from automax_ros.blocks.declaration import Block, Form, Input, Output, State, Time, Times
 from automax_ros.blocks.rules import Storage
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
-from automax_ros.core.types import DataType
+from automax_ros.core.types import DataType, Value
 
 
 def running_average_step(
@@ -50,6 +52,10 @@ def running_average_step(
     return data_valid, max_value, min_value, output, samples, position, taken, total, highest, lowest
 
 
+def _required(facts: Mapping[str, Value]) -> int:
+    return int(facts["required_samples"])
+
+
 RUNNING_AVERAGE = Block(
     name="RUNNING_AVERAGE",
     section="25",
@@ -76,9 +82,9 @@ RUNNING_AVERAGE = Block(
         Output("OUTPUT", DataType.INTEGER, "O", "the average of the last samples"),
     ),
     states=(
-        State("samples", DataType.INTEGER, 0, size=lambda facts: int(facts["required_samples"])),
-        State("position", DataType.INTEGER, 0),
-        State("taken", DataType.INTEGER, 0),
+        State("samples", DataType.INTEGER, 0, size=_required),
+        State("position", DataType.INTEGER, 0, below=_required),
+        State("taken", DataType.INTEGER, 0, below=lambda facts: _required(facts) + 1),
         State("total", DataType.DOUBLE, 0),
         State("highest", DataType.INTEGER, INT16_MIN),
         State("lowest", DataType.INTEGER, INT16_MAX),

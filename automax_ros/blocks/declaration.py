@@ -164,13 +164,15 @@ class State:
 
     INTEGER states are ints of any width the step function keeps to, REAL states double precision. A state with a
     ``size`` is a buffer: the number of its elements comes from the facts of the CALL, by lower-case name: its literals
-    and defaults, and the ``CALL_FACTS``.
+    and defaults, and the ``CALL_FACTS``. A place in a buffer, or a count of places, is always 0 or more and less than
+    what ``below`` gives; a snapshot that breaks this is refused.
     """
 
     name: str
     type: DataType
     initial: Value
     size: Callable[[Mapping[str, Value]], int] | None = None
+    below: Callable[[Mapping[str, Value]], int] | None = None
 
 
 CALL_FACTS = ("elements", "channels", "max_columns", "programmed")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declaration import Block, Form, Input, Output, State, Time, Times
+from automax_ros.blocks.declaration import CLAMPED, Block, Form, Input, Output, State, Time, Times
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
@@ -19,18 +19,19 @@ def s_curve_step(  # noqa: PLR0912, PLR0915 - a step function calls no other
     initial_value: int,
     register: int,
     speed: int,
-) -> tuple[int, int, int, int]:
+) -> tuple[int, int, int, int, int]:
     """Move the register of OUTPUT x SCALE toward INPUT x SCALE; its speed changes by at most JERK_RATE a scan (26).
 
     The speed is the largest that can still be taken back, JERK_RATE a scan, before INPUT is reached: k full steps of
     the jerk take back k x JERK_RATE within JERK_RATE x k (k + 1) / 2. Decisions: accel leads up and decel down,
     exchanged by REVERSE; with JERK_RATE at least both rates the block is RAMP with ABS_RAMP = FALSE, reversals
-    included; JERK_RATE 0 keeps the speed there is; at the end of the 16-bit range OUTPUT stops, and the speed is the
-    move that was left.
+    included; JERK_RATE 0 keeps the speed there is. At the end of the 16-bit range OUTPUT is clamped, which is logged,
+    and the rate is set to 0 (note 5).
     """
     accel = accel_rate if accel_rate >= 0 else -accel_rate
     decel = decel_rate if decel_rate >= 0 else -decel_rate
     jerk = jerk_rate if jerk_rate >= 0 else -jerk_rate
+    problem = 0
     if reset:
         register = initial_value * scale
         speed = 0
@@ -80,11 +81,13 @@ def s_curve_step(  # noqa: PLR0912, PLR0915 - a step function calls no other
                 speed = -speed
         register = register + speed
         if register > INT16_MAX * scale:
-            speed = speed - register + INT16_MAX * scale
             register = INT16_MAX * scale
+            speed = 0
+            problem = CLAMPED
         elif register < INT16_MIN * scale:
-            speed = speed - register + INT16_MIN * scale
             register = INT16_MIN * scale
+            speed = 0
+            problem = CLAMPED
     if scale == 1:
         output = register
     elif register >= 0:
@@ -92,7 +95,7 @@ def s_curve_step(  # noqa: PLR0912, PLR0915 - a step function calls no other
     else:
         output = -(-register // scale)
     rate = speed if speed <= INT16_MAX else INT16_MAX
-    return output, rate, register, speed
+    return output, rate, register, speed, problem
 
 
 S_CURVE = Block(
@@ -127,12 +130,14 @@ S_CURVE = Block(
         Output("RATE", DataType.INTEGER, "RATE", "change of OUTPUT x SCALE in this scan", required=False),
     ),
     states=(State("register", DataType.INTEGER, 0), State("speed", DataType.INTEGER, 0)),
+    logs=("AMX7001",),
     times=Times(Time(47.00), Time(282.0), Time(35.01), Time(32.92)),
     notes=(
         "A rate of 0 holds the curve in that direction.",
         "A move of D counts takes D / ACCEL + ACCEL / JERK scans, or 2 x sqrt(D / JERK) if ACCEL is not reached.",
         "With JERK_RATE at least both rates the block does what RAMP does with ABS_RAMP = FALSE.",
         "OUTPUT overshoots only if INPUT, a rate or JERK_RATE changes so late that the rate cannot come down in time.",
+        "If it leaves the 16-bit range it is clamped, which is logged, and the rate is set to 0.",
         "JERK_RATE 0 keeps the rate there is.",
     ),
     step=s_curve_step,

@@ -142,8 +142,8 @@ def _states(size: Callable[[Mapping[str, Value]], int]) -> tuple[State, ...]:
     data, head, loaded = STRUCTURE_STATES
     return (
         State(data, DataType.INTEGER, 0, size),
-        State(head, DataType.INTEGER, 0),
-        State(loaded, DataType.INTEGER, 0),
+        State(head, DataType.INTEGER, 0, below=_columns),
+        State(loaded, DataType.INTEGER, 0, below=lambda facts: _columns(facts) + 1),
     )
 
 

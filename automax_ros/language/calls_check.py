@@ -36,7 +36,7 @@ def check_call(context: Context, call: Call) -> None:
         return
     before = context.errors
     if context.target not in block.runs_on:
-        message = f"{block.name} cannot be used in a {context.target.value.upper()} task"
+        message = f"{block.name} cannot be used in {context.task_words}"
         context.report("AMX4071", message, context.place_of(call.block, call.span))
     given = _arguments_by_keyword(context, block, call)
     values: dict[str, Expression] = {}

@@ -54,6 +54,12 @@ class Context:
         self.diagnostics.append(Diagnostic(code, message, span, self.line, hint, notes))
 
     @property
+    def task_words(self) -> str:
+        """The kind of task, for messages: ``an AUTOMAX task``."""
+        article = "an" if self.target is Processor.AUTOMAX else "a"
+        return f"{article} {self.target.value.upper()} task"
+
+    @property
     def errors(self) -> int:
         """The number of errors found so far, warnings left out."""
         return sum(PROBLEMS[item.code].severity is Severity.ERROR for item in self.diagnostics)

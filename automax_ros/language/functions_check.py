@@ -15,7 +15,7 @@ def check_function(context: Context, call: FunctionCall, types: list[DataType | 
     """Report what is wrong in a call whose arguments have these types, and return the type of its value."""
     function = FUNCTIONS[call.name]
     if context.target.value not in function.targets:
-        message = f"{call.name} cannot be used in a {context.target.value.upper()} task"
+        message = f"{call.name} cannot be used in {context.task_words}"
         context.report("AMX4027", message, call.span)
     if not len(function.arguments) <= len(types) <= function.most:
         context.report("AMX2013", f"{call.name} takes {_count(function)}, {len(types)} given", call.span)

@@ -35,7 +35,7 @@ def checked_value(context: Context, block: Block, parameter: Input | Output, arg
     if isinstance(parameter, Output):
         value: Expression | None = _checked_output(context, parameter, argument)
     elif context.target not in parameter.runs_on:
-        message = f"{parameter.name} of {block.name} cannot be used in a {context.target.value.upper()} task"
+        message = f"{parameter.name} of {block.name} cannot be used in {context.task_words}"
         context.report("AMX4027", message, argument.span)
         return None
     elif parameter.type is Special.EVENT:

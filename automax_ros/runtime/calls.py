@@ -75,7 +75,8 @@ class BlockInstance:
     def _state_field(self, state: State) -> Field:
         structure = self.bound.structure
         label = self.label if structure is None else structure.name
-        size = 1 if state.size is None else state.size(self.bound.facts)
+        facts = self.bound.facts
+        size = 1 if state.size is None else state.size(facts)
         dimensions = () if state.size is None else (size,)
         return Field(
             f"{label}.{state.name}",
@@ -85,6 +86,7 @@ class BlockInstance:
             size,
             is_array=state.size is not None,
             dimensions=dimensions,
+            below=0 if state.below is None else state.below(facts),
         )
 
     def _coefficient_fields(self) -> Iterator[tuple[str, Field]]:

@@ -41,7 +41,8 @@ class Field:
     """One field: ``name`` is the variable's full name, or line, block and state as in ``1030 LAG.y1``.
 
     ``initial`` is the value at installation (locals), or at the block's first execution since RUN; ``dimensions`` are
-    an array's, ``length`` is the longest text of a string.
+    an array's, ``length`` is the longest text of a string. ``below``, where it is not 0, tells that the value is 0 or
+    more and less than it: a place in a buffer.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Field:
     is_array: bool = False
     dimensions: tuple[int, ...] = ()
     length: int = 0
+    below: int = 0
 
     def fresh(self) -> StateValue:
         """Return the field's value at installation."""
@@ -70,6 +72,8 @@ class Field:
             return bool(value)
         elif self.type is DataType.REAL:
             return float(value)
+        elif self.below and not 0 <= value < self.below:
+            raise ValueError(f"{self.name} cannot be {value!r}: it is 0 to {self.below - 1}")
         elif math.isfinite(value) and (self.role not in _VARIABLES or _in_range(self.type, value)):
             return int(value)
         raise ValueError(f"{self.name} cannot be {value!r}: it is {self.type.word}")

@@ -342,7 +342,9 @@ class StatementLowering:
         self.emitter.emit(build.assign("data_pointer", build.constant(first if statement.line is not None else 0)))
 
     def _use_data(self) -> None:
-        self.fields["data_pointer"] = Field("DATA.pointer", DataType.DOUBLE, Role.STACK, 0)
+        self.fields["data_pointer"] = Field(
+            "DATA.pointer", DataType.DOUBLE, Role.STACK, 0, below=len(self.emitter.program.data) + 1
+        )
         self.emitter.extra_globals["data"] = self.emitter.program.data
 
     def _io_write(self, statement: IoWrite) -> None:

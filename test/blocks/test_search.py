@@ -119,18 +119,19 @@ def test_against_the_operators(options, value, table, select):
 
 
 @pytest.mark.parametrize(
-    ("options", "output"),
+    ("options", "value", "output"),
     [
-        (("compare_equ",), 2),
-        (("compare_gtr",), 3),
-        (("compare_les",), 0),
-        (("compare_gtr", "compare_equ"), 2),
-        (("compare_les", "compare_equ"), 0),
-        (("compare_gtr", "compare_les"), 0),
+        (("compare_equ",), 20, 2),
+        (("compare_gtr",), 20, 3),
+        (("compare_les",), 39, 0),
+        (("compare_gtr", "compare_equ"), 20, 2),
+        (("compare_les", "compare_equ"), 40, 0),
+        (("compare_gtr", "compare_les"), 40, 1),
     ],
 )
-def test_table_2_is_searched_in_the_same_way(options, output):
-    assert search(20, [0, 0, 0, 0], *options, table2=[40, 30, 20, 10], select=True) == found(output)
+def test_table_2_is_searched_in_the_same_way(options, value, output):
+    tables = {"table1": [0, 0, 0, 0], "table2": [40, 30, 20, 10]}
+    assert run("SEARCH", **dict.fromkeys(options, True)).scan(input=value, select=True, **tables) == found(output)
 
 
 @pytest.fixture(params=["at once", "in steps"])

@@ -78,5 +78,6 @@ def test_against_a_list_of_columns(columns, channels, data):
     shifter = Shifter("SHIFT_BITS", columns, channels)
     values = st.lists(st.booleans(), min_size=channels, max_size=channels)
     likely = st.integers(0, 5).map(bool)
-    for column, shift, enable, kept in data.draw(st.lists(st.tuples(values, likely, likely, likely), max_size=40)):
-        shifter.scan(column, shift=shift, enable=enable, reset=not kept)
+    rows = st.tuples(values, likely, likely, likely, st.none() | values)
+    for column, shift, enable, kept, foreign in data.draw(st.lists(rows, max_size=40)):
+        shifter.scan(column, shift=shift, enable=enable, reset=not kept, foreign=foreign)

@@ -56,8 +56,11 @@ class Shifter:
         self.model = Columns(columns, channels, empty)
         self.shown = [empty] * channels
 
-    def scan(self, values, *, shift=True, reset=False, enable=True):
-        """Scan the block and compare it with the model."""
+    def scan(self, values, *, shift=True, reset=False, enable=True, foreign=None):
+        """Scan the block and compare it with the model; ``foreign``: what another writer put on the outputs before."""
+        if foreign is not None:
+            self.shown = foreign
+            self.block.outputs.update({f"output{channel}": value for channel, value in enumerate(foreign, 1)})
         inputs = {f"input{channel}": value for channel, value in enumerate(values, 1)}
         result = self.block.scan(shift=shift, reset=reset, enable=enable, **inputs)
         if reset:
@@ -168,5 +171,6 @@ def test_against_a_list_of_columns(columns, channels, data):
     shifter = Shifter("SHIFT_WORDS", columns, channels)
     values = st.lists(int16, min_size=channels, max_size=channels)
     likely = st.integers(0, 5).map(bool)
-    for column, shift, enable, kept in data.draw(st.lists(st.tuples(values, likely, likely, likely), max_size=40)):
-        shifter.scan(column, shift=shift, enable=enable, reset=not kept)
+    rows = st.tuples(values, likely, likely, likely, st.none() | values)
+    for column, shift, enable, kept, foreign in data.draw(st.lists(rows, max_size=40)):
+        shifter.scan(column, shift=shift, enable=enable, reset=not kept, foreign=foreign)

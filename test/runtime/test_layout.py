@@ -155,3 +155,40 @@ def test_values_that_a_field_cannot_hold_are_refused(kind, role, value):
 def test_a_blocks_state_may_be_wider_than_its_type():
     layout = Layout((Field("30 PULSE_MULT.remainder", DataType.INTEGER, Role.BLOCK, 0),))
     assert layout.restore([2**40]) == [2**40]
+
+
+BUFFERS = """10 LOCAL A%, B%, C%, X@
+20 CALL SCAN_LOOP(TICKS=4)
+30 CALL SHIFT_WORDS(STRUCTURE_NAME=QUEUE%, MAX_COLUMNS=3, SHIFT=TRUE, INPUT1=A%, OUTPUT1=B%)
+40 CALL RUNNING_AVERAGE(REQUIRED_SAMPLES=4, INPUT=A%, OUTPUT=C%)
+50 DATA 1, 2
+60 READ A%
+70 RESTORE
+80 END
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "highest"),
+    [
+        ("QUEUE%.head", 2),
+        ("QUEUE%.loaded", 3),
+        ("40 RUNNING_AVERAGE.position", 3),
+        ("40 RUNNING_AVERAGE.taken", 4),
+        ("DATA.pointer", 2),
+    ],
+)
+def test_a_snapshot_with_a_place_outside_of_its_buffer_is_refused(name, highest):
+    """A snapshot comes from a bag, which anybody may have written: no scan may fail on it."""
+    task, _ = task_of(BUFFERS)
+    task.run()
+    task.scan(1)
+    layout = task.compiled.layout
+    at = sum(field.size for field in layout.fields[: layout.index(name)])
+    good = task.snapshot()
+    for value in (0, highest):
+        task.restore([*good[:at], value, *good[at + 1 :]])
+        task.scan(2)
+    for value in (-1, highest + 1, 99999):
+        with pytest.raises(ValueError, match=f"it is 0 to {highest}"):
+            task.restore([*good[:at], value, *good[at + 1 :]])
