@@ -17,18 +17,31 @@ from automax_ros.drive.errors import GateError, ParameterError, SourceShortError
 from automax_ros.drive.events import ROUTINE, Event, EventKind
 from automax_ros.drive.meter import EnergyMeter, Sample
 from automax_ros.drive.motor import Machine
-from automax_ros.drive.network import ARMATURE_ARC, PHASE_ARC, Impedances, Network, settle
-from automax_ros.drive.scr import BIT, mask_of, numbers_of, rail_of
+from automax_ros.drive.network import (
+    ARMATURE_ARC,
+    ARMATURE_SHORT,
+    CROSS_FIRE,
+    LINE_SHORT,
+    PHASE_ARC,
+    Impedances,
+    Network,
+    settle,
+)
+from automax_ros.drive.scr import BIT, numbers_of, rail_of
 from automax_ros.drive.waves import ZERO_A, Piece, first_zero
 
-TURN_ON_V = 1e-5
-"""Forward voltage, beyond the drop, at which a gated SCR turns on, V (decision: above rounding, 0.1 ns of a line's slope)."""
 MECHANICS_STEP_NS = 3_500_000
 """The longest interval of constant speed, ns: just over a firing interval at 48 Hz."""
 ARC_V = 1200.0
 """Voltage of an arc in an opening contactor or fuse, V (decision: above any voltage of these drives)."""
 EVENTS_KEPT = 10_000
 PIECES_KEPT = 64
+_NO_MODES = (0.0, 0.0, 0.0)
+_ALARMS = (
+    (ARMATURE_SHORT, EventKind.ARMATURE_SHORT),
+    (LINE_SHORT, EventKind.LINE_SHORT),
+    (CROSS_FIRE, EventKind.CROSS_FIRE),
+)
 
 
 class Circuit:
@@ -126,10 +139,11 @@ class Circuit:
 
     def sample(self) -> Sample:
         """Return the integrals since the last call (or the start), and begin anew."""
-        square = self._square + sum(Piece(*piece).square() for piece in self._pieces)
         volt_s = self._volt_s + self._z.r * self._charge + self._z.l * (self.current_a - self._current_before)
         duration_s = (self.now_ns - self._sample_ns) * 1e-9
-        sample = Sample.of(duration_s, self._charge, square, volt_s, self._zero_s, self._overlap_s)
+        sample = Sample(
+            duration_s, self._charge, volt_s, self._zero_s, self._overlap_s, self._square, self._pieces
+        )
         self._begin_sample()
         return sample
 
@@ -169,7 +183,8 @@ class Circuit:
 
     def phase_currents(self) -> tuple[float, float, float]:
         """Return the currents out of the line's three phases, A."""
-        return self._phases(self._net, self.current_a, self.line.angle(self.now_ns))
+        angle = self.line.angle(self.now_ns)
+        return self._phases(self._net, self.current_a, sin(angle), cos(angle))
 
     # What can break
 
@@ -242,15 +257,28 @@ class Circuit:
         net, current = self._net, self.current_a
         modes = self._modes
         sine, cosine = sin(theta), cos(theta)
-        t = charge = 0.0
+        t = charge = ahead_sine = ahead_cosine = ahead_fall = 0.0
         while True:
             first = left = total - t
-            out = on = 0
+            out = on = soonest = 0
             k = a = 0.0
+            ahead = -1.0
             decay = net.decay
             if net.active:
                 k = (net.constant - emf) / net.resistance
                 a = current - net.c * cosine - net.d * sine - k
+            if (bridge.gated | bridge.recovering) & ~net.mask:
+                now_ns = start_ns + t * 1e9
+                wanted = bridge.candidates(now_ns, net.mask)
+                if wanted:
+                    when, mask = self._watch(wanted, now_ns, (theta, sine, cosine, k, a), left)
+                    if when == 0.0:
+                        self.current_a, self._modes = current, modes
+                        net = self._switch(0, mask, start_ns, t, sine, cosine)
+                        current, modes = self.current_a, self._modes
+                        continue
+                    if when < first:
+                        first, on = when, mask
             for mask, c, d, share, part, wa, wb, wc, bend in net.guards:
                 guard_k, guard_a = share * k + part, share * a
                 value = c * cosine + d * sine + guard_k + guard_a
@@ -270,22 +298,32 @@ class Circuit:
                     least = value if value > 0.0 else 0.0
                     if least + first * (slope - 0.5 * bend * first) > 0.0:
                         continue
+                    if first == left:  # likewise from the values at both ends, which the interval needs anyway
+                        if ahead != left:
+                            ahead, angle = left, theta + omega * left
+                            ahead_sine, ahead_cosine = sin(angle), cos(angle)
+                            ahead_fall = exp(-decay * left)
+                        final = c * ahead_cosine + d * ahead_sine + guard_k + guard_a * ahead_fall
+                        if guard_b:
+                            final += guard_b * exp(-net.decay_s * left)
+                        sag = 0.5 * bend * left - (final - least) / left
+                        if final > 0.0 and (sag <= 0.0 or 2.0 * bend * least > sag * sag):
+                            continue
                 zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, net.decay_s, first)
                 if zero <= first:
-                    first, out = zero, mask
-            if (bridge.gated | bridge.recovering) & ~net.mask:
-                now_ns = start_ns + t * 1e9
-                wanted = bridge.candidates(now_ns, net.mask)
-                if wanted:
-                    when, mask = self._watch(wanted, now_ns, (theta, sine, cosine, k, a), first)
-                    if when < first or (when == 0.0 and not out):
-                        first, on, out = when, mask, 0
+                    first, out, on = zero, mask, 0
+                    if mask != net.guards[0][0]:
+                        soonest = mask
+            if soonest:
+                net.put_first(soonest)
             if first > 0.0:
                 before_sine, before_cosine, before = sine, cosine, theta
                 theta += omega * first
-                sine, cosine = sin(theta), cos(theta)
+                if first == ahead:
+                    sine, cosine, fall = ahead_sine, ahead_cosine, ahead_fall
+                else:
+                    sine, cosine, fall = sin(theta), cos(theta), exp(-decay * first)
                 if net.active:
-                    fall = exp(-decay * first)
                     current = net.c * cosine + net.d * sine + k + a * fall
                     charge += (
                         (net.c * (sine - before_sine) - net.d * (cosine - before_cosine)) / omega
@@ -306,7 +344,7 @@ class Circuit:
                 t += first
             if out or on:
                 self.current_a, self._modes = current, modes
-                net = self._switch(out, on, start_ns, t, theta)
+                net = self._switch(out, on, start_ns, t, sine, cosine)
                 current, modes = self.current_a, self._modes
             elif first >= left:
                 break
@@ -320,7 +358,7 @@ class Circuit:
         if machine.turns:
             machine.advance(total, charge)
         if self.energy is not None:
-            phases = self._phases(net, current, theta)
+            phases = self._phases(net, current, sine, cosine)
             self.energy.stored_j = 0.5 * (self._z.l * current**2 + self._z.ls * sum(phase**2 for phase in phases))
 
     def _watch(
@@ -336,9 +374,8 @@ class Circuit:
         decay = net.decay
         soonest, who = inf, 0
         most, now_on = 0.0, 0
-        for mask, (c, d, constant, by_k, by_a, by_emf) in net.watch(wanted):
-            level = TURN_ON_V + bridge.drop_v * (1 if mask & (mask - 1) == 0 else 2)
-            short = level - constant - by_k * k - by_emf * emf
+        for mask, c, d, constant, by_k, by_a, by_emf, bend in net.watches.get(wanted) or net.watch(wanted):
+            short = -constant - by_k * k - by_emf * emf
             fade = by_a * a
             value = c * cosine + d * sine + fade - short
             if value > 0.0:
@@ -348,43 +385,65 @@ class Circuit:
                 elif value > most:
                     most, now_on = value, mask
                 continue
-            if now_on:
-                continue
-            horizon = min(limit, soonest, (bridge.window_end_ns(mask, now_ns) - now_ns) * 1e-9)
+            horizon = limit if limit < soonest else soonest
+            if not mask & bridge.gated and horizon > bridge.turn_off_ns * 1e-9:
+                horizon = bridge.turn_off_ns * 1e-9
             slope = omega * (d * cosine - c * sine) - decay * fade
-            bend = omega * omega * sqrt(c * c + d * d)
             if fade > 0.0:
-                bend += decay * decay * fade
+                bend += decay * decay * fade  # noqa: PLW2901
+            # As for the currents: a parabola that stays above the voltage and is negative proves that nothing happens.
             if value + horizon * (slope + 0.5 * bend * horizon) < 0.0:
                 continue
+            horizon = min(horizon, (bridge.window_end_ns(mask, now_ns) - now_ns) * 1e-9)
             zero = first_zero(-c, -d, short, -fade, 0.0, theta, omega, decay, 0.0, horizon)
             if zero < soonest:
                 soonest, who = zero, mask
         return (0.0, now_on) if now_on else (soonest, who)
 
-    def _switch(self, out: int, on: int, start_ns: int, t: float, theta: float) -> Network:
+    def _switch(self, out: int, on: int, start_ns: int, t: float, sine: float, cosine: float) -> Network:
         """Let SCRs go out (or arcs end), or turn on, at an instant; return the circuit from then on."""
         old = self._net
-        now_ns = start_ns + t * 1e9
-        phases = self._phases(old, self.current_a, theta)
+        phases = self._phases(old, self.current_a, sine, cosine)
         if on:
             self._note_turn_on(on, start_ns, t)
         if out >> 12:
             self._open(out, t)
-        mask = settle((old.mask | on) & ~out, self.bridge.wiring)
-        net = self._enter(mask, phases, theta)
+        net = self._enter((old.mask | on) & ~out, phases, sine, cosine)
         gone = old.mask & ~net.mask
         if gone:
-            self.bridge.put_out(gone, now_ns)
-        if out and old.modes and not old.line_short:
-            self._note_failed_commutation(out, net.mask, t)
-        self._note_switch(old, net, gone, start_ns, t)
+            self.bridge.put_out(gone, start_ns + t * 1e9)
+            if old.modes and not old.alarms and out:
+                self._note_failed_commutation(out, net.mask, t)
+        if self._trace or net.alarms & ~old.alarms:
+            self._note_switch(old, net, gone, t)
         return net
 
-    def _enter(self, mask: int, phases: tuple[float, float, float], theta: float) -> Network:
+    def _enter(self, mask: int, phases: tuple[float, float, float], sine: float, cosine: float) -> Network:
         """Make a set of SCRs conduct from the present, with the phase currents (A) just before."""
-        net = self._network(mask)
-        sine, cosine = sin(theta), cos(theta)
+        net = self._nets.get(mask) or self._network(mask)
+        if net.instant or self.bridge.wiring.arcing:
+            net, phases = self._clear_up(net, phases, sine, cosine)
+        if not net.active:
+            self.current_a = 0.0
+        self._modes = _NO_MODES
+        if net.modes and net.decay_s < inf:
+            modes = [0.0, 0.0, 0.0]
+            for x, y, z in net.tied:
+                # The phases' currents over their common mean; it is what the armature takes.
+                mean = (phases[x] + phases[y]) / 2 if z is None else (phases[x] + phases[y] + phases[z]) / 3
+                first = phases[x] - mean - net.phase_c[x] * cosine - net.phase_d[x] * sine - net.phase_k[x]
+                modes[x], modes[y] = first, -first
+                if z is not None:
+                    last = phases[z] - mean - net.phase_c[z] * cosine - net.phase_d[z] * sine - net.phase_k[z]
+                    modes[y], modes[z] = -first - last, last
+            self._modes = (modes[0], modes[1], modes[2])
+        self._net = net
+        return net
+
+    def _clear_up(
+        self, net: Network, phases: tuple[float, float, float], sine: float, cosine: float
+    ) -> tuple[Network, tuple[float, float, float]]:
+        """Commutate what has no source impedance, open arcs without current; return the circuit and phase currents."""
         while True:
             wiring = self.bridge.wiring
             if wiring.armature_arc_v and not net.active:
@@ -393,24 +452,11 @@ class Circuit:
                 if wiring.phase_arc_v[x] and not any(x in group for group in net.rail_of_phases):
                     self._open(PHASE_ARC << x, 0.0)
             if wiring is not self.bridge.wiring:
-                net = self._network(settle(net.mask, self.bridge.wiring))
+                net = self._network(net.mask)
             elif net.instant:
                 net, phases = self._commutate_at_once(net, phases, sine, cosine)
             else:
-                break
-        if not net.active:
-            self.current_a = 0.0
-        modes = [0.0, 0.0, 0.0]
-        if net.modes and net.decay_s < inf:
-            for group in net.rail_of_phases:
-                if len(group) > 1:
-                    over = [phases[x] - net.share[x] * self.current_a for x in group]
-                    mean = sum(over) / len(group)
-                    for x, part in zip(group, over, strict=True):
-                        modes[x] = part - mean - net.phase_c[x] * cosine - net.phase_d[x] * sine - net.phase_k[x]
-        self._modes = (modes[0], modes[1], modes[2])
-        self._net = net
-        return net
+                return net, phases
 
     def _commutate_at_once(
         self, net: Network, phases: tuple[float, float, float], sine: float, cosine: float
@@ -442,23 +488,29 @@ class Circuit:
         moved = tuple(phases[x] + push[x] * soonest for x in range(3))
         if gone >> 12:
             self._open(gone, 0.0)
-        return self._network(settle(net.mask & ~gone, self.bridge.wiring)), (moved[0], moved[1], moved[2])
+        return self._network(net.mask & ~gone), (moved[0], moved[1], moved[2])
 
-    def _phases(self, net: Network, current: float, theta: float) -> tuple[float, float, float]:
-        share = net.share
+    def _phases(self, net: Network, current: float, sine: float, cosine: float) -> tuple[float, float, float]:
+        a, b, c = net.share
+        a, b, c = a * current, b * current, c * current
         if not net.modes:
-            return share[0] * current, share[1] * current, share[2] * current
-        sine, cosine, modes = sin(theta), cos(theta), self._modes
-        a, b, c = (
-            share[x] * current + net.phase_c[x] * cosine + net.phase_d[x] * sine + net.phase_k[x] + modes[x]
-            for x in range(3)
+            return a, b, c
+        modes, by_c, by_d, const = self._modes, net.phase_c, net.phase_d, net.phase_k
+        return (
+            a + by_c[0] * cosine + by_d[0] * sine + const[0] + modes[0],
+            b + by_c[1] * cosine + by_d[1] * sine + const[1] + modes[1],
+            c + by_c[2] * cosine + by_d[2] * sine + const[2] + modes[2],
         )
-        return a, b, c
 
     def _network(self, mask: int) -> Network:
+        """Return the circuit of the SCRs of a mask, without those that can carry no current."""
         net = self._nets.get(mask)
         if net is None:
-            net = self._nets[mask] = Network(mask, self.bridge.wiring, self.line, self._z)
+            settled = settle(mask, self.bridge.wiring)
+            net = self._nets.get(settled)
+            if net is None:
+                net = self._nets[settled] = Network(settled, self.bridge.wiring, self.line, self._z)
+            self._nets[mask] = net
         return net
 
     def _change_line(self, now_ns: int) -> None:
@@ -480,12 +532,12 @@ class Circuit:
         """Take over what changed in the wiring or the line, with the phase currents (A) just before."""
         old = self._net
         self._nets.clear()
-        wiring = self.bridge.wiring
-        net = self._enter(settle(old.mask, wiring), phases, self.line.angle(self.now_ns))
+        angle = self.line.angle(self.now_ns)
+        net = self._enter(old.mask, phases, sin(angle), cos(angle))
         gone = old.mask & ~net.mask
         if gone:
             self.bridge.put_out(gone, float(self.now_ns))
-        self._note_switch(old, net, gone, self.now_ns, 0.0)
+        self._note_switch(old, net, gone, 0.0)
 
     def _open(self, arcs: int, t: float) -> None:
         """Open the phases and the contactor whose arcs have ended."""
@@ -506,9 +558,11 @@ class Circuit:
     def _note_turn_on(self, on: int, start_ns: int, t: float) -> None:
         bridge = self.bridge
         for number in numbers_of(on):
-            self._newest[rail_of(number)] = number
-            self._emit(EventKind.TURN_ON, t, number)
-            if not bridge.gated & mask_of([number]) or bridge.gate_end_ns[BIT[number]] <= start_ns + t * 1e9:
+            bit = BIT[number]
+            self._newest[bit >> 1 & 1] = number
+            if self._trace:
+                self._emit(EventKind.TURN_ON, t, number)
+            if not bridge.gated >> bit & 1 or bridge.gate_end_ns[bit] <= start_ns + t * 1e9:
                 self._emit(EventKind.COMMUTATION_FAILURE, t, number)
 
     def _note_failed_commutation(self, out: int, left: int, t: float) -> None:
@@ -517,13 +571,9 @@ class Circuit:
             if self._newest[rail] == number and any(rail_of(other) == rail for other in numbers_of(left)):
                 self._emit(EventKind.COMMUTATION_FAILURE, t, number)
 
-    def _note_switch(self, old: Network, net: Network, gone: int, start_ns: int, t: float) -> None:
-        for kind, now, before in (
-            (EventKind.ARMATURE_SHORT, net.armature_short, old.armature_short),
-            (EventKind.LINE_SHORT, net.line_short, old.line_short),
-            (EventKind.CROSS_FIRE, net.cross_fire, old.cross_fire),
-        ):
-            if now and not before:
+    def _note_switch(self, old: Network, net: Network, gone: int, t: float) -> None:
+        for alarm, kind in _ALARMS:
+            if net.alarms & alarm and not old.alarms & alarm:
                 self._emit(kind, t, 0)
         if self._trace:
             for number in numbers_of(gone):

@@ -6,40 +6,61 @@ from dataclasses import dataclass
 from math import inf, sqrt
 from typing import TYPE_CHECKING
 
-from automax_ros.drive.waves import Moments, Wave
+from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave
 
 if TYPE_CHECKING:
     from automax_ros.drive.ac_line import AcLine
     from automax_ros.drive.network import Impedances, Network, Wiring
 
 
-@dataclass(frozen=True)
 class Sample:
     """Exact integrals since the sample before.
 
     Attributes:
         duration_s: the time since then, s.
-        mean_current_a: mean armature current, A.
-        rms_current_a: root of the mean square of the armature current, A.
-        mean_voltage_v: mean voltage over the armature's terminals, V; the EMF while no current flows.
+        charge_c: integral of the armature current, A s.
+        volt_s: integral of the voltage over the armature's terminals, V s; the EMF counts while no current flows.
         zero_current_s: how long no armature current flowed, s (DC_TIME).
         overlap_s: how long a rail had two or three phases, s.
     """
 
-    duration_s: float
-    mean_current_a: float
-    rms_current_a: float
-    mean_voltage_v: float
-    zero_current_s: float
-    overlap_s: float
+    __slots__ = ("_pieces", "_square", "charge_c", "duration_s", "overlap_s", "volt_s", "zero_current_s")
 
-    @staticmethod
-    def of(duration_s: float, charge_c: float, square: float, volt_s: float, zero_s: float, overlap_s: float) -> Sample:
-        """Make means of integrals; all zero over no time."""
-        if duration_s <= 0.0:
-            return Sample(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        rms = sqrt(max(square, 0.0) / duration_s)
-        return Sample(duration_s, charge_c / duration_s, rms, volt_s / duration_s, zero_s, overlap_s)
+    def __init__(
+        self,
+        duration_s: float,
+        charge_c: float,
+        volt_s: float,
+        zero_current_s: float,
+        overlap_s: float,
+        square: float,
+        pieces: list[RawPiece],
+    ) -> None:
+        self.duration_s = duration_s
+        self.charge_c = charge_c
+        self.volt_s = volt_s
+        self.zero_current_s = zero_current_s
+        self.overlap_s = overlap_s
+        self._square = square
+        self._pieces = pieces
+
+    @property
+    def mean_current_a(self) -> float:
+        """Mean armature current, A."""
+        return self.charge_c / self.duration_s if self.duration_s else 0.0
+
+    @property
+    def mean_voltage_v(self) -> float:
+        """Mean voltage over the armature's terminals, V."""
+        return self.volt_s / self.duration_s if self.duration_s else 0.0
+
+    @property
+    def rms_current_a(self) -> float:
+        """Root of the mean square of the armature current, A; computed when asked for."""
+        if not self.duration_s:
+            return 0.0
+        square = self._square + sum(Piece(*piece).square() for piece in self._pieces)
+        return sqrt(max(square, 0.0) / self.duration_s)
 
 
 @dataclass

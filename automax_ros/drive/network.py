@@ -17,8 +17,10 @@ from dataclasses import dataclass
 from math import hypot, inf
 
 from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.scr import M, P
+from automax_ros.drive.scr import FORWARD_MASK, REVERSE_MASK, M, P
 
+TURN_ON_V = 1e-5
+"""Forward voltage, beyond the drop, at which a gated SCR turns on, V (decision: above rounding, 0.1 ns of a line's slope)."""
 SLOWEST_DECAY = 0.01
 """A resistance below L x this (1/s) counts as this, so that a steady state exists: 20 microohm with 2 mH (decision)."""
 
@@ -44,6 +46,11 @@ class Wiring:
     armature_closed: bool = True
     armature_arc_v: float = 0.0
 
+    @property
+    def arcing(self) -> bool:
+        """Whether a phase or the contactor is opening."""
+        return self.armature_arc_v != 0.0 or self.phase_arc_v != (0.0, 0.0, 0.0)
+
 
 @dataclass(frozen=True)
 class Impedances:
@@ -68,17 +75,19 @@ Guard = tuple[int, float, float, float, float, float, float, float, float]
 constant, shares of the three phases' source modes, curvature omega^2 hypot(c, d)."""
 
 
+Watch = tuple[int, float, float, float, float, float, float, float]
+"""A voltage that turns on the SCRs of a mask when it is above 0: a Potential less drops and ``TURN_ON_V``, curvature."""
 _Current = tuple[float, float, float, float, float, float, float]
-"""The same without the mask and the curvature."""
+"""A Guard without its mask and curvature."""
 
 
 class Network:
     """The equations of one set of closed legs, as numbers for ``circuit``; built once for a set and a line segment."""
 
     __slots__ = (
-        "active", "armature_short", "bend", "c", "constant", "cross_fire", "d", "decay", "decay_s", "floating_offset",
-        "guards", "idle", "inductance", "instant", "line_short", "mask", "modes", "offsets", "phase_c", "phase_d",
-        "phase_k", "potentials", "rail_offset", "rail_of_phases", "resistance", "share", "watches",
+        "_drop_v", "_omega", "active", "alarms", "armature_short", "c", "constant", "d", "decay", "decay_s", "floating_offset", "guards",
+        "inductance", "instant", "mask", "modes", "offsets", "phase_c", "phase_d", "phase_k", "potentials", "rail_offset",
+        "rail_of_phases", "resistance", "share", "tied", "watches",
     )  # fmt: skip
 
     def __init__(self, mask: int, wiring: Wiring, line: AcLine, z: Impedances) -> None:
@@ -86,15 +95,18 @@ class Network:
         self.mask = mask
         legs = _closed_legs(mask, wiring)
         drops = {leg: direction * z.drop_v for leg, direction in legs.items()}
-        self.watches: dict[int, list[tuple[int, Potential]]] = {}
+        self.watches: dict[int, list[Watch]] = {}
+        self._drop_v, self._omega = z.drop_v, line.omega
         self._group(legs, drops, wiring)
         self._solve_armature(wiring, line, z)
         self._solve_phases(line, z)
         self._set_potentials(legs, drops, wiring, line, z)
         self._set_guards(legs, wiring, line.omega)
-        self.idle = not self.active and not self.modes
-        forward, reverse = mask & _ALL_FORWARD, mask & _ALL_REVERSE
-        self.cross_fire = bool(forward and reverse)
+        self.alarms = ARMATURE_SHORT if self.armature_short else 0
+        if any(_is_line_short(rail, legs) for rail in (P, M)):
+            self.alarms |= LINE_SHORT
+        if mask & FORWARD_MASK and mask & REVERSE_MASK:
+            self.alarms |= CROSS_FIRE
 
     def _group(self, legs: dict[int, int], drops: dict[int, float], wiring: Wiring) -> None:
         """Find which phases are tied together, their shares of the armature current and their voltage offsets."""
@@ -129,8 +141,8 @@ class Network:
                 self.share = [0.0, 0.0, 0.0]
         self.offsets = [offset + arc for offset, arc in zip(self.offsets, wiring.phase_arc_v, strict=True)]
         self.rail_of_phases = groups
-        self.modes = any(len(group) > 1 for group in groups)
-        self.line_short = any(_is_line_short(group, legs, rail) for rail, group in enumerate((at_p, at_m)))
+        self.tied = [(g[0], g[1], g[2] if len(g) > 2 else None) for g in groups if len(g) > 1]
+        self.modes = bool(self.tied)
 
     def _solve_armature(self, wiring: Wiring, line: AcLine, z: Impedances) -> None:
         n, driven = 0.0, [0.0, 0.0]
@@ -146,7 +158,6 @@ class Network:
         self.inductance = z.l + n * z.ls
         self.decay = self.resistance / self.inductance
         self.c, self.d = _response(driven[0], driven[1], self.resistance, line.omega * self.inductance)
-        self.bend = line.omega**2 * hypot(self.c, self.d)
 
     def _solve_phases(self, line: AcLine, z: Impedances) -> None:
         self.phase_c, self.phase_d, self.phase_k = [0.0] * 3, [0.0] * 3, [0.0] * 3
@@ -246,23 +257,31 @@ class Network:
             a = b = c = 0.0
         return share * self.c + cosine, share * self.d + sine, share, constant, a, b, c
 
-    def watch(self, wanted: int) -> list[tuple[int, Potential]]:
-        """Return, for SCRs that could begin to conduct, the voltages over them: of single ones, of pairs in series.
+    def put_first(self, mask: int) -> None:
+        """Let the current of these SCRs be looked at first: what ended this circuit last time will next time too."""
+        self.guards.sort(key=lambda guard: guard[0] != mask)
 
-        A voltage counts in the direction of conduction and drops are not taken off. A pair joins where one SCR alone has no
-        way for its current: on floating rails or an open phase.
+    def watch(self, wanted: int) -> list[Watch]:
+        """Return, for SCRs that could begin to conduct, the voltages that drive them: of single ones, of pairs in series.
+
+        A pair joins where one SCR alone has no way for its current: on floating rails or an open phase.
         """
         found = self.watches.get(wanted)
         if found is None:
-            found = self.watches[wanted] = _watch(self.potentials, self.floating_offset, wanted)
+            found = []
+            for mask, (c, d, constant, *rest) in _watch(self.potentials, self.floating_offset, wanted):
+                level = TURN_ON_V + self._drop_v * (2 if mask & (mask - 1) else 1)
+                by_k, by_a, by_emf = rest
+                found.append((mask, c, d, constant - level, by_k, by_a, by_emf, self._omega**2 * hypot(c, d)))
+            self.watches[wanted] = found
         return found
 
 
 PHASE_ARC = 1 << 12
 """The bit of an arc in phase A; the next two are B's and C's."""
 ARMATURE_ARC = 1 << 15
-_ALL_FORWARD = sum(1 << (4 * x) | 1 << (4 * x + 3) for x in range(3))
-_ALL_REVERSE = _ALL_FORWARD ^ 0xFFF
+ARMATURE_SHORT, LINE_SHORT, CROSS_FIRE = 1, 2, 4
+"""Bits of ``Network.alarms``."""
 _NOTHING: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _UNIT: Potential = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _EMF: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -297,9 +316,10 @@ def _closed_legs(mask: int, wiring: Wiring) -> dict[int, int]:
     return legs
 
 
-def _is_line_short(group: list[int], legs: dict[int, int], rail: int) -> bool:
+def _is_line_short(rail: int, legs: dict[int, int]) -> bool:
     """Whether the phases on a rail are shorted for longer than a commutation: not all conduct the same way."""
-    return len(group) > 1 and not abs(sum(legs[2 * x + rail] for x in group)) == len(group)
+    ways = [legs[leg] for leg in legs if leg % 2 == rail]
+    return len(ways) > 1 and abs(sum(ways)) != len(ways)
 
 
 def _leg_currents(legs: dict[int, int]) -> dict[int, tuple[float, float, float, float]]:

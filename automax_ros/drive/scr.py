@@ -10,6 +10,7 @@ is a place for a pair, ``2 * phase + rail``: phases A, B, C are 0, 1, 2, the rai
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 
 from automax_ros.drive.errors import GateError
 
@@ -70,6 +71,7 @@ def mask_of(numbers: Iterable[int]) -> int:
     return mask
 
 
+@lru_cache(maxsize=4096)
 def numbers_of(mask: int) -> tuple[int, ...]:
     """Return the numbers of the SCRs of a mask, ascending."""
     return tuple(sorted(NUMBER[bit] for bit in range(12) if mask >> bit & 1))

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 STRIDE_S = 1e-8
 """A dip below zero that is shorter than this may be passed over: its depth is below 1e-8 A in any real circuit."""
+NEWTON_S, NEWTON_LEFT = 1e-6, 1e-4
+"""Closer than this (s) to a zero two Newton steps find it; they have if the first left at most this part."""
 ZERO_A = 1e-7
 """A current that falls and is below this (A) has ended: two orders above rounding in circuits without resistance."""
 
@@ -76,6 +78,16 @@ def first_zero(
             step = (slope + sqrt(reach)) / bend if bend > 0.0 else inf
         else:
             step = 2.0 * value / (sqrt(reach) - slope)
+            if step < NEWTON_S and bend * value < 1e-3 * slope * slope:
+                zero = t - value / slope
+                if zero > limit:
+                    return inf
+                angle = theta + omega * zero
+                value = c * cos(angle) + d * sin(angle) + k + a * exp(-decay * zero)
+                if b:
+                    value += b * exp(-decay_b * zero)
+                if abs(value) <= NEWTON_LEFT * above:
+                    return zero - value / slope
         if t >= limit:
             return inf
         t += step if step > STRIDE_S else STRIDE_S
@@ -165,6 +177,8 @@ class Piece(NamedTuple):
         return first_zero(c, d, k, a, 0.0, angle, self.omega, self.decay, 1.0, self.duration_s - start)
 
 
+RawPiece = tuple[float, float, float, float, float, float, float, float]
+"""A Piece's fields, in a form that is quick to make."""
 Wave = tuple[float, float, float, float, float]
 """The factors c, d, k, a, b of a wave."""
 
