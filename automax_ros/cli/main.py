@@ -20,6 +20,7 @@ SUBCOMMANDS: dict[str, str] = {
     "compile": "print the function that a task becomes",
     "run": "run a rack",
     "export": "write common memory of a recording to a CSV table",
+    "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
     "explain": "say what a problem code means and how to cure it",
 }

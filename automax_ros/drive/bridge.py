@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from automax_ros.drive.errors import GateError, require
 from automax_ros.drive.network import Wiring
-from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of
+from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, numbers_of
 
 REST_NS = 10
 """How long an SCR that went out conducts no more, gated or not: keeps events from piling up at one instant (decision)."""
@@ -117,6 +117,10 @@ class Bridge:
         """Return when the last SCR of a mask may conduct again after it went out, ns."""
         bits = (bit for bit in range(12) if mask & self.recovering & 1 << bit)
         return max((self.out_ns[bit] + REST_NS for bit in bits), default=0.0)
+
+    def gated_numbers(self, now_ns: int) -> tuple[int, ...]:
+        """Return the SCRs that are gated at an instant."""
+        return tuple(n for n in numbers_of(self.gated) if self.gate_end_ns[BIT[n]] > now_ns)
 
     def put_out(self, mask: int, now_ns: float) -> None:
         """Note that SCRs went out."""

@@ -8,6 +8,7 @@ the instants of extinction and commutation are not rounded.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 from math import cos, exp, inf, sin, sqrt
 
@@ -27,7 +28,7 @@ from automax_ros.drive.network import (
     Network,
     settle,
 )
-from automax_ros.drive.scr import BIT, numbers_of, rail_of
+from automax_ros.drive.scr import BIT, mask_of, numbers_of, rail_of
 from automax_ros.drive.waves import ZERO_A, Piece, first_zero
 
 MECHANICS_STEP_NS = 3_500_000
@@ -94,6 +95,20 @@ class Circuit:
         bridge.wiring = replace(bridge.wiring, open_phases=sum(1 << x for x in line.missing))
         self._net = self._network(0)
         self._begin_sample()
+
+    def begin_with(self, numbers: Iterable[int], current_a: float) -> None:
+        """Begin with two SCRs that conduct an armature current (A), of the sign that they carry.
+
+        Raises:
+            ParameterError: these SCRs cannot carry it.
+        """
+        net = self._network(mask_of(numbers))
+        shares = [guard[3] * current_a for guard in net.guards]
+        if not net.active or net.modes or min(shares, default=-1.0) < 0:
+            raise ParameterError(f"SCRs {', '.join(map(str, numbers))} cannot begin with {current_a:g} A")
+        self.current_a = self._current_before = current_a
+        share = net.share
+        self._enter(net.mask, (share[0] * current_a, share[1] * current_a, share[2] * current_a), 0.0, 1.0)
 
     # What a controller does
 
