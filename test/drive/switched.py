@@ -43,6 +43,7 @@ class Switched:
     angle: object = None  # line angle (rad) as a function of time; phase a is its cosine
     shorted: tuple = ()
     lost: frozenset = frozenset()
+    arcs: dict = field(default_factory=dict)  # phase: voltage of its opening arc, with the sign of its current
     step: float = 20e-6
     rtol: float = 1e-9
     gates: list = field(default_factory=list)  # (from s, to s, SCR)
@@ -81,7 +82,7 @@ class Switched:
 
     def drive(self, rows, time):
         return np.array([
-            self.source(name, time) if name in ("a", "b", "c") else -self.emf if name == "d" else 0.0
+            self.source(name, time) - self.arcs.get(name, 0.0) if name in ("a", "b", "c") else -self.emf if name == "d" else 0.0
             for name, *_ in rows
         ])
 
@@ -91,7 +92,7 @@ class Switched:
     def forward(self, on, rows, basis, y, rate, time):
         """The forward voltage over each SCR that is off, for single ones and pairs that would close a loop."""
         i, di = dict(zip([row[0] for row in rows], basis @ y)), dict(zip([row[0] for row in rows], basis @ rate))
-        level = {x: self.source(x, time) - self.rs * i[x] - self.ls * di[x] for x in "abc" if x not in self.lost}
+        level = {x: self.source(x, time) - self.arcs.get(x, 0.0) - self.rs * i[x] - self.ls * di[x] for x in "abc" if x not in self.lost}
         closed = [WAYS[scr] for scr in (*on, *self.shorted)]
         armature = self.emf + self.r * i["d"] + self.l * di["d"]
         for _ in range(3):
@@ -124,8 +125,12 @@ class Switched:
         for start, end in pairwise([self.time, *edges, until]):
             self.time = start
             self.watched = sorted(self.gated(start))
-            while self.time < end - 1e-13:
+            for _ in range(1000):
+                if self.time >= end - 1e-13:
+                    break
                 self.interval(end)
+            else:
+                raise RuntimeError(f"stuck at {self.time} with {sorted(self.on)}")
 
     def interval(self, end):
         on = self.on
@@ -169,6 +174,12 @@ class Switched:
             event.terminal, event.direction = True, 1
             events.append(event)
             actions.append(on | set(who))
+        for phase, volts_arc in self.arcs.items():
+            column = np.sign(volts_arc) * basis[names.index(phase)]
+            event = (lambda column: lambda t, s: column @ s[:width])(column)
+            event.terminal, event.direction = True, -1
+            events.append(event)
+            actions.append(phase)
         solution = solve_ivp(
             full, (self.time, end), np.concatenate([y0, [0.0, 0.0]]), "DOP853", events=events, max_step=self.step,
             rtol=self.rtol, atol=1e-8, dense_output=False,
@@ -183,10 +194,32 @@ class Switched:
         self.currents = {x: final[names.index(x)] if x in names else 0.0 for x in "abcd"}
         if solution.status == 1:
             hit = next(n for n, times in enumerate(solution.t_events) if len(times))
-            self.on = actions[hit]
-            if hit < len(on):  # SCRs in series go out together
+            if actions[hit] in self.arcs:
+                self.open(actions[hit])
+            else:
+                self.on = actions[hit]
+            if hit < len(on) or not isinstance(actions[hit], frozenset):  # SCRs in series go out together
                 self.on = frozenset(
                     s for s in self.on
                     if abs(final[names.index(s)]) > 1e-6 or basis[names.index(s)] @ rate(self.time, solution.y[:, -1]) > 0
                 )  # fmt: skip
         self.on = frozenset(self.on)
+        for phase in list(self.arcs):
+            if abs(self.currents[phase]) < 1e-6:
+                self.open(phase)
+
+    def open(self, phase):
+        self.arcs.pop(phase)
+        self.lost |= {phase}
+
+    def lose(self, phase, arc_v):
+        if abs(self.currents[phase]) < 1e-6:
+            self.lost |= {phase}
+        else:
+            self.arcs[phase] = arc_v * np.sign(self.currents[phase])
+
+    def at(self, times):
+        """The armature current at instants."""
+        time = np.concatenate([segment.time for segment in self.segments])
+        current = np.concatenate([segment.current for segment in self.segments])
+        return np.interp(times, time, current)
