@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -40,6 +41,8 @@ class _Table(Protocol):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax bridge``."""
+    # argparse before 3.14 takes -1e-3 for an option and asks for a number.
+    parser._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
     line = parser.add_argument_group("line")
     line.add_argument("--v-ll", type=float, default=460.0, metavar="V", help="line-to-line voltage, rms (default 460)")
     line.add_argument("--freq", type=float, default=60.0, metavar="HZ", help="48 to 62 (default 60)")

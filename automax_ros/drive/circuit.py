@@ -266,9 +266,7 @@ class Circuit:
         start_ns, omega = self.now_ns, line.omega
         total = (stop_ns - start_ns) * 1e-9
         theta = line.start_angle + omega * ((start_ns - line.start_ns) * 1e-9)
-        if machine.turns:
-            self._emf = machine.emf(total)
-        emf = self._emf
+        emf = self._emf = machine.emf(total)
         net, current = self._net, self.current_a
         modes = self._modes
         sine, cosine = sin(theta), cos(theta)
@@ -324,7 +322,10 @@ class Circuit:
                         sag = 0.5 * bend * left - (final - least) / left
                         if final > 0.0 and (sag <= 0.0 or 2.0 * bend * least > sag * sag):
                             continue
-                zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, net.decay_s, first)
+                if -ZERO_A <= value <= ZERO_A and abs(guard_k) + abs(guard_a) + abs(guard_b) + bend < 1e-9:
+                    zero = 0.0  # nothing drives it any more
+                else:
+                    zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, net.decay_s, first)
                 if zero <= first:
                     first, out, on = zero, mask, 0
                     if mask != net.guards[0][0]:

@@ -128,7 +128,7 @@ def _between(
             high, high_value = t, value
             low_value, side = (low_value / 2 if side < 0 else low_value), -1
         if abs(value) < 1e-12 or high - low < 1e-17:
-            break
+            return t
     return low
 
 

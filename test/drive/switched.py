@@ -115,7 +115,7 @@ class Switched:
                 for two in off:
                     start, middle = WAYS[one]
                     other, end = WAYS[two]
-                    if start in level and end in level and middle in "PM" and other in "PM" and start != end:
+                    if start in level and end in level and middle in "PM" and other in "PM" and (start != end or middle != other):
                         drop = 0.0 if middle == other else self.emf if middle == "P" else -self.emf
                         volts[one, two] = level[start] - level[end] - drop
         return volts
@@ -158,7 +158,11 @@ class Switched:
             return
         # Who goes out at once?
         di, i = basis @ rate(self.time, y0), basis @ y0
-        leaving = {s for s in on if i[names.index(s)] < 1e-6 and di[names.index(s)] < 0}
+        leaving = {
+            s for s in on
+            if i[names.index(s)] < -1e-6 or (i[names.index(s)] < 1e-6 and di[names.index(s)] < -1e-3)
+            or np.abs(basis[names.index(s)]).max(initial=0.0) < 1e-9  # no way round
+        }  # fmt: skip
         if leaving:
             self.on = on - leaving
             return
@@ -170,7 +174,7 @@ class Switched:
             events.append(event)
             actions.append(on - {scr})
         for who in volts:
-            event = (lambda who: lambda t, s: self.forward(on, rows, basis, s[:width], rate(t, s), t)[who])(who)
+            event = (lambda who: lambda t, s: self.forward(on, rows, basis, s[:width], rate(t, s), t)[who] - FORWARD_V)(who)
             event.terminal, event.direction = True, 1
             events.append(event)
             actions.append(on | set(who))

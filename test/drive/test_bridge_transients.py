@@ -55,7 +55,6 @@ def test_emf_reversal_through_both_bridges():
     times = windows(15)
     first = compare(circuit, oracle, times)
     circuit.machine.emf_v = oracle.emf = -40.0
-    circuit._emf = -40.0
     later = windows(17, first=21)
     ours = np.array(currents_at(circuit, later))
     oracle.run(later[-1] * 1e-9 + 1e-6)
