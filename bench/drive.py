@@ -57,7 +57,8 @@ def drive(load: float, reference: float, seconds: float) -> tuple[float, list[in
 def runge_kutta(seconds: float) -> float:
     """Run the same circuit at a fixed step, firings and overlap rounded to the grid; return wall seconds.
 
-    As a programmer would write it first: derivatives of current and speed by the SCR pair that conducts, without overlap.
+    As a programmer would write it first: derivatives of current and speed by the SCR pair that conducts, without
+    overlap.
     """
     peak = sqrt(2) * PARAMETERS.line_v
     data: MotorData = PARAMETERS.motor

@@ -61,7 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     motor.add_argument("--friction", type=float, metavar="NMS", help="viscous friction, N m s/rad (default 0)")
     motor.add_argument("--load", type=float, metavar="NM", help="load torque (default 0)")
     motor.add_argument("--duration", type=float, metavar="S", help="length of the run")
-    motor.add_argument("--csv", type=Path, metavar="FILE", help=f"table of the run, a row every 1 ms: {', '.join(COLUMNS)}")
+    motor.add_argument(
+        "--csv", type=Path, metavar="FILE", help=f"table of the run, a row every 1 ms: {', '.join(COLUMNS)}"
+    )
     parser.add_argument("--json", action="store_true", help="print the steady state as JSON")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw two cycles of the steady state")
 
@@ -112,11 +114,11 @@ def _steady(case: BridgeCase, arguments: argparse.Namespace) -> None:
 def report(case: BridgeCase, state: SteadyState) -> str:
     """Return the steady state as a drive engineer reads it."""
     ideal = 3 * sqrt(2) / pi * case.v_ll_v * cos(radians(case.alpha_deg)) * (-1 if case.reverse else 1)
+    name = f"bridge {2 if case.reverse else 1}, alpha {case.alpha_deg:g} deg (delta {180 - case.alpha_deg:g})"
+    ripple = f"rms {state.rms_current_a:.3f} A, ripple {state.ripple_pp_a:.3f} A peak to peak"
     lines = [
-        f"bridge {2 if case.reverse else 1}, alpha {case.alpha_deg:g} deg (delta {180 - case.alpha_deg:g}), "
-        f"line {case.v_ll_v:g} V {case.frequency_hz:g} Hz, EMF {case.emf_v:g} V",
-        f"  mean current   {state.mean_current_a:12.3f} A      rms {state.rms_current_a:.3f} A, "
-        f"ripple {state.ripple_pp_a:.3f} A peak to peak",
+        f"{name}, line {case.v_ll_v:g} V {case.frequency_hz:g} Hz, EMF {case.emf_v:g} V",
+        f"  mean current   {state.mean_current_a:12.3f} A      {ripple}",
         f"  mean voltage   {state.mean_voltage_v:12.3f} V      ideal bridge, continuous {ideal:.3f} V",
     ]
     if state.mean_current_a == 0.0:

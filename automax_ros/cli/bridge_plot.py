@@ -61,7 +61,9 @@ def _draw_voltages(axis: Any, time_ms: list[float], moments: list[Moment], case:
 def _draw_current(axis: Any, time_ms: list[float], moments: list[Moment], state: SteadyState) -> None:
     axis.plot(time_ms, [moment.current_a for moment in moments], color="black", linewidth=1.2)
     axis.axhline(state.mean_current_a, color="grey", linewidth=0.8, linestyle="--")
-    mode = f"overlap {state.overlap_deg:.2f}°" if state.continuous else f"no current {state.zero_current_us:.0f} µs in 60°"
+    mode = (
+        f"overlap {state.overlap_deg:.2f}°" if state.continuous else f"no current {state.zero_current_us:.0f} µs in 60°"
+    )
     axis.set_title(
         f"mean {state.mean_current_a:.2f} A, rms {state.rms_current_a:.2f} A, ripple {state.ripple_pp_a:.2f} A p-p, "
         f"mean output {state.mean_voltage_v:.2f} V, {mode}",

@@ -1,9 +1,10 @@
 """The three-phase line: voltage and frequency that move, rotation, source impedance, missing phases.
 
-In every segment the phase voltages are sinusoids of constant amplitude and frequency, so the circuit's solution is closed. A
-line at rest is one segment. While frequency or voltage moves, segments are short (``segment_ns``, 0.5 ms) and carry its
-mean over the segment: the angle at the end of each is exact and continuous; within one it is off by at most
-pi rate segment^2 / 4 (6e-6 rad at 28 Hz/s), and a voltage that settles with tau by segment / (2 tau) of its remaining way.
+In every segment the phase voltages are sinusoids of constant amplitude and frequency, so the circuit's solution is
+closed. A line at rest is one segment. While frequency or voltage moves, segments are short (``segment_ns``, 0.5 ms)
+and carry its mean over the segment: the angle at the end of each is exact and continuous; within one it is off by at
+most pi rate segment^2 / 4 (6e-6 rad at 28 Hz/s), and a voltage that settles with tau by segment / (2 tau) of its
+remaining way.
 """
 
 from __future__ import annotations
@@ -79,8 +80,8 @@ Change = Callable[[], None]
 class AcLine:
     """A three-phase line with isolated neutral; belongs to one circuit, which lets its time pass.
 
-    Phase x has the voltage ``amplitude_v cos(angle + shift[x])`` to the neutral; A's shift is 0, B's -120 degrees on a line
-    that rotates A, B, C.
+    Phase x has the voltage ``amplitude_v cos(angle + shift[x])`` to the neutral; A's shift is 0, B's -120 degrees on
+    a line that rotates A, B, C.
     """
 
     def __init__(
@@ -147,7 +148,7 @@ class AcLine:
         return self.amplitude_v * cos(self.angle(time_ns) + self.shift[phase])
 
     def instant_of(self, angle_rad: float, after_ns: int) -> int:
-        """Return the first instant at or after ``after_ns`` (ns) at which the line has an angle, as the line now runs."""
+        """Return the first instant at or after ``after_ns`` (ns) at which the line has an angle, if it runs on."""
         ahead = fmod(angle_rad - self.angle(after_ns), 2 * pi)
         if ahead < -1e-9:
             ahead += 2 * pi
@@ -179,7 +180,7 @@ class AcLine:
     def generator_transient(
         self, at_ns: int, dip: float, frequency_dip_hz: float, fall_s: float, recovery_s: float
     ) -> None:
-        """Imitate a generator that takes a load: voltage and frequency sag with one time constant, recover with another.
+        """Imitate a generator that takes a load: voltage and frequency sag with one time constant, then recover.
 
         Args:
             at_ns: when the load comes, ns.
@@ -233,7 +234,9 @@ class AcLine:
 
     def _schedule(self, at_ns: int, change: Change, _checked: float) -> None:
         if at_ns < self.start_ns:
-            raise ParameterError(f"a change of the line at {at_ns} ns lies before its present segment, {self.start_ns} ns")
+            raise ParameterError(
+                f"a change of the line at {at_ns} ns lies before its present segment, {self.start_ns} ns"
+            )
         self._serial += 1
         heapq.heappush(self._pending, (at_ns, self._serial, change))
         self.next_change_ns = min(self.next_change_ns, at_ns)

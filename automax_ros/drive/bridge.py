@@ -11,7 +11,8 @@ from automax_ros.drive.network import Wiring
 from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, numbers_of
 
 REST_NS = 10
-"""How long an SCR that went out conducts no more, gated or not: keeps events from piling up at one instant (decision)."""
+"""How long an SCR that went out conducts no more, gated or not: keeps events from piling up at one instant
+(decision)."""
 
 
 class Bridge:

@@ -32,9 +32,7 @@ class EventKind(enum.Enum):
     ARMATURE_CLOSED = "armature closed"
 
 
-ROUTINE = frozenset(
-    {EventKind.TURN_ON, EventKind.EXTINCTION, EventKind.COMMUTATION_START, EventKind.COMMUTATION_END}
-)
+ROUTINE = frozenset({EventKind.TURN_ON, EventKind.EXTINCTION, EventKind.COMMUTATION_START, EventKind.COMMUTATION_END})
 """What happens in every healthy cycle; told only on request."""
 
 

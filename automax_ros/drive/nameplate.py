@@ -1,6 +1,7 @@
 """A drive's parameters from the motor's name plate: each value with the rule it came from.
 
-The rules are textbook practice; a measured value replaces its rule. The three example motors are plausible, not real ones.
+The rules are textbook practice; a measured value replaces its rule. The three example motors are plausible, not real
+ones.
 """
 
 from __future__ import annotations
@@ -111,7 +112,9 @@ def derive(plate: NamePlate) -> DriveParameters:
     rubbing = _put(
         values,
         "viscous_n_m_s",
-        Value(max(0.0, k * amps - torque) / speed, "N m s/rad", "(k x amps - shaft torque) / base speed, all as viscous"),
+        Value(
+            max(0.0, k * amps - torque) / speed, "N m s/rad", "(k x amps - shaft torque) / base speed, all as viscous"
+        ),
     )
     line_v = _put(values, "line_v", _line(plate))
     source = _put(values, "source_h", _source(plate, line_v, amps))

@@ -1,26 +1,29 @@
 """The circuit that a set of closed legs makes: source, legs, armature, as decoupled first-order modes.
 
-Phase x obeys ``e_x - (Ls d/dt + Rs) i_x = v_x`` with all source impedances equal and an isolated neutral; the armature obeys
-``(L d/dt + R) i + E = v_P - v_M``. Whatever set of legs is closed, this falls apart into
+Phase x obeys ``e_x - (Ls d/dt + Rs) i_x = v_x`` with all source impedances equal and an isolated neutral; the
+armature obeys ``(L d/dt + R) i + E = v_P - v_M``. Whatever set of legs is closed, this falls apart into
 
-* one mode of the armature current with L + n Ls, R + n Rs, where n is 1/p + 1/m for p and m phases on the rails (2 for two
+* one mode of the armature current with L + n Ls, R + n Rs, where n is 1/p + 1/m for p and m phases on the rails (2
+for two
   SCRs, 1.5 while one commutates), or 0 where a phase on both rails shorts the armature;
-* modes of the currents that flow between the phases of one rail beside their equal share of the armature current: Ls, Rs.
+* modes of the currents that flow between the phases of one rail beside their equal share of the armature current: Ls,
+Rs.
 
-Each is solved in closed form (``waves``). SCRs are ideal but for a constant drop; where legs alone make a loop its current
-has no driving voltage, and the legs share as equal small resistances would.
+Each is solved in closed form (``waves``). SCRs are ideal but for a constant drop; where legs alone make a loop its
+current has no driving voltage, and the legs share as equal small resistances would.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, inf
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.scr import FORWARD_MASK, REVERSE_MASK, M, P
 
 TURN_ON_V = 1e-5
-"""Forward voltage, beyond the drop, at which a gated SCR turns on, V (decision: above rounding, 0.1 ns of a line's slope)."""
+"""Forward voltage, beyond the drop, at which a gated SCR turns on, V (decision: above rounding, 0.1 ns of a line's
+slope)."""
 SLOWEST_DECAY = 0.01
 """A resistance below L x this (1/s) counts as this, so that a steady state exists: 20 microohm with 2 mH (decision)."""
 
@@ -51,6 +54,11 @@ class Wiring:
         """Whether a phase or the contactor is opening."""
         return self.armature_arc_v != 0.0 or self.phase_arc_v != (0.0, 0.0, 0.0)
 
+    def with_arc(self, phase: int, arc_v: float) -> Wiring:
+        """Return the same with an arc of a voltage (V) in a phase; 0 ends it."""
+        a, b, c = (arc_v if x == phase else old for x, old in enumerate(self.phase_arc_v))
+        return replace(self, phase_arc_v=(a, b, c))
+
 
 @dataclass(frozen=True)
 class Impedances:
@@ -71,12 +79,13 @@ class Impedances:
 
 
 Guard = tuple[int, float, float, float, float, float, float, float, float]
-"""A current that must stay positive: SCRs it flows through (mask), factors of cos and sin, share of the armature current,
-constant, shares of the three phases' source modes, curvature omega^2 hypot(c, d)."""
+"""A current that must stay positive: SCRs it flows through (mask), factors of cos and sin, share of the armature
+current, constant, shares of the three phases' source modes, curvature omega^2 hypot(c, d)."""
 
 
 Watch = tuple[int, float, float, float, float, float, float, float]
-"""A voltage that turns on the SCRs of a mask when it is above 0: a Potential less drops and ``TURN_ON_V``, curvature."""
+"""A voltage that turns on the SCRs of a mask when it is above 0: a Potential less drops and ``TURN_ON_V``,
+curvature."""
 _Current = tuple[float, float, float, float, float, float, float]
 """A Guard without its mask and curvature."""
 
@@ -85,9 +94,33 @@ class Network:
     """The equations of one set of closed legs, as numbers for ``circuit``; built once for a set and a line segment."""
 
     __slots__ = (
-        "_drop_v", "_omega", "active", "alarms", "armature_short", "c", "constant", "d", "decay", "decay_s", "floating_offset", "guards",
-        "inductance", "instant", "mask", "modes", "offsets", "phase_c", "phase_d", "phase_k", "potentials", "rail_offset",
-        "rail_of_phases", "resistance", "share", "tied", "watches",
+        "_drop_v",
+        "_omega",
+        "active",
+        "alarms",
+        "armature_short",
+        "c",
+        "constant",
+        "d",
+        "decay",
+        "decay_s",
+        "floating_offset",
+        "guards",
+        "inductance",
+        "instant",
+        "mask",
+        "modes",
+        "offsets",
+        "phase_c",
+        "phase_d",
+        "phase_k",
+        "potentials",
+        "rail_of_phases",
+        "rail_offset",
+        "resistance",
+        "share",
+        "tied",
+        "watches",
     )  # fmt: skip
 
     def __init__(self, mask: int, wiring: Wiring, line: AcLine, z: Impedances) -> None:
@@ -205,12 +238,14 @@ class Network:
         self.floating_offset: Potential | None = _EMF if wiring.armature_closed else None
         if self.armature_short:
             self.floating_offset = _combined(_NOTHING, _UNIT, self.rail_offset)
-            rails = [rails[0], None if rails[0] is None else _combined(rails[0], _UNIT, -self.rail_offset)]
+            tied = rails[P]
+            rails[M] = None if tied is None else _combined(tied, _UNIT, -self.rail_offset)
         elif wiring.armature_closed:
-            if rails[P] is None and rails[M] is not None:
-                rails[P] = _combined(rails[M], _EMF, 1.0)
-            elif rails[M] is None and rails[P] is not None:
-                rails[M] = _combined(rails[P], _EMF, -1.0)
+            at_p, at_m = rails
+            if at_p is None and at_m is not None:
+                rails[P] = _combined(at_m, _EMF, 1.0)
+            elif at_m is None and at_p is not None:
+                rails[M] = _combined(at_p, _EMF, -1.0)
         phases: list[Potential | None] = []
         for x in range(3):
             cosine, sine = line.unit_wave(x)
@@ -262,7 +297,7 @@ class Network:
         self.guards.sort(key=lambda guard: guard[0] != mask)
 
     def watch(self, wanted: int) -> list[Watch]:
-        """Return, for SCRs that could begin to conduct, the voltages that drive them: of single ones, of pairs in series.
+        """Return, for SCRs that could begin to conduct, the voltages over them: of single ones, of pairs in series.
 
         A pair joins where one SCR alone has no way for its current: on floating rails or an open phase.
         """
@@ -323,11 +358,11 @@ def _is_line_short(rail: int, legs: dict[int, int]) -> bool:
 
 
 def _leg_currents(legs: dict[int, int]) -> dict[int, tuple[float, float, float, float]]:
-    """Return each leg's current, from phase to rail, as weights of the armature current and the three phase currents."""
+    """Return each leg's current, from phase to rail, as weights of armature current and three phase currents."""
     both = [x for x in range(3) if 2 * x in legs and 2 * x + 1 in legs]
     weights: dict[int, tuple[float, float, float, float]] = {}
     for leg in legs:
-        x, rail = divmod(leg, 2)
+        x = leg // 2
         if x not in both:
             weights[leg] = _weights({1 + x: 1.0})
     if not both:
@@ -369,9 +404,7 @@ def settle(mask: int, wiring: Wiring) -> int:
     return sum((mask & 3 << (2 * leg)) for leg in range(6) if leg in edges and not wiring.shorted >> leg & 1)
 
 
-def _watch(
-    nodes: list[Potential | None], floating: Potential | None, wanted: int
-) -> list[tuple[int, Potential]]:
+def _watch(nodes: list[Potential | None], floating: Potential | None, wanted: int) -> list[tuple[int, Potential]]:
     """Return what ``Network.watch`` returns; ``floating`` is the voltage from P to M where both rails float."""
     found = []
     ways = []
@@ -395,7 +428,7 @@ def _watch(
 def _series(
     nodes: list[Potential | None], floating: Potential | None, start: int, entry: int, leave: int, end: int
 ) -> Potential | None:
-    """Return the voltage of a way from ``start`` over the floating ``entry`` and ``leave`` to ``end``, None if it is none."""
+    """Return the voltage of a way from ``start`` over the floating ``entry`` and ``leave`` to ``end``, if it is one."""
     one, two = nodes[start], nodes[end]
     if start == end and entry != leave:
         way: Potential = _NOTHING

@@ -157,7 +157,7 @@ def _fixed_point(case: BridgeCase) -> float | None:
 
 
 def _simulated(case: BridgeCase) -> SteadyState:
-    """Return what a simulation from rest settles to; for overlaps beyond 60 degrees, and to find that nothing settles."""
+    """Return what a simulation from rest settles to: for overlaps beyond 60 degrees, or to find that none does."""
     circuit = case.circuit()
     bridge = ConstantAlpha(circuit, radians(case.alpha_deg), bridge=2 if case.reverse else 1)
     before = mean = inf
@@ -185,19 +185,18 @@ def _one_window(circuit: Circuit, bridge: ConstantAlpha, case: BridgeCase) -> tu
 
 
 def _why(case: BridgeCase, current_a: float) -> str:
-    text = f"no steady state at alpha {case.alpha_deg:g} degrees: SCRs fail to commutate, at {abs(current_a):.4g} A on average"
+    current = f"{abs(current_a):.4g} A on average"
+    text = f"no steady state at alpha {case.alpha_deg:g} degrees: SCRs fail to commutate, at {current}"
     if case.alpha_deg <= 90:
         return text
     reactance = 2 * pi * case.frequency_hz * case.source_h
     return (
-        f"{text}. An inverter at I ampere needs cos(alpha) > 2 X I / (sqrt(2) V) - 1, here with X = {reactance:.4g} ohm a "
-        f"phase and V = {case.v_ll_v:g} V: take a smaller alpha or an EMF nearer to 0 than {1.35 * case.v_ll_v:.4g} V"
+        f"{text}. An inverter at I ampere needs cos(alpha) > 2 X I / (sqrt(2) V) - 1 with X = {reactance:.4g} ohm a phase, "
+        f"V = {case.v_ll_v:g} V: take a smaller alpha or an EMF nearer to 0 than {1.35 * case.v_ll_v:.4g} V"
     )
 
 
-def _describe(
-    case: BridgeCase, windows: list[tuple[Sample, list[Piece]]], start_current_a: float
-) -> SteadyState:
+def _describe(case: BridgeCase, windows: list[tuple[Sample, list[Piece]]], start_current_a: float) -> SteadyState:
     time = sum(sample.duration_s for sample, _ in windows)
     mean = sum(sample.charge_c for sample, _ in windows) / time
     square = sum(sample.rms_current_a**2 * sample.duration_s for sample, _ in windows) / time
@@ -252,7 +251,10 @@ def waveforms(case: BridgeCase, state: SteadyState, *, cycles: int = 2, step_ns:
         # A nanosecond after the grid, so that what happens on it is seen.
         controller.advance(number * step_ns + 1)
         now = circuit.now_ns
-        phases = (circuit.line.phase_voltage(0, now), circuit.line.phase_voltage(1, now), circuit.line.phase_voltage(2, now))
+        phases = (
+            circuit.line.phase_voltage(0, now),
+            circuit.line.phase_voltage(1, now),
+            circuit.line.phase_voltage(2, now),
+        )
         gated = circuit.bridge.gated_numbers(now)
         yield Moment(now * 1e-9, phases, circuit.armature_v, circuit.current_a, circuit.conducting, gated)
-

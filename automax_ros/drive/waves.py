@@ -159,8 +159,8 @@ class Piece(NamedTuple):
         """Return the least and the greatest current (A) of the interval."""
         values = [self.value(0.0), self.value(self.duration_s)]
         slope = (self.omega * self.d, -self.omega * self.c, 0.0, -self.decay * self.a, 0.0)
-        for sign in (1.0, -1.0):
-            start = 0.0
+        for first_sign in (1.0, -1.0):
+            start, sign = 0.0, first_sign
             while start < self.duration_s:
                 t = start + self._slope_zero(sign, slope, start)
                 if t >= self.duration_s:

@@ -27,7 +27,7 @@ def natural(number):
 
 
 def plan(alphas_deg, *, bridge=1, first_window=6, hertz=60.0, width_deg=60.0):
-    """Double pulses, one window of 60 degrees after another from a number of windows after time 0: (on, off, SCR) in ns."""
+    """Double pulses, one in each window of 60 degrees from a number of windows after time 0: (on, off, SCR), ns."""
     gates = []
     for window, alpha in enumerate(alphas_deg, first_window):
         number = window % 6 + 1

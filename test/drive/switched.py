@@ -1,8 +1,9 @@
 """A switched circuit integrated by scipy: what the model is judged by. It shares no code with it.
 
-Line, closed SCRs and armature are branches of a graph. Each set of closed SCRs gives independent loops (the null space of the
-incidence matrix), ``B' L B y' = B' (v - R B y)``, which ``solve_ivp`` integrates with a fine step; events stop it where the
-current of an SCR or the forward voltage over a gated one crosses zero. SCRs are ideal, recovery takes no time.
+Line, closed SCRs and armature are branches of a graph. Each set of closed SCRs gives independent loops (the null
+space of the incidence matrix), ``B' L B y' = B' (v - R B y)``, which ``solve_ivp`` integrates with a fine step;
+events stop it where the current of an SCR or the forward voltage over a gated one crosses zero. SCRs are ideal,
+recovery takes no time.
 """
 
 from dataclasses import dataclass, field
@@ -40,6 +41,8 @@ class Switched:
     r: float
     l: float  # noqa: E741
     emf: float = 0.0
+    motor: tuple = ()  # k, inertia, friction, load torque; the EMF is then k speed
+    speed: float = 0.0
     angle: object = None  # line angle (rad) as a function of time; phase a is its cosine
     shorted: tuple = ()
     lost: frozenset = frozenset()
@@ -80,21 +83,24 @@ class Switched:
         resistance = np.diag([row[4] for row in rows])
         return rows, basis, np.linalg.pinv(basis.T @ inductance @ basis), basis.T @ resistance @ basis
 
-    def drive(self, rows, time):
-        return np.array([
-            self.source(name, time) - self.arcs.get(name, 0.0) if name in ("a", "b", "c") else -self.emf if name == "d" else 0.0
-            for name, *_ in rows
-        ])
+    def drive(self, rows, time, emf):
+        volts = {"d": -emf}
+        volts |= {x: self.source(x, time) - self.arcs.get(x, 0.0) for x in "abc"}
+        return np.array([volts.get(name, 0.0) for name, *_ in rows])
 
     def gated(self, time):
         return {scr for start, end, scr in self.gates if start <= time < end}
 
-    def forward(self, on, rows, basis, y, rate, time):
+    def forward(self, on, rows, basis, y, rate, time, emf):
         """The forward voltage over each SCR that is off, for single ones and pairs that would close a loop."""
-        i, di = dict(zip([row[0] for row in rows], basis @ y)), dict(zip([row[0] for row in rows], basis @ rate))
-        level = {x: self.source(x, time) - self.arcs.get(x, 0.0) - self.rs * i[x] - self.ls * di[x] for x in "abc" if x not in self.lost}
+        names = [row[0] for row in rows]
+        i, di = dict(zip(names, basis @ y, strict=True)), dict(zip(names, basis @ rate, strict=True))
+        level = {
+            x: self.source(x, time) - self.arcs.get(x, 0.0) - self.rs * i[x] - self.ls * di[x]
+            for x in "abc" if x not in self.lost
+        }  # fmt: skip
         closed = [WAYS[scr] for scr in (*on, *self.shorted)]
-        armature = self.emf + self.r * i["d"] + self.l * di["d"]
+        armature = emf + self.r * i["d"] + self.l * di["d"]
         for _ in range(3):
             for one, two in closed:
                 for known, other in ((one, two), (two, one)):
@@ -115,8 +121,13 @@ class Switched:
                 for two in off:
                     start, middle = WAYS[one]
                     other, end = WAYS[two]
-                    if start in level and end in level and middle in "PM" and other in "PM" and (start != end or middle != other):
-                        drop = 0.0 if middle == other else self.emf if middle == "P" else -self.emf
+                    if (
+                        start in level
+                        and end in level
+                        and {middle, other} <= {"P", "M"}
+                        and (start, middle) != (end, other)
+                    ):
+                        drop = 0.0 if middle == other else emf if middle == "P" else -emf
                         volts[one, two] = level[start] - level[end] - drop
         return volts
 
@@ -143,21 +154,30 @@ class Switched:
         start[held] = [self.currents[names[n]] for n in held]
         y0 = np.linalg.lstsq(basis[held], start[held], rcond=None)[0]
 
+        def emf(state):
+            return self.motor[0] * state[-1] if self.motor else self.emf
+
         def rate(time, state):
-            return inverse @ (basis.T @ self.drive(rows, time) - resistance @ state[:width])
+            return inverse @ (basis.T @ self.drive(rows, time, emf(state)) - resistance @ state[:width])
 
         def full(time, state):
             d = basis[names.index("d")] @ state[:width]
-            return np.concatenate([rate(time, state), [d, d * d]])
+            turn = 0.0
+            if self.motor:
+                k, inertia, friction, load = self.motor
+                turn = (k * d - friction * state[-1] - load) / inertia
+            return np.concatenate([rate(time, state), [d, d * d, turn]])
+
+        y0 = np.concatenate([y0, [0.0, 0.0, self.speed]])
 
         # Who turns on at once?
-        volts = self.forward(on, rows, basis, y0, rate(self.time, y0), self.time)
+        volts = self.forward(on, rows, basis, y0[:width], rate(self.time, y0), self.time, emf(y0))
         ready = {who: v for who, v in volts.items() if v > FORWARD_V}
         if ready:
             self.on = on | set(max(ready, key=ready.get))
             return
         # Who goes out at once?
-        di, i = basis @ rate(self.time, y0), basis @ y0
+        di, i = basis @ rate(self.time, y0), basis @ y0[:width]
         leaving = {
             s for s in on
             if i[names.index(s)] < -1e-6 or (i[names.index(s)] < 1e-6 and di[names.index(s)] < -1e-3)
@@ -169,23 +189,23 @@ class Switched:
         events, actions = [], []
         for scr in sorted(on):
             column = basis[names.index(scr)]
-            event = (lambda column: lambda t, s: column @ s[:width] + (1e-9 if t - self.time < 1e-8 else 0.0))(column)
+            event = self.ending(column, self.time)
             event.terminal, event.direction = True, -1
             events.append(event)
             actions.append(on - {scr})
         for who in volts:
-            event = (lambda who: lambda t, s: self.forward(on, rows, basis, s[:width], rate(t, s), t)[who] - FORWARD_V)(who)
+            event = self.crossing(who, lambda t, s: self.forward(on, rows, basis, s[:width], rate(t, s), t, emf(s)))
             event.terminal, event.direction = True, 1
             events.append(event)
             actions.append(on | set(who))
         for phase, volts_arc in self.arcs.items():
             column = np.sign(volts_arc) * basis[names.index(phase)]
-            event = (lambda column: lambda t, s: column @ s[:width])(column)
+            event = self.ending(column, self.time)
             event.terminal, event.direction = True, -1
             events.append(event)
             actions.append(phase)
         solution = solve_ivp(
-            full, (self.time, end), np.concatenate([y0, [0.0, 0.0]]), "DOP853", events=events, max_step=self.step,
+            full, (self.time, end), y0, "DOP853", events=events, max_step=self.step,
             rtol=self.rtol, atol=1e-8, dense_output=False,
         )  # fmt: skip
         branch = basis @ solution.y[:width]
@@ -194,6 +214,7 @@ class Switched:
         self.time = solution.t[-1]
         self.charge += solution.y[width, -1]
         self.square += solution.y[width + 1, -1]
+        self.speed = solution.y[width + 2, -1]
         final = basis @ solution.y[:width, -1]
         self.currents = {x: final[names.index(x)] if x in names else 0.0 for x in "abcd"}
         if solution.status == 1:
@@ -203,14 +224,23 @@ class Switched:
             else:
                 self.on = actions[hit]
             if hit < len(on) or not isinstance(actions[hit], frozenset):  # SCRs in series go out together
-                self.on = frozenset(
-                    s for s in self.on
-                    if abs(final[names.index(s)]) > 1e-6 or basis[names.index(s)] @ rate(self.time, solution.y[:, -1]) > 0
-                )  # fmt: skip
+                change = basis @ rate(self.time, solution.y[:, -1])
+                row = names.index
+                self.on = frozenset(s for s in self.on if abs(final[row(s)]) > 1e-6 or change[row(s)] > 0)
         self.on = frozenset(self.on)
         for phase in list(self.arcs):
             if abs(self.currents[phase]) < 1e-6:
                 self.open(phase)
+
+    @staticmethod
+    def ending(column, start):
+        """An event: a sum of loop currents falls to zero, but not one that only begins there."""
+        return lambda t, s: column @ s[: len(column)] + (1e-9 if t - start < 1e-8 else 0.0)
+
+    @staticmethod
+    def crossing(who, volts):
+        """An event: the forward voltage of SCRs exceeds zero."""
+        return lambda t, s: volts(t, s)[who] - FORWARD_V
 
     def open(self, phase):
         self.arcs.pop(phase)

@@ -72,8 +72,8 @@ def test_angle_within_a_segment_is_off_by_what_is_told():
     for _ in range(50):
         for part in range(10):
             t = (line.start_ns + part * 50_000) * 1e-9
-            worst = max(worst, abs(line.angle(t * 1e9) - line.start_angle
-                                   - 2 * pi * (line.frequency_hz * part * 50e-6 - rate * (part * 50e-6) ** 2 / 2)))  # fmt: skip
+            true = 2 * pi * (line.frequency_hz * part * 50e-6 - rate * (part * 50e-6) ** 2 / 2)
+            worst = max(worst, abs(line.angle(t * 1e9) - line.start_angle - true))
         line.advance(line.next_change_ns)
     assert worst <= pi * rate * segment_s**2 / 4 * 1.01
     assert worst > 0.5 * pi * rate * segment_s**2 / 4

@@ -1,6 +1,6 @@
 """What breaks: each failure's currents by circuit theory, and its event."""
 
-from math import pi, sqrt
+from math import pi, sin, sqrt
 
 import pytest
 
@@ -36,7 +36,7 @@ def test_anti_parallel_pairs_are_the_manuals():
 
 @pytest.mark.parametrize("failed", [1, 2, 5])
 def test_a_shorted_scr_shorts_the_line_through_the_next_of_its_rail(failed):
-    """Line-to-line fault through 2 Ls, from zero current at the angle of firing: (cos(alpha) - cos(wt)) sqrt2 V / 2X."""
+    """Line-to-line fault through 2 Ls, from zero at the angle of firing: (cos(alpha) - cos(wt)) sqrt2 V / 2X."""
     ls, alpha = 300e-6, 60.0
     circuit = circuit_of(ls=ls, rs=0.0, r=5.0, l=50e-3, emf=0.0, trace=True)
     circuit.short_scr(failed)
@@ -120,7 +120,7 @@ def inverter(turn_off_s, alpha, last_window=16):
 
 
 def test_too_little_turn_off_angle_fails_the_commutation():
-    """At alpha 150 an ideal SCR commutates with some 20 degrees to spare; one that needs 1.5 ms (32 degrees) does not."""
+    """At alpha 150 an ideal SCR commutates with some 20 degrees to spare; one that needs 1.5 ms does not."""
     assert EventKind.COMMUTATION_FAILURE not in kinds_of(inverter(0.0, 150.0))
     circuit = inverter(1.5e-3, 150.0)
     events = circuit.take_events()
@@ -149,14 +149,12 @@ def test_cross_fire_shorts_the_line_through_both_bridges():
     """SCR 1 of bridge 1 and SCR 16 of bridge 2 join phases A and B at rail P."""
     ls = 200e-6
     circuit = circuit_of(ls=ls, rs=0.0)
-    on = round(1e9 / 60 - 1e9 / 720)  # A above B from 30 degrees before A's maximum... at -30 degrees
+    on = round(1e9 / 60 - 1e9 / 720)  # at 30 degrees before A's maximum A is far above B
     circuit.fire(on, on + 50_000, 1, 16)
     circuit.advance(on + 4_000_000)
     angle_on, angle = (2 * pi * 60 * time * 1e-9 + pi / 6 for time in (on, on + 4_000_000))
     # v_ab = sqrt2 V cos(angle): i = sqrt2 V (sin(angle) - sin(angle_on)) / 2X
-    import math
-
-    expected = PEAK / (2 * 2 * pi * 60 * ls) * (math.sin(angle) - math.sin(angle_on))
+    expected = PEAK / (2 * 2 * pi * 60 * ls) * (sin(angle) - sin(angle_on))
     assert circuit.phase_currents() == pytest.approx((expected, -expected, 0.0), rel=1e-4)
     assert circuit.current_a == 0.0
     assert circuit.conducting == (1, 16)
@@ -205,7 +203,7 @@ def test_without_the_armature_no_scr_conducts():
 def test_a_line_without_impedance_cannot_be_shorted():
     circuit = circuit_of(ls=0.0, rs=0.0)
     circuit.fire(15_000_000, 15_100_000, 1, 16)
-    with pytest.raises(SourceShortError, match="SCRs 1, 16 short two phases .* give it an inductance"):
+    with pytest.raises(SourceShortError, match=r"SCRs 1, 16 short two phases .* give it an inductance"):
         circuit.advance(16_000_000)
 
 

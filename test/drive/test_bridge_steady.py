@@ -17,7 +17,9 @@ def one_window(case, current):
     """60 degrees from the firing of SCR 1 with a current in SCRs 5 and 6."""
     begin = (4 * pi - pi / 3 + radians(case.alpha_deg)) / (2 * pi * 60)
     # The integration needs some inductance; 0.1 uH commutates 100 A in 40 ns.
-    circuit = Switched(case.v_ll_v, case.source_h or 1e-7, case.source_ohm, case.resistance_ohm, case.inductance_h, case.emf_v)
+    circuit = Switched(
+        case.v_ll_v, case.source_h or 1e-7, case.source_ohm, case.resistance_ohm, case.inductance_h, case.emf_v
+    )
     circuit.time = begin
     circuit.gates = [(begin, begin + SIXTH_S, 1), (begin, begin + SIXTH_S, 6)]
     if current > 0:
@@ -144,9 +146,9 @@ def test_textbook_overlap_holds_for_a_smooth_current(alpha):
 
 
 def test_textbook_mean_current_errs_with_ripple():
-    """At ripple the outgoing current at firing is far below the mean, so the overlap formula takes too long and too much.
+    """With ripple the current at firing is far below the mean, so the formula takes overlap for longer than it is.
 
-    What is known exactly is the voltage lost in overlap by the current at its end: 6 f Ls i. The formula takes the mean.
+    The voltage lost in overlap is 6 f Ls times the current at its end; the formula takes the mean current.
     """
     case = BridgeCase(460.0, 60.0, 300e-6, 0.0, 0.3, 1e-3, 170.0, 70.0)
     state = steady_state(case)

@@ -89,7 +89,7 @@ def test_a_phase_is_lost_and_returns(phase):
 
 
 def test_frequency_drifts_from_62_to_48_hz():
-    """At 200 Hz/s, faster than any line, so that a firing plan at the true angle shows an error of the line's segments."""
+    """At 200 Hz/s, faster than any line, and gates at the true angle: an error of the line would show."""
     rate, start_s = 200.0, 0.02
     end_s = start_s + 14 / rate
 
@@ -115,12 +115,14 @@ def test_frequency_drifts_from_62_to_48_hz():
     times = [round(20e6 + n * 0.1e6) for n in range(1000)]
     run(circuit, gates, times, angle=angle)
     assert circuit.line.frequency_hz == 48.0
-    assert circuit.line.angle(circuit.now_ns) % (2 * pi) == pytest.approx(angle(circuit.now_ns * 1e-9) % (2 * pi), abs=1e-9)
+    assert circuit.line.angle(circuit.now_ns) % (2 * pi) == pytest.approx(
+        angle(circuit.now_ns * 1e-9) % (2 * pi), abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("number", [1, 6])
 def test_a_shorted_scr(number):
-    """Through it and each SCR of its rail in turn the line is shorted: only the source's impedance limits the current."""
+    """Through it and each SCR of its rail in turn the line is shorted, limited by the source alone."""
     gates = plan([75.0] * 24)
     circuit = circuit_of(emf=100, ls=200e-6)
     fire_all(circuit, gates)
@@ -133,7 +135,7 @@ def test_a_shorted_scr(number):
     circuit.advance(failed_ns)
     circuit.short_scr(number)
     phases, ours_later = [], []
-    for time in times[len(before):]:
+    for time in times[len(before) :]:
         circuit.advance(time)
         ours_later.append(circuit.current_a)
         phases.append(circuit.phase_currents())
@@ -146,7 +148,7 @@ def test_a_shorted_scr(number):
     time = np.concatenate([segment.time for segment in oracle.segments])
     for phase in range(3):
         whole = np.concatenate([segment.phases[phase] for segment in oracle.segments])
-        expected = np.interp(np.array(times[len(before):]) * 1e-9, time, whole)
+        expected = np.interp(np.array(times[len(before) :]) * 1e-9, time, whole)
         worst = np.abs(np.array(phases)[:, phase] - expected).max()
         assert worst < 0.005 * np.abs(np.array(phases)).max()
     # The fault current of two phases: sqrt2 V / (2 X) with its offset up to twice that.

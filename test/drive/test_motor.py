@@ -1,5 +1,6 @@
 """Motor, field, loads, coupling and sensors: against the closed solutions of their equations."""
 
+from itertools import pairwise
 from math import cos, exp, pi, radians, sqrt
 from random import Random
 from statistics import fmean, pstdev
@@ -23,7 +24,7 @@ def coast(motor, seconds, charge_a=0.0, step_s=2.7e-3):
     """Let the mechanics turn with a constant armature current."""
     for _ in range(round(seconds / step_s)):
         motor.emf(step_s)
-        motor.advance(step_s, charge_a * step_s)
+        motor.advance(step_s, charge_a * step_s, 0.0)
 
 
 def test_viscous_coast_down():
@@ -96,7 +97,7 @@ def test_a_weak_field_makes_less_emf_and_less_torque():
     assert motor.emf(0.0) == pytest.approx(250.0)
     coast(motor, 8.1)
     assert motor.k_v_s == pytest.approx(1.25, rel=1e-6)
-    motor.advance(1e-3, 100e-3)
+    motor.advance(1e-3, 100e-3, 0.0)
     assert motor.torque_n_m == pytest.approx(125, rel=1e-6)
 
 
@@ -119,7 +120,9 @@ def test_speed_at_no_load_is_where_the_emf_is_the_mean_voltage():
     assert 1.7 * sample.mean_current_a == pytest.approx(0.5 * motor.speed_rad_s, rel=1e-3)
     assert sample.mean_voltage_v == pytest.approx(1.7 * motor.speed_rad_s + 0.05 * sample.mean_current_a, rel=1e-4)
     ideal = 3 * sqrt(2) / pi * 460 * cos(radians(60))
-    assert sample.mean_voltage_v == pytest.approx(ideal - (2 * 0.005 + 6 * 60 * 60e-6) * sample.mean_current_a, rel=2e-3)
+    assert sample.mean_voltage_v == pytest.approx(
+        ideal - (2 * 0.005 + 6 * 60 * 60e-6) * sample.mean_current_a, rel=2e-3
+    )
 
 
 def coupled(*, first=1.5, second=3.0, speed=(0.0, 0.0), k=2.5, **options):
@@ -178,7 +181,7 @@ def test_an_elastic_coupling_swings_at_its_frequency():
         if before < 0 <= slip:
             crossings.append(step * 250e-6)
         before = slip
-    periods = [(later - earlier) for earlier, later in zip(crossings, crossings[1:], strict=False)]
+    periods = [later - earlier for earlier, later in pairwise(crossings)]
     assert fmean(periods) == pytest.approx(1 / frequency, rel=2e-3)
     assert 1.5 * one.speed_rad_s + 3.0 * two.speed_rad_s == pytest.approx(0.0, abs=1e-9)
     energy = 0.75 * one.speed_rad_s**2 + 1.5 * two.speed_rad_s**2 + 2000 * shaft.twist_rad**2

@@ -24,8 +24,8 @@ def pattern(seed):
             busy_until[number] = off
             windows.append((on, off, number))
     circuit = circuit_of(
-        ls=random.choice([60e-6, 300e-6]), l=random.choice([0.5e-3, 3e-3]), emf=random.choice([-400, -100, 0, 100, 300]),
-        energy=True,
+        ls=random.choice([60e-6, 300e-6]), l=random.choice([0.5e-3, 3e-3]),
+        emf=random.choice([-400, -100, 0, 100, 300]),        energy=True,
     )  # fmt: skip
     shorted = random.choice([(), (), (3,), (2,)])
     for number in shorted:
