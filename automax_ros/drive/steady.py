@@ -191,8 +191,8 @@ def _why(case: BridgeCase, current_a: float) -> str:
         return text
     reactance = 2 * pi * case.frequency_hz * case.source_h
     return (
-        f"{text}. An inverter at I ampere needs cos(alpha) > 2 X I / (sqrt(2) V) - 1 with X = {reactance:.4g} ohm a phase, "
-        f"V = {case.v_ll_v:g} V: take a smaller alpha or an EMF nearer to 0 than {1.35 * case.v_ll_v:.4g} V"
+        f"{text}. An inverter at I ampere needs cos(alpha) > 2 X I / (sqrt(2) V) - 1 with X = {reactance:.4g} ohm "
+        f"a phase, V = {case.v_ll_v:g} V: take a smaller alpha or an EMF nearer to 0 than {1.35 * case.v_ll_v:.4g} V"
     )
 
 
