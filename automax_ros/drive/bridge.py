@@ -13,6 +13,8 @@ from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, num
 REST_NS = 10
 """How long an SCR that went out conducts no more, gated or not: keeps events from piling up at one instant
 (decision)."""
+UNLATCHED_NS = 100_000
+"""The same for one that conducted for less than ``REST_NS``: it did not latch (decision)."""
 
 
 class Bridge:
@@ -44,8 +46,12 @@ class Bridge:
         self.gate_end_ns = [0] * 12
         self.recovering = 0
         """SCRs that went out and were not seen to recover."""
-        self.out_ns = [0.0] * 12
-        """When each of them went out."""
+        self.on_ns = [0.0] * 12
+        """When each SCR last turned on."""
+        self.recovered_ns = [0.0] * 12
+        """When each that went out blocks forward voltage again."""
+        self.rest_ns = [0.0] * 12
+        """Until when each that went out cannot turn on."""
         self.open_gates = 0
 
     def fire(self, on_ns: int, off_ns: int, numbers: Iterable[int]) -> None:
@@ -95,10 +101,10 @@ class Bridge:
                 else:
                     self.gated ^= low
             if self.recovering & low:
-                if self.out_ns[bit] + max(self.turn_off_ns, REST_NS) <= now_ns:
-                    self.recovering ^= low
-                elif self.turn_off_ns:
+                if self.recovered_ns[bit] > now_ns:
                     mask |= low
+                elif self.rest_ns[bit] <= now_ns:
+                    self.recovering ^= low
         return mask
 
     def window_end_ns(self, mask: int, now_ns: float) -> float:
@@ -110,14 +116,14 @@ class Bridge:
             bit = low.bit_length() - 1
             own = float(self.gate_end_ns[bit]) if self.gated & low else now_ns
             if self.recovering & low:
-                own = max(own, self.out_ns[bit] + self.turn_off_ns)
+                own = max(own, self.recovered_ns[bit])
             end = min(end, own)
         return end
 
     def rest_end_ns(self, mask: int) -> float:
         """Return when the last SCR of a mask may conduct again after it went out, ns."""
         bits = (bit for bit in range(12) if mask & self.recovering & 1 << bit)
-        return max((self.out_ns[bit] + REST_NS for bit in bits), default=0.0)
+        return max((self.rest_ns[bit] for bit in bits), default=0.0)
 
     def gated_numbers(self, now_ns: int) -> tuple[int, ...]:
         """Return the SCRs that are gated at an instant."""
@@ -129,7 +135,9 @@ class Bridge:
         while mask:
             low = mask & -mask
             mask ^= low
-            self.out_ns[low.bit_length() - 1] = now_ns
+            bit = low.bit_length() - 1
+            self.recovered_ns[bit] = now_ns + self.turn_off_ns
+            self.rest_ns[bit] = now_ns + (REST_NS if now_ns - self.on_ns[bit] >= REST_NS else UNLATCHED_NS)
 
     def open_gate(self, number: int, *, is_open: bool = True) -> None:
         """Break (or mend) the gate lead of an SCR."""

@@ -18,7 +18,7 @@ from automax_ros.drive.events import Event, EventKind
 from automax_ros.drive.meter import Sample
 from automax_ros.drive.motor import Machine
 from automax_ros.drive.network import ARMATURE_ARC, PHASE_ARC
-from automax_ros.drive.scr import mask_of, numbers_of
+from automax_ros.drive.scr import BIT, mask_of, numbers_of
 from automax_ros.drive.waves import ZERO_A, Piece
 
 ARC_V = 1200.0
@@ -168,12 +168,18 @@ class Circuit(Conduction):
     # What can break
 
     def short_scr(self, number: int, *, shorted: bool = True) -> None:
-        """Let an SCR fail into a short both ways (or put a sound one in)."""
+        """Let an SCR fail into a short both ways, or put a sound one in, which carries on with the current there is."""
         phases = self.phase_currents()
-        self.bridge.short(number, shorted=shorted)
+        left_on = 0
         if shorted:
             self._emit(EventKind.SCR_SHORTED, 0.0, number)
-        self._rewire(phases)
+        else:
+            leg = BIT[number] // 2
+            current = self._net.leg_current(leg, self.current_a, phases)
+            if abs(current) > ZERO_A:
+                left_on = 1 << (2 * leg + (current < 0))
+        self.bridge.short(number, shorted=shorted)
+        self._rewire(phases, left_on)
 
     def open_gate(self, number: int, *, is_open: bool = True) -> None:
         """Break (or mend) the gate lead of an SCR; each time it should fire is an event."""
@@ -236,12 +242,12 @@ class Circuit(Conduction):
             else:
                 self.close_phase(phase)
 
-    def _rewire(self, phases: Phases) -> None:
+    def _rewire(self, phases: Phases, left_on: int = 0) -> None:
         """Take over what changed in the wiring or the line, with the phase currents (A) just before."""
         old = self._net
         self._nets.clear()
         angle = self.line.angle(self.now_ns)
-        net = self._enter(old.mask, phases, sin(angle), cos(angle))
+        net = self._enter(old.mask | left_on, phases, sin(angle), cos(angle))
         gone = old.mask & ~net.mask
         if gone:
             self.bridge.put_out(gone, float(self.now_ns))

@@ -174,7 +174,7 @@ class Conduction:
         net, omega = self._net, self.line.omega
         decay, decay_s = net.decay, net.decay_s
         first, out = limit, 0
-        ahead = None
+        ahead, lowest = None, -ZERO_A
         for mask, c, d, share, part, wa, wb, wc, bend in net.guards:
             guard_k, guard_a = share * k + part, share * a
             value = c * cosine + d * sine + guard_k + guard_a
@@ -187,6 +187,10 @@ class Conduction:
                 slope -= decay_s * guard_b
                 if guard_b < 0.0:
                     bend -= decay_s * decay_s * guard_b  # noqa: PLW2901
+            if value < lowest:  # a loop of legs has shared its current anew: who would carry it backwards most goes out
+                lowest, first, out = value, 0.0, mask
+            if lowest < -ZERO_A:
+                continue
             # A parabola of this bend stays below the current: positive at the end, it proves that there is no zero.
             if value > ZERO_A or (value >= -ZERO_A and slope >= 0.0):
                 least = value if value > 0.0 else 0.0
@@ -243,6 +247,10 @@ class Conduction:
                 continue
             horizon = min(horizon, (bridge.window_end_ns(mask, now_ns) - now_ns) * 1e-9)
             zero = first_zero(-c, -d, short, -fade, 0.0, theta, omega, decay, 0.0, horizon)
+            if zero < soonest and mask & bridge.recovering:
+                rest = (bridge.rest_end_ns(mask) - now_ns) * 1e-9
+                if zero < rest:
+                    zero, mask = rest, 0  # noqa: PLW2901
             if zero < soonest:
                 soonest, who = zero, mask
         return (0.0, now_on) if now_on else (soonest, who)
@@ -377,6 +385,7 @@ class Conduction:
         for number in numbers_of(on):
             bit = BIT[number]
             self._newest[bit >> 1 & 1] = number
+            bridge.on_ns[bit] = start_ns + t * 1e9
             if self._trace:
                 self._emit(EventKind.TURN_ON, t, number)
             if not bridge.gated >> bit & 1 or bridge.gate_end_ns[bit] <= start_ns + t * 1e9:

@@ -94,33 +94,10 @@ class Network:
     """The equations of one set of closed legs, as numbers for ``circuit``; built once for a set and a line segment."""
 
     __slots__ = (
-        "_drop_v",
-        "_omega",
-        "active",
-        "alarms",
-        "armature_short",
-        "c",
-        "constant",
-        "d",
-        "decay",
-        "decay_s",
-        "floating_offset",
-        "guards",
-        "inductance",
-        "instant",
-        "mask",
-        "modes",
-        "offsets",
-        "phase_c",
-        "phase_d",
-        "phase_k",
-        "potentials",
-        "rail_of_phases",
-        "rail_offset",
-        "resistance",
-        "share",
-        "tied",
-        "watches",
+        "_drop_v", "_omega", "active", "alarms", "armature_short", "c", "constant", "d", "decay", "decay_s",
+        "floating_offset", "guards", "inductance", "instant", "leg_weights", "mask", "modes", "offsets",
+        "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset", "resistance", "share",
+        "tied", "watches",
     )  # fmt: skip
 
     def __init__(self, mask: int, wiring: Wiring, line: AcLine, z: Impedances) -> None:
@@ -262,7 +239,8 @@ class Network:
     def _set_guards(self, legs: dict[int, int], wiring: Wiring, omega: float) -> None:
         """Collect the currents whose zero ends the interval: of SCRs, and of arcs."""
         guards: dict[_Current, int] = {}
-        for leg, weights in _leg_currents(legs).items():
+        self.leg_weights = _leg_currents(legs)
+        for leg, weights in self.leg_weights.items():
             if legs[leg]:
                 bit = 1 << (2 * leg + (legs[leg] < 0))
                 key = self._guard(*(legs[leg] * weight for weight in weights))
@@ -291,6 +269,11 @@ class Network:
         if not self.modes:
             a = b = c = 0.0
         return share * self.c + cosine, share * self.d + sine, share, constant, a, b, c
+
+    def leg_current(self, leg: int, armature_a: float, phases_a: tuple[float, float, float]) -> float:
+        """Return the current of a leg from its phase to its rail, A; 0 of an open one."""
+        armature, a, b, c = self.leg_weights.get(leg, (0.0, 0.0, 0.0, 0.0))
+        return armature * armature_a + a * phases_a[0] + b * phases_a[1] + c * phases_a[2]
 
     def put_first(self, mask: int) -> None:
         """Let the current of these SCRs be looked at first: what ended this circuit last time will next time too."""

@@ -10,7 +10,7 @@ the source's decay rate (1/s).
 
 from __future__ import annotations
 
-from math import cos, exp, hypot, inf, sin, sqrt
+from math import cos, exp, expm1, hypot, inf, sin, sqrt
 from typing import NamedTuple
 
 STRIDE_S = 1e-8
@@ -199,7 +199,7 @@ class Moments:
         self.a, self._aa, self._ca, self._sa = _decaying(decay, omega, duration, s0, c0, s1, c1)
         self.b, self._bb, self._cb, self._sb = _decaying(decay_b, omega, duration, s0, c0, s1, c1)
         both = decay + decay_b
-        self._ab = 0.0 if both == inf else (1 - exp(-both * duration)) / both
+        self._ab = 0.0 if both == inf else -expm1(-both * duration) / both
 
     def single(self, wave: Wave) -> float:
         """Return the integral of a wave."""
@@ -225,7 +225,7 @@ def _decaying(
     if decay == inf:
         return 0.0, 0.0, 0.0, 0.0
     end = exp(-decay * duration)
-    single = (1 - end) / decay
+    single = -expm1(-decay * duration) / decay
     square = single * (1 + end) / 2
     norm = decay * decay + omega * omega
     cosine = (end * (omega * s1 - decay * c1) - (omega * s0 - decay * c0)) / norm
