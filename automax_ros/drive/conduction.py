@@ -181,7 +181,7 @@ class Conduction:
             slope = omega * (d * cosine - c * sine) - decay * guard_a
             if guard_a < 0.0:
                 bend -= decay * decay * guard_a  # noqa: PLW2901
-            guard_b = wa * modes[0] + wb * modes[1] + wc * modes[2]
+            guard_b = wa * modes[0] + wb * modes[1] + wc * modes[2] if net.modes else 0.0
             if guard_b:
                 value += guard_b
                 slope -= decay_s * guard_b
