@@ -21,6 +21,7 @@ SUBCOMMANDS: dict[str, str] = {
     "run": "run a rack",
     "compare": "run a block beside the Logix instruction it becomes",
     "export": "write common memory of a recording to a CSV table",
+    "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
     "explain": "say what a problem code means and how to cure it",
 }

@@ -54,13 +54,14 @@ def test_a_variable_of_zero_or_less_counts_as_one(samples):
 
 
 def test_reset_drops_the_samples_of_the_window():
-    block = run("SAMPLED_AVERAGE", required_samples=2)
-    for value in (100, 200, 300):
+    """The window that it ends holds a greater and a smaller sample than the next one."""
+    block = run("SAMPLED_AVERAGE", required_samples=3)
+    for value in (100, 200, 300, 900, -900):
         block.scan(input=value)
     assert block.scan(input=1000, reset=True) == CLEARED
     assert block.scan(input=1000, reset=True) == CLEARED
-    assert block.scan(input=4) == CLEARED
-    assert block.scan(input=6) == shown(5, 6, 4, valid=True)
+    assert [block.scan(input=value) for value in (4, 6)] == [CLEARED, CLEARED]
+    assert block.scan(input=5) == shown(5, 6, 4, valid=True)
 
 
 def test_reset_on_the_scan_of_an_update_wins():

@@ -1,0 +1,417 @@
+"""How a power circuit passes time: from event to event, each interval in closed form.
+
+Root finding serves only to find the instant of an event: a current that ends, a gated SCR that gets forward voltage.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from math import cos, exp, inf, sin
+
+from automax_ros.drive.ac_line import AcLine
+from automax_ros.drive.bridge import Bridge
+from automax_ros.drive.errors import SourceShortError
+from automax_ros.drive.events import ROUTINE, EventKind
+from automax_ros.drive.meter import EnergyMeter
+from automax_ros.drive.motor import Machine
+from automax_ros.drive.network import (
+    ARMATURE_ARC,
+    ARMATURE_SHORT,
+    CROSS_FIRE,
+    LINE_SHORT,
+    PHASE_ARC,
+    Impedances,
+    Network,
+    settle,
+)
+from automax_ros.drive.scr import BIT, numbers_of, rail_of
+from automax_ros.drive.waves import ZERO_A, Piece, RawPiece, first_zero
+
+EVENTS_KEPT = 10_000
+PIECES_KEPT = 64
+_NO_MODES = (0.0, 0.0, 0.0)
+_ALARMS = (
+    (ARMATURE_SHORT, EventKind.ARMATURE_SHORT),
+    (LINE_SHORT, EventKind.LINE_SHORT),
+    (CROSS_FIRE, EventKind.CROSS_FIRE),
+)
+Phases = tuple[float, float, float]
+State = tuple[float, float, float, float, float]
+"""At the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
+
+
+class Conduction:
+    """Line, bridge and machine while neither gates nor line nor wiring change; ``circuit.Circuit`` is the whole."""
+
+    def __init__(self, line: AcLine, bridge: Bridge, machine: Machine, *, trace: bool, energy: bool) -> None:
+        """Begin at the line's start without current; see ``Circuit``."""
+        self.line = line
+        self.bridge = bridge
+        self.machine = machine
+        self.now_ns = line.start_ns
+        self.current_a = 0.0
+        self.energy = EnergyMeter() if energy else None
+        self.events_lost = 0
+        self._trace = trace
+        self._z = Impedances.of(line, machine.inductance_h, machine.resistance_ohm, bridge.drop_v)
+        self._nets: dict[int, Network] = {}
+        self._modes: Phases = _NO_MODES
+        self._newest = [0, 0]
+        self._emf = machine.emf(0.0)
+        self._events: deque[tuple[EventKind, int, float, int, float]] = deque(maxlen=EVENTS_KEPT)
+        bridge.wiring = replace(bridge.wiring, open_phases=sum(1 << x for x in line.missing))
+        self._net = self._network(0)
+        self._begin_sample()
+
+    def _begin_sample(self) -> None:
+        self._sample_ns = self.now_ns
+        self._current_before = self.current_a
+        self._charge = self._volt_s = self._zero_s = self._overlap_s = self._square = 0.0
+        self._pieces: list[RawPiece] = []
+
+    def _run(self, stop_ns: int) -> None:
+        """Let time pass to an instant before which no gate begins and the line stays as it is."""
+        line, bridge, machine = self.line, self.bridge, self.machine
+        start_ns, omega = self.now_ns, line.omega
+        total = (stop_ns - start_ns) * 1e-9
+        theta = line.start_angle + omega * ((start_ns - line.start_ns) * 1e-9)
+        emf = self._emf = machine.emf(total)
+        net, current = self._net, self.current_a
+        began_a = current
+        modes = self._modes
+        sine, cosine = sin(theta), cos(theta)
+        t = charge = 0.0
+        while True:
+            first = left = total - t
+            if left <= 0.0:
+                break
+            out = on = 0
+            k = a = 0.0
+            decay = net.decay
+            if net.active:
+                k = (net.constant - emf) / net.resistance
+                a = current - net.c * cosine - net.d * sine - k
+            if (bridge.gated | bridge.recovering) & ~net.mask:
+                now_ns = start_ns + t * 1e9
+                wanted = bridge.candidates(now_ns, net.mask)
+                if wanted:
+                    when, mask = self._watch(wanted, now_ns, (theta, sine, cosine, k, a), left)
+                    if when == 0.0:
+                        self.current_a, self._modes = current, modes
+                        net = self._switch(0, mask, start_ns, t, sine, cosine)
+                        current, modes = self.current_a, self._modes
+                        continue
+                    if when < first:
+                        first, on = when, mask
+            ahead = None
+            if net.guards:
+                when, mask, ahead = self._ending((theta, sine, cosine, k, a), modes, first)
+                if mask:
+                    first, out, on = when, mask, 0
+            if first > 0.0:
+                before_sine, before_cosine, before = sine, cosine, theta
+                theta += omega * first
+                if ahead is not None and not out:
+                    sine, cosine, fall = ahead
+                else:
+                    sine, cosine, fall = sin(theta), cos(theta), exp(-decay * first)
+                if net.active:
+                    current = net.c * cosine + net.d * sine + k + a * fall
+                    charge += (
+                        (net.c * (sine - before_sine) - net.d * (cosine - before_cosine)) / omega
+                        + k * first
+                        + a * (1.0 - fall) / decay
+                    )
+                    self._pieces.append((first, before, omega, net.c, net.d, k, a, decay))
+                else:
+                    self._zero_s += first
+                if net.modes or self.energy is not None:
+                    modes = self._fade(modes, (before, first, k, a))
+                t = t + first if first < left else total
+            if out or on:
+                self.current_a, self._modes = current, modes
+                net = self._switch(out, on, start_ns, t, sine, cosine)
+                current, modes = self.current_a, self._modes
+        self.current_a, self._modes = current, modes
+        self._finish(stop_ns, total, charge, current - began_a)
+
+    def _fade(self, modes: Phases, interval: tuple[float, float, float, float]) -> Phases:
+        """Count an interval (angle at its start, duration, k and a) and return what is left of the source's modes."""
+        net, duration = self._net, interval[1]
+        if self.energy is not None:
+            self.energy.add(net, self.line, self._z, self.bridge.wiring, self._emf, interval, modes)
+        if net.modes:
+            self._overlap_s += duration
+            if net.decay_s < inf:
+                fall = exp(-net.decay_s * duration)
+                modes = modes[0] * fall, modes[1] * fall, modes[2] * fall
+        return modes
+
+    def _finish(self, stop_ns: int, total: float, charge: float, change_a: float) -> None:
+        """Count what a run brought and let the machine turn."""
+        self.now_ns = stop_ns
+        self._charge += charge
+        self._volt_s += self._emf * total
+        if len(self._pieces) > PIECES_KEPT:
+            self._square += sum(Piece(*piece).square() for piece in self._pieces)
+            self._pieces.clear()
+        if self.machine.turns:
+            self.machine.advance(total, charge, change_a)
+        if self.energy is not None:
+            angle = self.line.angle(stop_ns)
+            squares = sum(phase**2 for phase in self._phases(self._net, self.current_a, sin(angle), cos(angle)))
+            self.energy.stored_j = 0.5 * (self._z.l * self.current_a**2 + self._z.ls * squares)
+
+    def _ending(
+        self, state: State, modes: Phases, limit: float
+    ) -> tuple[float, int, tuple[float, float, float] | None]:
+        """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs.
+
+        Third, if they were needed: sine and cosine of the line's angle and the armature's decay at the limit.
+        """
+        theta, sine, cosine, k, a = state
+        net, omega = self._net, self.line.omega
+        decay, decay_s = net.decay, net.decay_s
+        first, out = limit, 0
+        ahead, lowest = None, -ZERO_A
+        for mask, c, d, share, part, wa, wb, wc, bend in net.guards:
+            guard_k, guard_a = share * k + part, share * a
+            value = c * cosine + d * sine + guard_k + guard_a
+            slope = omega * (d * cosine - c * sine) - decay * guard_a
+            if guard_a < 0.0:
+                bend -= decay * decay * guard_a  # noqa: PLW2901
+            guard_b = wa * modes[0] + wb * modes[1] + wc * modes[2] if net.modes else 0.0
+            if guard_b:
+                value += guard_b
+                slope -= decay_s * guard_b
+                if guard_b < 0.0:
+                    bend -= decay_s * decay_s * guard_b  # noqa: PLW2901
+            if value < lowest:  # a loop of legs has shared its current anew: who would carry it backwards most goes out
+                lowest, first, out = value, 0.0, mask
+            if lowest < -ZERO_A:
+                continue
+            # A parabola of this bend stays below the current: positive at the end, it proves that there is no zero.
+            if value > ZERO_A or (value >= -ZERO_A and slope >= 0.0):
+                least = value if value > 0.0 else 0.0
+                if least + first * (slope - 0.5 * bend * first) > 0.0:
+                    continue
+                if not out and not guard_b:  # likewise from both ends; the interval probably needs the values there
+                    if ahead is None:
+                        angle = theta + omega * limit
+                        ahead = sin(angle), cos(angle), exp(-decay * limit)
+                    final = c * ahead[1] + d * ahead[0] + guard_k + guard_a * ahead[2]
+                    sag = 0.5 * bend * limit - (final - least) / limit
+                    if final > 0.0 and (sag <= 0.0 or 2.0 * bend * least > sag * sag):
+                        continue
+            if -ZERO_A <= value <= ZERO_A and abs(guard_k) + abs(guard_a) + abs(guard_b) + bend < 1e-9:
+                zero = 0.0  # nothing drives it any more
+            else:
+                zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, decay_s, first)
+            if zero <= first:
+                first, out = zero, mask
+        if out and out != net.guards[0][0]:
+            net.put_first(out)
+        return first, out, ahead
+
+    def _watch(self, wanted: int, now_ns: float, state: State, limit: float) -> tuple[float, int]:
+        """Return when (s from now) forward voltage first turns on SCRs of a mask, and which; inf if not before a limit.
+
+        ``state`` is the line's angle, its sine and cosine, and k and a of the armature current. No SCR with a time
+        means that nothing is known beyond it: some SCR rests until then.
+        """
+        theta, sine, cosine, k, a = state
+        net, bridge, omega, emf = self._net, self.bridge, self.line.omega, self._emf
+        decay = net.decay
+        soonest, who = inf, 0
+        most, now_on = 0.0, 0
+        for mask, c, d, constant, by_k, by_a, by_emf, bend in net.watches.get(wanted) or net.watch(wanted):
+            short = -constant - by_k * k - by_emf * emf
+            fade = by_a * a
+            value = c * cosine + d * sine + fade - short
+            if value > 0.0:
+                if mask & bridge.recovering and bridge.rest_end_ns(mask) > now_ns:
+                    rest = (bridge.rest_end_ns(mask) - now_ns) * 1e-9
+                    soonest, who = (rest, 0) if rest < soonest else (soonest, who)
+                elif value > most:
+                    most, now_on = value, mask
+                continue
+            horizon = limit if limit < soonest else soonest
+            if not mask & bridge.gated and horizon > bridge.turn_off_ns * 1e-9:
+                horizon = bridge.turn_off_ns * 1e-9
+            slope = omega * (d * cosine - c * sine) - decay * fade
+            if fade > 0.0:
+                bend += decay * decay * fade  # noqa: PLW2901
+            # As for the currents: a parabola that stays above the voltage and is negative proves that nothing happens.
+            if value + horizon * (slope + 0.5 * bend * horizon) < 0.0:
+                continue
+            horizon = min(horizon, (bridge.window_end_ns(mask, now_ns) - now_ns) * 1e-9)
+            zero = first_zero(-c, -d, short, -fade, 0.0, theta, omega, decay, 0.0, horizon)
+            if zero < soonest and mask & bridge.recovering:
+                rest = (bridge.rest_end_ns(mask) - now_ns) * 1e-9
+                if zero < rest:
+                    zero, mask = rest, 0  # noqa: PLW2901
+            if zero < soonest:
+                soonest, who = zero, mask
+        return (0.0, now_on) if now_on else (soonest, who)
+
+    def _switch(self, out: int, on: int, start_ns: int, t: float, sine: float, cosine: float) -> Network:
+        """Let SCRs go out (or arcs end), or turn on, at an instant; return the circuit from then on."""
+        old = self._net
+        phases = self._phases(old, self.current_a, sine, cosine)
+        if on:
+            self._note_turn_on(on, start_ns, t)
+        if out >> 12:
+            self._open(out, t)
+        net = self._enter((old.mask | on) & ~out, phases, sine, cosine)
+        gone = old.mask & ~net.mask
+        if gone:
+            self.bridge.put_out(gone, start_ns + t * 1e9)
+            if old.modes and not old.alarms and out:
+                self._note_failed_commutation(out, net.mask, t)
+        if self._trace or net.alarms & ~old.alarms:
+            self._note_switch(old, net, gone, t)
+        return net
+
+    def _enter(self, mask: int, phases: Phases, sine: float, cosine: float) -> Network:
+        """Make a set of SCRs conduct from the present, with the phase currents (A) just before."""
+        net = self._nets.get(mask) or self._network(mask)
+        if net.instant or self.bridge.wiring.arcing:
+            net, phases = self._clear_up(net, phases, sine, cosine)
+        if not net.active:
+            self.current_a = 0.0
+        self._modes = _NO_MODES
+        if net.modes and net.decay_s < inf:
+            modes = [0.0, 0.0, 0.0]
+            for x, y, z in net.tied:
+                # The phases' currents over their common mean; it is what the armature takes.
+                mean = (phases[x] + phases[y]) / 2 if z is None else (phases[x] + phases[y] + phases[z]) / 3
+                first = phases[x] - mean - net.phase_c[x] * cosine - net.phase_d[x] * sine - net.phase_k[x]
+                modes[x], modes[y] = first, -first
+                if z is not None:
+                    last = phases[z] - mean - net.phase_c[z] * cosine - net.phase_d[z] * sine - net.phase_k[z]
+                    modes[y], modes[z] = -first - last, last
+            self._modes = (modes[0], modes[1], modes[2])
+        self._net = net
+        return net
+
+    def _clear_up(self, net: Network, phases: Phases, sine: float, cosine: float) -> tuple[Network, Phases]:
+        """Commutate what has no source impedance, open arcs without current; return the circuit and phase currents."""
+        while True:
+            wiring = self.bridge.wiring
+            if wiring.armature_arc_v and not net.active:
+                self._open(ARMATURE_ARC, 0.0)
+            for x in range(3):
+                if wiring.phase_arc_v[x] and not any(x in group for group in net.rail_of_phases):
+                    self._open(PHASE_ARC << x, 0.0)
+            if wiring is not self.bridge.wiring:
+                net = self._network(net.mask)
+            elif net.instant:
+                net, phases = self._commutate_at_once(net, phases, sine, cosine)
+            else:
+                return net, phases
+
+    def _commutate_at_once(self, net: Network, phases: Phases, sine: float, cosine: float) -> tuple[Network, Phases]:
+        """Let one SCR go out of phases tied without impedance: the first whose current is driven to zero."""
+        line = self.line
+        push, over = [0.0] * 3, [0.0] * 3
+        for group in net.rail_of_phases:
+            volts = {}
+            for x in group:
+                c, d = line.unit_wave(x)
+                volts[x] = line.amplitude_v * (c * cosine + d * sine) - net.offsets[x]
+            for x in group:
+                push[x] = volts[x] - sum(volts.values()) / len(group)
+                over[x] = phases[x] - net.share[x] * self.current_a
+        soonest, gone = inf, 0
+        for mask, _, _, share, _, *weights, _ in net.guards:
+            slope = sum(weight * volt for weight, volt in zip(weights, push, strict=True))
+            if slope < -1e-9:
+                value = share * self.current_a + sum(w * part for w, part in zip(weights, over, strict=True))
+                when = max(value, 0.0) / -slope
+                if when < soonest:
+                    soonest, gone = when, mask
+        if not gone:
+            raise SourceShortError(
+                f"SCRs {', '.join(map(str, numbers_of(net.mask))) or 'shorted'} short two phases at {self.now_ns} ns "
+                "and the line has no impedance: give it an inductance or resistance"
+            )
+        moved = tuple(phases[x] + push[x] * soonest for x in range(3))
+        if gone >> 12:
+            self._open(gone, 0.0)
+        return self._network(net.mask & ~gone), (moved[0], moved[1], moved[2])
+
+    def _phases(self, net: Network, current: float, sine: float, cosine: float) -> Phases:
+        """Return the phase currents (A) at an armature current (A) and the line's angle."""
+        a, b, c = net.share
+        a, b, c = a * current, b * current, c * current
+        if not net.modes:
+            return a, b, c
+        modes, by_c, by_d, const = self._modes, net.phase_c, net.phase_d, net.phase_k
+        return (
+            a + by_c[0] * cosine + by_d[0] * sine + const[0] + modes[0],
+            b + by_c[1] * cosine + by_d[1] * sine + const[1] + modes[1],
+            c + by_c[2] * cosine + by_d[2] * sine + const[2] + modes[2],
+        )
+
+    def _network(self, mask: int) -> Network:
+        """Return the circuit of the SCRs of a mask, without those that can carry no current."""
+        net = self._nets.get(mask)
+        if net is None:
+            settled = settle(mask, self.bridge.wiring)
+            net = self._nets.get(settled)
+            if net is None:
+                net = self._nets[settled] = Network(settled, self.bridge.wiring, self.line, self._z)
+            self._nets[mask] = net
+        return net
+
+    def _open(self, arcs: int, t: float) -> None:
+        """Open the phases and the contactor whose arcs have ended."""
+        wiring = self.bridge.wiring
+        for x in range(3):
+            if arcs & PHASE_ARC << x:
+                wiring = replace(wiring.with_arc(x, 0.0), open_phases=wiring.open_phases | 1 << x)
+                self._emit(EventKind.PHASE_OPEN, t, x)
+        if arcs & ARMATURE_ARC:
+            wiring = replace(wiring, armature_closed=False, armature_arc_v=0.0)
+            self._emit(EventKind.ARMATURE_OPEN, t, 0)
+        self.bridge.wiring = wiring
+        self._nets.clear()
+
+    # What is told
+
+    def _note_turn_on(self, on: int, start_ns: int, t: float) -> None:
+        bridge = self.bridge
+        for number in numbers_of(on):
+            bit = BIT[number]
+            self._newest[bit >> 1 & 1] = number
+            bridge.on_ns[bit] = start_ns + t * 1e9
+            if self._trace:
+                self._emit(EventKind.TURN_ON, t, number)
+            if not bridge.gated >> bit & 1 or bridge.gate_end_ns[bit] <= start_ns + t * 1e9:
+                self._emit(EventKind.COMMUTATION_FAILURE, t, number)
+
+    def _note_failed_commutation(self, out: int, left: int, t: float) -> None:
+        for number in numbers_of(out & 0xFFF):
+            rail = rail_of(number)
+            if self._newest[rail] == number and any(rail_of(other) == rail for other in numbers_of(left)):
+                self._emit(EventKind.COMMUTATION_FAILURE, t, number)
+
+    def _note_switch(self, old: Network, net: Network, gone: int, t: float) -> None:
+        for alarm, kind in _ALARMS:
+            if net.alarms & alarm and not old.alarms & alarm:
+                self._emit(kind, t, 0)
+        if self._trace:
+            for number in numbers_of(gone):
+                self._emit(EventKind.EXTINCTION, t, number)
+            if net.modes and not old.modes:
+                self._emit(EventKind.COMMUTATION_START, t, 0)
+            elif old.modes and not net.modes:
+                self._emit(EventKind.COMMUTATION_END, t, 0)
+
+    def _emit(self, kind: EventKind, t: float, number: int) -> None:
+        if kind in ROUTINE and not self._trace:
+            return
+        if len(self._events) == EVENTS_KEPT:
+            self.events_lost += 1
+        self._events.append((kind, self.now_ns, t, number, self.current_a))

@@ -1,0 +1,133 @@
+"""What is measured over a time: the exact integrals that a controller samples, and where the energy went."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, sqrt
+from typing import TYPE_CHECKING
+
+from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave
+
+if TYPE_CHECKING:
+    from automax_ros.drive.ac_line import AcLine
+    from automax_ros.drive.network import Impedances, Network, Wiring
+
+
+class Sample:
+    """Exact integrals since the sample before.
+
+    Attributes:
+        duration_s: the time since then, s.
+        charge_c: integral of the armature current, A s.
+        volt_s: integral of the voltage over the armature's terminals, V s; the EMF counts while no current flows.
+        zero_current_s: how long no armature current flowed, s (DC_TIME).
+        overlap_s: how long a rail had two or three phases, s.
+    """
+
+    __slots__ = ("_pieces", "_square", "charge_c", "duration_s", "overlap_s", "volt_s", "zero_current_s")
+
+    def __init__(
+        self,
+        duration_s: float,
+        charge_c: float,
+        volt_s: float,
+        zero_current_s: float,
+        overlap_s: float,
+        square: float,
+        pieces: list[RawPiece],
+    ) -> None:
+        self.duration_s = duration_s
+        self.charge_c = charge_c
+        self.volt_s = volt_s
+        self.zero_current_s = zero_current_s
+        self.overlap_s = overlap_s
+        self._square = square
+        self._pieces = pieces
+
+    @property
+    def mean_current_a(self) -> float:
+        """Mean armature current, A."""
+        return self.charge_c / self.duration_s if self.duration_s else 0.0
+
+    @property
+    def mean_voltage_v(self) -> float:
+        """Mean voltage over the armature's terminals, V."""
+        return self.volt_s / self.duration_s if self.duration_s else 0.0
+
+    @property
+    def rms_current_a(self) -> float:
+        """Root of the mean square of the armature current, A; computed when asked for."""
+        if not self.duration_s:
+            return 0.0
+        square = self._square + sum(Piece(*piece).square() for piece in self._pieces)
+        return sqrt(max(square, 0.0) / self.duration_s)
+
+
+@dataclass
+class EnergyMeter:
+    """Energies since the start, J: ``source_j = loss_j + stored_j + shaft_j``.
+
+    Attributes:
+        source_j: from the three phase voltages.
+        resistance_j: lost in the armature's and the source's resistance.
+        drop_j: lost in the drop of SCRs.
+        arc_j: lost in arcs of opening phases and of the contactor.
+        emf_j: taken by the EMF, as the circuit sees it.
+        stored_j: in the inductances, over what was there at the start.
+    """
+
+    source_j: float = 0.0
+    resistance_j: float = 0.0
+    drop_j: float = 0.0
+    arc_j: float = 0.0
+    emf_j: float = 0.0
+    stored_j: float = 0.0
+
+    @property
+    def loss_j(self) -> float:
+        """All that became heat, J."""
+        return self.resistance_j + self.drop_j + self.arc_j
+
+    def add(
+        self,
+        net: Network,
+        line: AcLine,
+        z: Impedances,
+        wiring: Wiring,
+        emf_v: float,
+        interval: tuple[float, float, float, float],
+        modes: tuple[float, float, float],
+    ) -> None:
+        """Add one interval.
+
+        Args:
+            net: the circuit of the interval.
+            line: the line in this segment.
+            z: its constants.
+            wiring: its faults.
+            emf_v: the EMF.
+            interval: angle of the line at the start, duration (s), k and a of the armature current.
+            modes: decaying parts of the three phases' source modes at the start, A.
+        """
+        theta, duration, k, a = interval
+        if not net.active:
+            k = a = 0.0
+        moments = Moments(theta, line.omega, net.decay, net.decay_s if net.modes else inf, duration)
+        current: Wave = (net.c, net.d, k, a, 0.0) if net.active else (0.0, 0.0, 0.0, 0.0, 0.0)
+        charge = moments.single(current)
+        heat = z.r * moments.product(current, current)
+        drop = -net.rail_offset * charge
+        for x in range(3):
+            share = net.share[x]
+            wave: Wave = (share * net.c + net.phase_c[x], share * net.d + net.phase_d[x],
+                          share * k + net.phase_k[x], share * a, modes[x])  # fmt: skip
+            cosine, sine = line.unit_wave(x)
+            self.source_j += moments.product(wave, (line.amplitude_v * cosine, line.amplitude_v * sine, 0.0, 0.0, 0.0))
+            heat += z.rs * moments.product(wave, wave)
+            through = moments.single(wave)
+            drop += (net.offsets[x] - wiring.phase_arc_v[x]) * through
+            self.arc_j += wiring.phase_arc_v[x] * through
+        self.arc_j += wiring.armature_arc_v * charge
+        self.resistance_j += heat
+        self.drop_j += drop
+        self.emf_j += emf_v * charge

@@ -1,0 +1,265 @@
+"""What the bridge feeds: a resistance, inductance and EMF; or a DC motor with field, inertia, friction and load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import exp, fmod, pi, sqrt
+from typing import Protocol
+
+from automax_ros.drive.errors import require
+
+SpeedLoad = Callable[[float], float]
+"""A load torque (N m) that depends on the speed (rad/s), such as a fan's; positive torque brakes positive speed."""
+LoadCallback = Callable[[float, float], float]
+"""A load torque (N m) asked for in every interval with the time (s) and the speed (rad/s)."""
+TURN = 2 * pi
+LONGEST_NS, SHORTEST_NS = 3_500_000, 500_000
+"""An interval of constant EMF: at most just over a firing interval at 48 Hz, at least this."""
+HELD_V_S = 1e-3
+"""An interval is so short that the EMF's slope times its square stays below this, V s (decision: 0.1 % of what the line
+gives in a firing interval; keeps the error of speed below 0.01 %)."""
+LONGEST_S2 = (LONGEST_NS * 1e-9) ** 2
+SMOOTH_S = 5e-3
+"""The acceleration that decides it is smoothed with this time constant: ripple does not count."""
+REPAID_S = 1e-3
+"""Within this time (s), or an interval if that is longer, what the last EMF was off by is made good."""
+
+
+class Machine(Protocol):
+    """What a circuit asks of its load."""
+
+    inductance_h: float
+    resistance_ohm: float
+    turns: bool
+    """Whether the EMF can change by itself: ``advance`` is called for each interval."""
+    step_ns: int
+    """The longest interval that the EMF may be held, ns."""
+
+    def emf(self, duration_s: float) -> float:
+        """Return the EMF (V) expected in the middle of the next ``duration_s``."""
+
+    def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
+        """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
+
+
+@dataclass
+class FixedLoad:
+    """A resistance (ohm), an inductance (H) and a constant EMF (V): a machine at a held speed, a choke, a battery."""
+
+    resistance_ohm: float
+    inductance_h: float
+    emf_v: float = 0.0
+    turns: bool = False
+    step_ns: int = LONGEST_NS
+
+    def __post_init__(self) -> None:
+        _check_armature(self.resistance_ohm, self.inductance_h)
+        require("EMF in V", self.emf_v, -1e6, 1e6)
+
+    def emf(self, duration_s: float) -> float:  # noqa: ARG002 - a Machine's
+        """Return the EMF, V."""
+        return self.emf_v
+
+    def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
+        """Do nothing: the EMF is held."""
+
+
+@dataclass
+class Field:
+    """The field: flux of its current, which follows its voltage with a time constant.
+
+    ``flux = (1 + s) x / (s + x)`` with x the current and flux over rated, s = ``knee`` (drive.md's curve has 0.5;
+    without a knee the flux is proportional: decision).
+
+    Attributes:
+        tau_s: time constant of the field current, s; 0 for none.
+        knee: how late the iron saturates, above 0; None for a straight line.
+        current: field current over rated.
+        voltage: field voltage over rated; loss of field is 0.
+    """
+
+    tau_s: float = 0.0
+    knee: float | None = None
+    current: float = 1.0
+    voltage: float = 1.0
+
+    def __post_init__(self) -> None:
+        require("time constant of the field in s", self.tau_s, 0.0)
+        if self.knee is not None:
+            require("knee of the saturation", self.knee, 0.0, above=True)
+
+    def flux_of(self, current: float) -> float:
+        """Return the flux over rated of a field current over rated, of either sign."""
+        if self.knee is None:
+            return current
+        return (1 + self.knee) * current / (self.knee + abs(current))
+
+    def flux(self, ahead_s: float) -> float:
+        """Return the flux over rated after ``ahead_s`` (s) of the present voltage."""
+        return self.flux_of(self._current(ahead_s))
+
+    def advance(self, time_s: float) -> None:
+        """Let time pass at the present voltage; exact."""
+        self.current = self._current(time_s)
+
+    def _current(self, ahead_s: float) -> float:
+        if not self.tau_s or self.current == self.voltage:
+            return self.voltage
+        return self.voltage + (self.current - self.voltage) * exp(-ahead_s / self.tau_s)
+
+
+@dataclass(frozen=True)
+class MotorData:
+    """A motor's constants.
+
+    Attributes:
+        resistance_ohm: armature circuit resistance, ohm.
+        inductance_h: armature circuit inductance with any choke, H.
+        k_v_s: EMF of 1 rad/s at rated flux, V s; also torque of 1 A, N m.
+        inertia_kg_m2: inertia at the motor's shaft.
+        viscous_n_m_s: viscous friction, N m s/rad.
+        coulomb_n_m: Coulomb friction, N m, which also holds the shaft at rest.
+    """
+
+    resistance_ohm: float
+    inductance_h: float
+    k_v_s: float
+    inertia_kg_m2: float
+    viscous_n_m_s: float = 0.0
+    coulomb_n_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_armature(self.resistance_ohm, self.inductance_h)
+        require("motor constant k in V s/rad", self.k_v_s, 0.0, above=True)
+        require("inertia in kg m2", self.inertia_kg_m2, 0.0, above=True)
+        require("viscous friction in N m s/rad", self.viscous_n_m_s, 0.0)
+        require("Coulomb friction in N m", self.coulomb_n_m, 0.0)
+
+
+class Motor:
+    """A DC motor on its shaft: a ``Machine`` whose EMF follows the speed.
+
+    The EMF is constant within an interval, at the value that the last acceleration lets expect in its middle; the
+    mechanics take the exact charge of the interval. The volt-seconds by which the expectation was off are made good
+    in the next interval, so that errors do not add up: below 0.01 % of speed in a start at full voltage
+    (``test/drive/test_energy``).
+    """
+
+    turns = True
+
+    def __init__(
+        self,
+        data: MotorData,
+        *,
+        load: float | SpeedLoad = 0.0,
+        load_callback: LoadCallback | None = None,
+        field: Field | None = None,
+        speed_rad_s: float = 0.0,
+    ) -> None:
+        """Begin at a speed.
+
+        Args:
+            data: the constants.
+            load: load torque in N m, which keeps its direction at any speed (a hoist), or a function of speed.
+            load_callback: a load torque that is asked for, in addition.
+            field: the field; constant and rated without it.
+            speed_rad_s: the speed at the start.
+        """
+        self.data = data
+        self.resistance_ohm = data.resistance_ohm
+        self.inductance_h = data.inductance_h
+        self.inertia_kg_m2 = data.inertia_kg_m2
+        self.field = field
+        self.load = load
+        self.load_callback = load_callback
+        self.speed_rad_s = speed_rad_s
+        self.angle_rad = 0.0
+        self.acceleration = 0.0
+        self.time_s = 0.0
+        self.k_v_s = data.k_v_s * (field.flux(0.0) if field else 1.0)
+        self.step_ns = LONGEST_NS
+        self._emf = self._owed_v_s = self._smooth = 0.0
+        self.coupling_n_m = 0.0
+        self.torque_n_m = 0.0
+        self.shaft_j = self.friction_j = self.load_j = 0.0
+
+    @property
+    def kinetic_j(self) -> float:
+        """The energy in the inertia, J; ``shaft_j`` taken in equals what this gained, ``friction_j`` and ``load_j``."""
+        return 0.5 * self.inertia_kg_m2 * self.speed_rad_s**2
+
+    def emf(self, duration_s: float) -> float:
+        """Return the EMF (V) expected in the middle of the next ``duration_s``."""
+        half = 0.5 * duration_s
+        if self.field is not None:
+            self.k_v_s = self.data.k_v_s * self.field.flux(half)
+        self._emf = self.k_v_s * (self.speed_rad_s + self.acceleration * half)
+        self._emf += self._owed_v_s / max(duration_s, REPAID_S)
+        return self._emf
+
+    def load_torque(self, speed_rad_s: float) -> float:
+        """Return the load torque (N m) now, at a speed."""
+        load = self.load
+        torque = load(speed_rad_s) if callable(load) else load
+        if self.load_callback is not None:
+            torque += self.load_callback(self.time_s, speed_rad_s)
+        return torque
+
+    def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
+        """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
+        before = self.speed_rad_s
+        self.torque_n_m = torque = self.k_v_s * charge_c / duration_s
+        load = self.load
+        if callable(load) or self.load_callback is not None:
+            load = self.load_torque(before + 0.5 * self.acceleration * duration_s)
+        self._turn(duration_s, torque, load)
+        after = self.speed_rad_s
+        self.acceleration = (after - before) / duration_s
+        # The mean speed: of both ends, less what a torque that rose in between came too late for.
+        mean = 0.5 * (before + after) - self.k_v_s * change_a * duration_s / (12.0 * self.inertia_kg_m2)
+        self._owed_v_s += (self.k_v_s * mean - self._emf) * duration_s
+        self._smooth += (self.acceleration - self._smooth) * (duration_s / (duration_s + SMOOTH_S))
+        slope = abs(self.k_v_s * self._smooth)
+        if slope * LONGEST_S2 < HELD_V_S:
+            self.step_ns = LONGEST_NS
+        else:
+            self.step_ns = max(SHORTEST_NS, int(1e9 * sqrt(HELD_V_S / slope)))
+        self.time_s += duration_s
+        if self.field is not None:
+            self.field.advance(duration_s)
+
+    def _turn(self, time_s: float, torque: float, load: float) -> None:
+        """Let constant torques (N m) act for a time; trapezoidal in speed, so that the energies add up exactly."""
+        data, speed = self.data, self.speed_rad_s
+        drive = torque - load + self.coupling_n_m
+        rubbing = data.coulomb_n_m
+        if rubbing:
+            if speed == 0.0:
+                if abs(drive) <= rubbing:
+                    return
+                rubbing = rubbing if drive > 0 else -rubbing
+            elif speed < 0.0:
+                rubbing = -rubbing
+        drag = 0.5 * data.viscous_n_m_s * time_s / self.inertia_kg_m2
+        after = (speed * (1.0 - drag) + time_s * (drive - rubbing) / self.inertia_kg_m2) / (1.0 + drag)
+        if rubbing and speed * after < 0.0:  # comes to rest on the way, where friction may hold it
+            part = time_s * speed / (speed - after)
+            self._move(part, 0.5 * speed, torque, load, rubbing)
+            self.speed_rad_s = 0.0
+            self._turn(time_s - part, torque, load)
+            return
+        self._move(time_s, 0.5 * (speed + after), torque, load, rubbing)
+        self.speed_rad_s = after
+
+    def _move(self, time_s: float, mean_speed: float, torque: float, load: float, rubbing: float) -> None:
+        way = mean_speed * time_s
+        self.angle_rad = fmod(self.angle_rad + way, TURN)
+        self.shaft_j += torque * way
+        self.load_j += load * way
+        self.friction_j += (rubbing + self.data.viscous_n_m_s * mean_speed) * way
+
+
+def _check_armature(resistance_ohm: float, inductance_h: float) -> None:
+    require("armature resistance in ohm", resistance_ohm, 0.0)
+    require("armature inductance in H", inductance_h, 0.0, above=True)

@@ -1,0 +1,233 @@
+"""Quantities of a conduction interval in closed form, their zeros, integrals and extremes.
+
+Within an interval every current and voltage is one wave of the time t since its start::
+
+    c cos(theta + omega t) + d sin(theta + omega t) + k + a exp(-decay t) + b exp(-decay_b t)
+
+with the line's angle theta at the start (rad) and its angular frequency omega (rad/s), the armature's decay rate and
+the source's decay rate (1/s).
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, expm1, hypot, inf, sin, sqrt
+from typing import NamedTuple
+
+STRIDE_S = 1e-8
+"""A dip below zero that is shorter than this may be passed over: its depth is below 1e-8 A in any real circuit."""
+NEWTON_S, NEWTON_LEFT = 1e-6, 1e-4
+"""Closer than this (s) to a zero two Newton steps find it; they have if the first left at most this part."""
+ZERO_A = 1e-7
+"""A current that falls and is below this (A) has ended: two orders above rounding in circuits without resistance."""
+
+
+def first_zero(
+    c: float,
+    d: float,
+    k: float,
+    a: float,
+    b: float,
+    theta: float,
+    omega: float,
+    decay: float,
+    decay_b: float,
+    limit: float,
+) -> float:
+    """Return the first instant in [0, limit] (s) at which a wave that begins at or above 0 falls below; inf if none.
+
+    The search never steps over a zero. The second derivative cannot lie below -(omega^2 hypot(c, d) + what the
+    exponentials with a negative factor add), so a parabola with that curvature stays under the wave, and its zero is a
+    safe step. Near the wave's zero the steps become Newton's; where the wave only grazes zero their number grows with
+    the logarithm of the clearance.
+    """
+    curve = omega * omega * hypot(c, d)
+    t = before = 0.0
+    above = 0.0
+    while True:
+        angle = theta + omega * t
+        sine, cosine = sin(angle), cos(angle)
+        value = c * cosine + d * sine + k
+        slope = omega * (d * cosine - c * sine)
+        bend = curve
+        if a:
+            part = a * exp(-decay * t)
+            value += part
+            part *= decay
+            slope -= part
+            if part < 0.0:
+                bend -= decay * part
+        if b:
+            part = b * exp(-decay_b * t)
+            value += part
+            part *= decay_b
+            slope -= part
+            if part < 0.0:
+                bend -= decay_b * part
+        if value < 0.0:
+            if t > 0.0:
+                return _between(c, d, k, a, b, theta, omega, decay, decay_b, before, above, t, value)
+            if value < -ZERO_A:
+                return 0.0
+            value = 0.0
+        if t == 0.0 and value <= ZERO_A and slope < 0.0:
+            return 0.0
+        before, above = t, value
+        reach = slope * slope + 2.0 * bend * value
+        # Of the two forms of the parabola's zero the one without cancellation.
+        if slope >= 0.0:
+            step = (slope + sqrt(reach)) / bend if bend > 0.0 else inf
+        else:
+            step = 2.0 * value / (sqrt(reach) - slope)
+            if step < NEWTON_S and bend * value < 1e-3 * slope * slope:
+                zero = t - value / slope
+                if zero > limit:
+                    return inf
+                angle = theta + omega * zero
+                value = c * cos(angle) + d * sin(angle) + k + a * exp(-decay * zero)
+                if b:
+                    value += b * exp(-decay_b * zero)
+                if abs(value) <= NEWTON_LEFT * above:
+                    return zero - value / slope
+        if t >= limit:
+            return inf
+        t += step if step > STRIDE_S else STRIDE_S
+        if t > limit:
+            if step > STRIDE_S:
+                return inf
+            t = limit
+
+
+def _between(
+    c: float,
+    d: float,
+    k: float,
+    a: float,
+    b: float,
+    theta: float,
+    omega: float,
+    decay: float,
+    decay_b: float,
+    low: float,
+    low_value: float,
+    high: float,
+    high_value: float,
+) -> float:
+    """Return the zero between an instant with a value at or above 0 and a later one below (Illinois method)."""
+    side = 0
+    for _ in range(100):
+        width = high - low
+        t = low + width * low_value / (low_value - high_value)
+        if not low < t < high:
+            break
+        angle = theta + omega * t
+        value = c * cos(angle) + d * sin(angle) + k + a * exp(-decay * t) + (b * exp(-decay_b * t) if b else 0.0)
+        if value >= 0.0:
+            low, low_value = t, value
+            high_value, side = (high_value / 2 if side > 0 else high_value), 1
+        else:
+            high, high_value = t, value
+            low_value, side = (low_value / 2 if side < 0 else low_value), -1
+        if abs(value) < 1e-12 or high - low < 1e-17:
+            return t
+    return low
+
+
+class Piece(NamedTuple):
+    """The armature current (A) over one conduction interval, and the voltage that drives it."""
+
+    duration_s: float
+    theta: float
+    omega: float
+    c: float
+    d: float
+    k: float
+    a: float
+    decay: float
+
+    def value(self, t: float) -> float:
+        """Return the current (A) at t seconds after the start."""
+        angle = self.theta + self.omega * t
+        return self.c * cos(angle) + self.d * sin(angle) + self.k + self.a * exp(-self.decay * t)
+
+    def square(self) -> float:
+        """Return the integral of the current's square (A^2 s)."""
+        moments = Moments(self.theta, self.omega, self.decay, inf, self.duration_s)
+        wave = (self.c, self.d, self.k, self.a, 0.0)
+        return moments.product(wave, wave)
+
+    def extremes(self) -> tuple[float, float]:
+        """Return the least and the greatest current (A) of the interval."""
+        values = [self.value(0.0), self.value(self.duration_s)]
+        slope = (self.omega * self.d, -self.omega * self.c, 0.0, -self.decay * self.a, 0.0)
+        for first_sign in (1.0, -1.0):
+            start, sign = 0.0, first_sign
+            while start < self.duration_s:
+                t = start + self._slope_zero(sign, slope, start)
+                if t >= self.duration_s:
+                    break
+                values.append(self.value(t))
+                start, sign = t + 1e-7, -sign
+        return min(values), max(values)
+
+    def _slope_zero(self, sign: float, slope: tuple[float, ...], start: float) -> float:
+        """Return how long after ``start`` the slope, times sign, falls below zero."""
+        c, d, k, a, _ = (sign * factor for factor in slope)
+        angle = self.theta + self.omega * start
+        a *= exp(-self.decay * start)
+        return first_zero(c, d, k, a, 0.0, angle, self.omega, self.decay, 1.0, self.duration_s - start)
+
+
+RawPiece = tuple[float, float, float, float, float, float, float, float]
+"""A Piece's fields, in a form that is quick to make."""
+Wave = tuple[float, float, float, float, float]
+"""The factors c, d, k, a, b of a wave."""
+
+
+class Moments:
+    """The integrals of all products of the five functions that a wave is made of, over one interval."""
+
+    def __init__(self, theta: float, omega: float, decay: float, decay_b: float, duration: float) -> None:
+        """Compute them; a decay_b of inf means that the part has vanished."""
+        end = theta + omega * duration
+        s0, c0, s1, c1 = sin(theta), cos(theta), sin(end), cos(end)
+        half_swing = (s1 * c1 - s0 * c0) / (2 * omega)
+        cross = (s1 * s1 - s0 * s0) / (2 * omega)
+        self.cosine = (s1 - s0) / omega
+        self.sine = (c0 - c1) / omega
+        self.duration = duration
+        self._cc, self._ss, self._cs = duration / 2 + half_swing, duration / 2 - half_swing, cross
+        self.a, self._aa, self._ca, self._sa = _decaying(decay, omega, duration, s0, c0, s1, c1)
+        self.b, self._bb, self._cb, self._sb = _decaying(decay_b, omega, duration, s0, c0, s1, c1)
+        both = decay + decay_b
+        self._ab = 0.0 if both == inf else -expm1(-both * duration) / both
+
+    def single(self, wave: Wave) -> float:
+        """Return the integral of a wave."""
+        c, d, k, a, b = wave
+        return c * self.cosine + d * self.sine + k * self.duration + a * self.a + b * self.b
+
+    def product(self, one: Wave, two: Wave) -> float:
+        """Return the integral of the product of two waves."""
+        c, d, k, a, b = two
+        return (
+            one[0] * (c * self._cc + d * self._cs + k * self.cosine + a * self._ca + b * self._cb)
+            + one[1] * (c * self._cs + d * self._ss + k * self.sine + a * self._sa + b * self._sb)
+            + one[2] * self.single(two)
+            + one[3] * (c * self._ca + d * self._sa + k * self.a + a * self._aa + b * self._ab)
+            + one[4] * (c * self._cb + d * self._sb + k * self.b + a * self._ab + b * self._bb)
+        )
+
+
+def _decaying(
+    decay: float, omega: float, duration: float, s0: float, c0: float, s1: float, c1: float
+) -> tuple[float, float, float, float]:
+    """Return the integrals of e = exp(-decay t), e^2, e cos and e sin."""
+    if decay == inf:
+        return 0.0, 0.0, 0.0, 0.0
+    end = exp(-decay * duration)
+    single = -expm1(-decay * duration) / decay
+    square = single * (1 + end) / 2
+    norm = decay * decay + omega * omega
+    cosine = (end * (omega * s1 - decay * c1) - (omega * s0 - decay * c0)) / norm
+    sine = (decay * s0 + omega * c0 - end * (decay * s1 + omega * c1)) / norm
+    return single, square, cosine, sine

@@ -1,0 +1,140 @@
+"""Simulated seconds per wall second of line, bridge and motor with a trivial controller, beside a fixed-step RK4."""
+
+from __future__ import annotations
+
+import gc
+import time
+from math import pi, sin, sqrt
+
+from automax_ros.drive.ac_line import AcLine
+from automax_ros.drive.bridge import Bridge
+from automax_ros.drive.circuit import Circuit
+from automax_ros.drive.motor import Motor, MotorData
+from automax_ros.drive.nameplate import EXAMPLES, derive
+
+PARAMETERS = derive(EXAMPLES["150hp"])
+TORQUE = PARAMETERS.values["shaft_torque_n_m"].value
+START_RAD_S = 170.0
+SECONDS = 8.0
+REPEATS = 8
+FIRINGS_PER_S = 360
+STEP_S = 20e-6
+SOURCE_OHM = 0.003
+CASES = (("rated torque, continuous current", 1.0, 1.0), ("5 % torque, discontinuous current", 0.05, 0.05))
+"""What is run: load torque and current reference over rated."""
+
+
+class Controller:
+    """The least that keeps a current: the delay of firing moves in proportion to the error of the mean."""
+
+    def __init__(self, reference: float) -> None:
+        self.wanted = reference * PARAMETERS.amps
+        self.alpha_us = 2000.0
+
+    def next_ns(self, number: int, mean_a: float) -> int:
+        """Return the delay of a firing after its natural commutation, ns, by the mean current until the last."""
+        self.alpha_us = min(max(self.alpha_us - 0.05 * (self.wanted - mean_a), 300.0), 5000.0)
+        return number * 25_000_000 // 9 + int(self.alpha_us * 1000)
+
+
+def drive(load: float, reference: float, seconds: float) -> tuple[float, list[int], float]:
+    """Run the closed-form circuit; return wall seconds, ns of each firing interval, and the final speed."""
+    line = AcLine(PARAMETERS.line_v, inductance_h=PARAMETERS.source_h, resistance_ohm=SOURCE_OHM, angle_rad=-pi / 3)
+    motor = Motor(PARAMETERS.motor, load=load * TORQUE, speed_rad_s=START_RAD_S)
+    circuit = Circuit(line, Bridge(), motor)
+    controller = Controller(reference)
+    mean = 0.0
+    taken = []
+    clock = time.perf_counter_ns
+    gc.collect()
+    gc.disable()
+    began = before = clock()
+    for number in range(int(seconds * FIRINGS_PER_S)):
+        on_ns = controller.next_ns(number, mean)
+        circuit.advance(on_ns)
+        mean = circuit.sample().mean_current_a
+        circuit.fire(on_ns, on_ns + 60_000, number % 6 + 1, (number - 1) % 6 + 1)
+        now = clock()
+        taken.append(now - before)
+        before = now
+    wall = (clock() - began) * 1e-9
+    gc.enable()
+    return wall, taken, motor.speed_rad_s
+
+
+def runge_kutta(load: float, reference: float, seconds: float) -> tuple[float, float]:
+    """Run the same circuit at a fixed step; return wall seconds and the final speed.
+
+    Two or three SCRs conduct; firing, end of overlap and extinction fall on the grid.
+    """
+    data: MotorData = PARAMETERS.motor
+    peak, omega, ls, rs = sqrt(2) * PARAMETERS.line_v, 2 * pi * 60, PARAMETERS.source_h, SOURCE_OHM
+    controller = Controller(reference)
+    torque = load * TORQUE
+    overlap, number = False, -1
+
+    def slope(t: float, current: float, share: float, speed: float) -> tuple[float, float, float]:
+        """Current, what the incoming SCR carries over half of it, speed: their rates."""
+        volts, n, over = peak * sin(omega * t - (number - 1) * pi / 3), 2.0, 0.0
+        if overlap:
+            before = peak * sin(omega * t - (number - 2) * pi / 3)
+            over = ((volts - before) / 2 - rs * share) / ls
+            volts, n = (volts + before) / 2, 1.5
+        drop = (data.resistance_ohm + n * rs) * current + data.k_v_s * speed
+        turn = (data.k_v_s * current - torque - data.viscous_n_m_s * speed) / data.inertia_kg_m2
+        return (volts - drop) / (data.inductance_h + n * ls), over, turn
+
+    current, share, speed, half, conducts = 0.0, 0.0, START_RAD_S, STEP_S / 2, False
+    total, steps = 0.0, 0
+    gc.collect()
+    gc.disable()
+    began = time.perf_counter()
+    fire_ns = controller.next_ns(0, 0.0)
+    for step in range(int(seconds / STEP_S)):
+        t = step * STEP_S
+        if t * 1e9 >= fire_ns:
+            number += 1
+            overlap, share, conducts = current > 0.0, -current / 2, True
+            fire_ns = controller.next_ns(number + 1, total / max(steps, 1))
+            total, steps = 0.0, 0
+        if conducts:
+            a1, b1, c1 = slope(t, current, share, speed)
+            a2, b2, c2 = slope(t + half, current + half * a1, share + half * b1, speed + half * c1)
+            a3, b3, c3 = slope(t + half, current + half * a2, share + half * b2, speed + half * c2)
+            a4, b4, c4 = slope(t + STEP_S, current + STEP_S * a3, share + STEP_S * b3, speed + STEP_S * c3)
+            current += STEP_S / 6 * (a1 + 2 * (a2 + a3) + a4)
+            share += STEP_S / 6 * (b1 + 2 * (b2 + b3) + b4)
+            speed += STEP_S / 6 * (c1 + 2 * (c2 + c3) + c4)
+            overlap = overlap and share < current / 2
+            if current <= 0.0:
+                current, conducts = 0.0, False
+        else:
+            speed -= STEP_S * (torque + data.viscous_n_m_s * speed) / data.inertia_kg_m2
+        total, steps = total + current, steps + 1
+    wall = time.perf_counter() - began
+    gc.enable()
+    return wall, speed
+
+
+def main() -> None:
+    """Print the figures."""
+    for title, load, reference in CASES:
+        runs = [drive(load, reference, SECONDS) for _ in range(REPEATS)]
+        wall, speed = min(run[0] for run in runs), runs[0][2]
+        times = sorted(min(samples) for samples in zip(*(run[1] for run in runs), strict=True))
+        everything = sorted(sample for run in runs for sample in run[1])
+        best = SECONDS / (sum(times) * 1e-9)
+        print(f"{title}: {SECONDS / wall:.0f} simulated s per wall s, {best:.0f} undisturbed; wanted: at least 150")
+        print(f"  a firing interval: {_quantiles(everything)}; of each the best of {REPEATS} runs: {_quantiles(times)}")
+        slow = [runge_kutta(load, reference, SECONDS) for _ in range(2)]
+        rate, error = SECONDS / min(run[0] for run in slow), slow[0][1] / speed - 1
+        print(f"  RK4 at 20 us: {rate:.0f} simulated s per wall s, speed at the end off by {100 * error:+.3f} %")
+
+
+def _quantiles(ordered: list[int]) -> str:
+    p50, p99 = ordered[len(ordered) // 2], ordered[len(ordered) * 99 // 100]
+    return f"p50 {p50 / 1000:.1f}, p99 {p99 / 1000:.1f}, max {ordered[-1] / 1000:.1f} us"
+
+
+if __name__ == "__main__":
+    main()

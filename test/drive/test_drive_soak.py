@@ -1,0 +1,58 @@
+"""A day at constant alpha: nothing drifts, nothing hangs, no memory grows."""
+
+import gc
+import sys
+from math import pi, radians
+
+import pytest
+
+from automax_ros.drive.ac_line import AcLine
+from automax_ros.drive.bridge import Bridge
+from automax_ros.drive.circuit import Circuit
+from automax_ros.drive.firing import ConstantAlpha
+from automax_ros.drive.motor import FixedLoad
+
+HOUR_NS = 3_600_000_000_000
+
+
+def run(emf, hours, parts):
+    """Samples of a second each, spread over some hours, and how many blocks of memory were in use after each."""
+    line = AcLine(460.0, inductance_h=60e-6, resistance_ohm=0.005)
+    circuit = Circuit(line, Bridge(), FixedLoad(0.3, 2e-3, emf))
+    firing = ConstantAlpha(circuit, radians(60))
+    firing.advance(1_000_000_000)
+    samples, blocks = [], []
+    for part in range(1, parts + 1):
+        firing.advance(max(round(hours * HOUR_NS * part / parts) - 1_000_000_000, circuit.now_ns))
+        circuit.sample()
+        firing.advance(circuit.now_ns + 1_000_000_000)
+        samples.append(circuit.sample())
+        gc.collect()
+        blocks.append(sys.getallocatedblocks())
+    return samples, blocks, circuit
+
+
+def check(samples, blocks, circuit):
+    first = samples[0]
+    for sample in samples:
+        # A second holds 60 cycles, wherever it begins.
+        assert sample.mean_current_a == pytest.approx(first.mean_current_a, rel=1e-6)
+        assert sample.rms_current_a == pytest.approx(first.rms_current_a, rel=1e-6)
+        assert sample.zero_current_s == pytest.approx(first.zero_current_s, abs=1e-6)
+        assert sample.overlap_s == pytest.approx(first.overlap_s, abs=1e-7)
+    assert max(blocks) - blocks[1] < 5000
+    angle = circuit.line.angle(circuit.now_ns)
+    expected = circuit.now_ns * 60 % 1_000_000_000 / 1e9 * 2 * pi
+    assert abs((angle - expected + pi) % (2 * pi) - pi) < 1e-6
+
+
+@pytest.mark.parametrize("emf", [150.0, 300.0])
+def test_a_minute_at_constant_alpha(emf):
+    check(*run(emf, 1 / 60, 4))
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("emf", [150.0, 300.0])
+def test_a_day_at_constant_alpha(emf):
+    check(*run(emf, 24, 24))
