@@ -190,6 +190,14 @@ def block_calls(draw) -> str:
                 f"CALL LAG(INPUT={one}, WLG=2.0, RESET=-{flag}, OUTPUT={out})",
                 f"CALL PROP_INT(INPUT={one}, KP=KR, WLD=H, RESET={flag}, SATURATED_PLUS={flag_out}, OUTPUT={out})",
                 f"CALL PULSE_MULT(INPUT={one}, WORD_SIZE=12, MULTIPLIER={two}, OUTPUT={out})",
+                f"CALL AMPLIFIER(INPUT1={one}, GAIN1={two}, INPUT2={two}, GAIN2=-7, SCALE={one}, OUTPUT={out})",
+                f"CALL MOVE(ENABLE={flag}, INPUT1={one}, OUTPUT1={out})",
+                f"CALL MULTIPLY_DIVIDE(INPUT1={one}, INPUT2=300, INPUT3={two}, OUTPUT={out})",
+                f"CALL COUNTER(INPUT_PLUS={one}, INPUT_MINUS={two}, PRESET=D!, RESET={flag}, OUTPUT={out})",
+                f"CALL RUNNING_AVERAGE(REQUIRED_SAMPLES=3, INPUT={one}, RESET={flag}, OUTPUT={out})",
+                f"CALL SAMPLED_AVERAGE(REQUIRED_SAMPLES={two}, INPUT={one}, DATA_VALID={flag_out}, OUTPUT={out})",
+                f"CALL S_CURVE(INPUT={one}, ACCEL_RATE=100, JERK_RATE={two}, HOLD={flag}, OUTPUT={out})",
+                f"CALL ALARM(INPUT={one}, HIGH_LIMIT={two}, ALARM_HIGH={flag_out})",
             ]
         )
     )
