@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from automax_ros.blocks.declaration import Block, Form, Input, Output, State, Time, Times
-from automax_ros.blocks.rules import Storage
+from automax_ros.blocks.rules import ForcedUp, Storage
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType, Value
 
@@ -166,9 +166,9 @@ SAMPLED_AVERAGE = Block(
             "REQUIRED_SAMPLES",
             DataType.INTEGER,
             "RS",
-            "number of samples to average; a variable of 0 or less counts as 1",
+            "number of samples to average; 0 or less counts as 1",
             required=True,
-            low=1,
+            low=INT16_MIN,
             high=INT16_MAX,
         ),
         Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
@@ -189,6 +189,7 @@ SAMPLED_AVERAGE = Block(
         State("shown_highest", DataType.INTEGER, INT16_MIN),
         State("shown_lowest", DataType.INTEGER, INT16_MAX),
     ),
+    rules=(ForcedUp("REQUIRED_SAMPLES", 1),),
     times=Times(Time(29.00), Time(125.0), Time(25.94), Time(20.32)),
     notes=("The first update comes on scan REQUIRED_SAMPLES. Between updates the outputs keep their values.",),
     step=sampled_average_step,

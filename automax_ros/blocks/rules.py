@@ -105,6 +105,26 @@ class Needs:
 
 
 @dataclass(frozen=True)
+class ForcedUp:
+    """A literal below a bound counts as the bound when the task runs: a warning (27)."""
+
+    parameter: str
+    low: int
+
+    @property
+    def text(self) -> str:
+        """The rule as a sentence."""
+        return f"A {self.parameter} below {self.low} counts as {self.low}."
+
+    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
+        """Return the warning for a literal below the bound."""
+        value = given[self.parameter].value if self.parameter in given else None
+        if not isinstance(value, int) or value >= self.low:
+            return []
+        return [Fault(f"{self.parameter} = {value} counts as {self.low}", self.parameter, "AMX4098")]
+
+
+@dataclass(frozen=True)
 class SameSize:
     """Two tables must have the same number of elements."""
 

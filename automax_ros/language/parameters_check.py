@@ -62,7 +62,6 @@ def _checked_input(context: Context, parameter: Input, kind: DataType, argument:
         _report_expression(context, parameter, kind, value)
         return None
     if parameter.form is Form.LITERAL:
-        check_variable(context, variable)
         context.report("AMX4076", f"{parameter.name} takes a constant only, no variable", value.span)
     else:
         _check_type(context, parameter, kind, check_variable(context, variable), variable)

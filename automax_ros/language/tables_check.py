@@ -16,16 +16,14 @@ def checked_table(context: Context, parameter: Input, argument: Argument) -> Exp
     if literal_of(value) is not None:
         context.report("AMX4075", f"{parameter.name} takes an array, no constant", value.span)
         return None
-    if isinstance(value, Element):
-        check_variable(context, value)
-        context.report("AMX4092", f"{parameter.name} takes the whole array", value.span, f"write {value.name}")
-        return None
-    if not isinstance(value, Variable):
+    if not isinstance(value, (Variable, Element)):
         context.report("AMX4077", f"{parameter.name} takes an array, no expression", value.span)
         return None
     symbol = context.symbols.get(value.name)
     if symbol is None:
         check_variable(context, value)
+    elif isinstance(value, Element):
+        context.report("AMX4092", f"{parameter.name} takes the whole array", value.span, f"write {value.name}")
     elif symbol.type is not DataType.INTEGER:
         context.report("AMX2015", f"{parameter.name} is INTEGER, {value.name} is {symbol.type.word}", value.span)
     elif len(symbol.dimensions) != 1:

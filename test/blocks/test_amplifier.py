@@ -103,7 +103,20 @@ def test_channels_behind_an_overflow_do_not_turn_its_sign():
     assert amplify([down, down, down, up, up, up, up], scale=1) == (-32768, 7002)
 
 
-@pytest.mark.parametrize(("value", "output"), [(5, 32767), (-5, -32768), (0, 0)])
+@pytest.mark.parametrize("zeros", range(4))
+def test_a_sum_at_the_edge_of_32_bit_goes_on(zeros):
+    """The largest and the smallest sum after three channels, channels that add nothing, and two that lead back."""
+    nothing = [(0, 5)] * zeros
+    largest = [(-32768, -32768), (-32768, -32767), (32767, 1)]
+    assert sum(value * gain for value, gain in largest) == LARGEST
+    # 2**31 - 1 - 2**30 + 32768 - 32767 = 2**30, and -2**31 + 2**30 + 32768 = -32767 x 32768.
+    assert amplify([*largest, *nothing, (-32768, 32767), (-32767, 1)], scale=-32768) == (-32768, 0)
+    assert amplify([*BOTTOM, *nothing, (-32768, -32768), (-32768, -1)], scale=-32768) == (32767, 0)
+
+
+@pytest.mark.parametrize(
+    ("value", "output"), [(5, 32767), (1, 32767), (-5, -32768), (-1, -32768), (32767, 32767), (-32768, -32768), (0, 0)]
+)
 def test_scale_0_is_logged_and_gives_the_clamp_of_the_sums_sign(value, output):
     assert amplify([(value, 1)], scale=0) == (output, 7003)
 
