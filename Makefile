@@ -7,6 +7,8 @@
 SHELL := /bin/bash
 BIN := .venv/bin
 CONFIG ?= config/section_drive/rack.yaml
+# A file of tests is one worker's; more than four would only hold up the tests of live racks.
+PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 # .venv brings its own ROS 2. A sourced distribution or another environment must not mix its libraries in.
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
@@ -30,7 +32,7 @@ test: setup
 	$(BIN)/ruff check . || status=$$?; \
 	$(BIN)/ruff format --check . || status=$$?; \
 	$(BIN)/mypy automax_ros tools || status=$$?; \
-	$(BIN)/python -m pytest -q test -m "not soak" || status=$$?; \
+	$(BIN)/python -m pytest -q test -m "not soak" $(PARALLEL) || status=$$?; \
 	exit $$status
 
 soak: setup
