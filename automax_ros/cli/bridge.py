@@ -20,7 +20,7 @@ from typing import Protocol
 from automax_ros.cli.usage import UsageError
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.errors import DriveError, require
+from automax_ros.drive.errors import LARGEST, DriveError, require
 from automax_ros.drive.firing import ConstantAlpha
 from automax_ros.drive.motor import Motor, MotorData
 from automax_ros.drive.steady import BridgeCase, SteadyState, steady_state
@@ -152,7 +152,7 @@ def _run_motor(case: BridgeCase, arguments: argparse.Namespace) -> None:
     data = MotorData(
         case.resistance_ohm, case.inductance_h, arguments.motor_k, arguments.inertia, arguments.friction or 0.0
     )
-    load = require("load torque in N m", arguments.load or 0.0, -1e9, 1e9)
+    load = require("load torque in N m", arguments.load or 0.0, -LARGEST, LARGEST)
     circuit = Circuit(case.line(), Bridge(), Motor(data, load=load))
     if arguments.csv is None:
         last = _simulate(case, circuit, duration_s, None)

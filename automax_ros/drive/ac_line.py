@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import ceil, cos, exp, fmod, pi, sin, sqrt
 
-from automax_ros.drive.errors import ParameterError, require
+from automax_ros.drive.errors import LARGEST, ParameterError, require
 from automax_ros.drive.scr import PHASES
 
 NEVER_NS = 1 << 62
@@ -111,8 +111,8 @@ class AcLine:
         Raises:
             ParameterError: a value outside its range.
         """
-        self.inductance_h = require("source inductance in H", inductance_h, 0.0)
-        self.resistance_ohm = require("source resistance in ohm", resistance_ohm, 0.0)
+        self.inductance_h = require("source inductance in H", inductance_h, 0.0, LARGEST)
+        self.resistance_ohm = require("source resistance in ohm", resistance_ohm, 0.0, LARGEST)
         self.rotation = rotation
         third = -2 * pi / 3 * rotation.value
         self.shift = (0.0, third, -third)
@@ -251,7 +251,7 @@ def _frequency(hertz: float) -> float:
 
 
 def _voltage(volts: float) -> float:
-    return require("line-to-line voltage in V", volts, 0.0)
+    return require("line-to-line voltage in V", volts, 0.0, LARGEST)
 
 
 def _phase(phase: int) -> int:

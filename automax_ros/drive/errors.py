@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import math
 
+LARGEST = 1e6
+"""Largest voltage (V), resistance (ohm), inductance (H) ... of any circuit (decision: beyond every machine, far from
+where numbers overflow)."""
+SMALLEST = 1e-9
+"""Smallest value of what must be above 0."""
+
 
 class DriveError(Exception):
     """Something about a power circuit is wrong; the text says what, where and what to do."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import exp, fmod, pi, sqrt
 from typing import Protocol
 
-from automax_ros.drive.errors import require
+from automax_ros.drive.errors import LARGEST, SMALLEST, ParameterError, require
 
 SpeedLoad = Callable[[float], float]
 """A load torque (N m) that depends on the speed (rad/s), such as a fan's; positive torque brakes positive speed."""
@@ -55,7 +55,7 @@ class FixedLoad:
 
     def __post_init__(self) -> None:
         _check_armature(self.resistance_ohm, self.inductance_h)
-        require("EMF in V", self.emf_v, -1e6, 1e6)
+        require("EMF in V", self.emf_v, -LARGEST, LARGEST)
 
     def emf(self, duration_s: float) -> float:  # noqa: ARG002 - a Machine's
         """Return the EMF, V."""
@@ -109,6 +109,11 @@ class Field:
         return self.voltage + (self.current - self.voltage) * exp(-ahead_s / self.tau_s)
 
 
+FASTEST_SWING = 1000.0
+"""Fastest swing of a machine's current and speed, rad/s (decision: five times the fastest drive's, and speed is held
+for 0.5 ms or more)."""
+
+
 @dataclass(frozen=True)
 class MotorData:
     """A motor's constants.
@@ -131,10 +136,16 @@ class MotorData:
 
     def __post_init__(self) -> None:
         _check_armature(self.resistance_ohm, self.inductance_h)
-        require("motor constant k in V s/rad", self.k_v_s, 0.0, above=True)
-        require("inertia in kg m2", self.inertia_kg_m2, 0.0, above=True)
-        require("viscous friction in N m s/rad", self.viscous_n_m_s, 0.0)
-        require("Coulomb friction in N m", self.coulomb_n_m, 0.0)
+        require("motor constant k in V s/rad", self.k_v_s, SMALLEST, LARGEST)
+        require("inertia in kg m2", self.inertia_kg_m2, SMALLEST, LARGEST)
+        require("viscous friction in N m s/rad", self.viscous_n_m_s, 0.0, LARGEST)
+        require("Coulomb friction in N m", self.coulomb_n_m, 0.0, LARGEST)
+        swing = self.k_v_s / sqrt(self.inertia_kg_m2 * self.inductance_h)
+        if swing > FASTEST_SWING:
+            raise ParameterError(
+                f"current and speed would swing at {swing:.4g} rad/s, k / sqrt(inertia x inductance); the model "
+                f"follows {FASTEST_SWING:g} at most: take a larger inertia, or a smaller motor constant k"
+            )
 
 
 class Motor:
@@ -261,5 +272,5 @@ class Motor:
 
 
 def _check_armature(resistance_ohm: float, inductance_h: float) -> None:
-    require("armature resistance in ohm", resistance_ohm, 0.0)
-    require("armature inductance in H", inductance_h, 0.0, above=True)
+    require("armature resistance in ohm", resistance_ohm, 0.0, LARGEST)
+    require("armature inductance in H", inductance_h, SMALLEST, LARGEST)

@@ -3,11 +3,10 @@
 Phase x obeys ``e_x - (Ls d/dt + Rs) i_x = v_x`` with all source impedances equal and an isolated neutral; the
 armature obeys ``(L d/dt + R) i + E = v_P - v_M``. Whatever set of legs is closed, this falls apart into
 
-* one mode of the armature current with L + n Ls, R + n Rs, where n is 1/p + 1/m for p and m phases on the rails (2
-for two
-  SCRs, 1.5 while one commutates), or 0 where a phase on both rails shorts the armature;
+* one mode of the armature current with L + n Ls, R + n Rs, where n is 1/p + 1/m for p and m phases on the rails (2 for
+  two SCRs, 1.5 while one commutates), or 0 where a phase on both rails shorts the armature;
 * modes of the currents that flow between the phases of one rail beside their equal share of the armature current: Ls,
-Rs.
+  Rs.
 
 Each is solved in closed form (``waves``). SCRs are ideal but for a constant drop; where legs alone make a loop its
 current has no driving voltage, and the legs share as equal small resistances would.

@@ -9,7 +9,7 @@ from math import inf, pi, radians, sqrt
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.errors import SteadyStateError, require
+from automax_ros.drive.errors import LARGEST, SMALLEST, SteadyStateError, require
 from automax_ros.drive.firing import ConstantAlpha, natural_angle
 from automax_ros.drive.meter import Sample
 from automax_ros.drive.motor import FixedLoad
@@ -49,7 +49,7 @@ class BridgeCase:
 
     def check(self) -> None:
         """Raise a ParameterError for what cannot be."""
-        require("line-to-line voltage in V", self.v_ll_v, 0.0, above=True)
+        require("line-to-line voltage in V", self.v_ll_v, SMALLEST, LARGEST)
         require("alpha in degrees", self.alpha_deg, 0.0, 180.0)
         self.line()
         FixedLoad(self.resistance_ohm, self.inductance_h, self.emf_v)
@@ -125,8 +125,7 @@ def _window(case: BridgeCase, current_a: float) -> Circuit | None:
     It fits if before and after it two SCRs, or none, conduct.
     """
     numbers = REVERSE if case.reverse else FORWARD
-    circuit = case.circuit()
-    circuit = case.circuit(natural_angle(numbers[0], circuit.line) + radians(case.alpha_deg))
+    circuit = case.circuit(natural_angle(numbers[0], case.line()) + radians(case.alpha_deg))
     if current_a:
         circuit.begin_with((numbers[4], numbers[5]), current_a)
     circuit.fire(0, case.window_ns, numbers[0], numbers[5])
@@ -239,11 +238,10 @@ class Moment:
 
 def waveforms(case: BridgeCase, state: SteadyState, *, cycles: int = 2, step_ns: int = 10_000) -> Iterator[Moment]:
     """Yield the steady state from a firing of the first SCR on, every ``step_ns``."""
-    circuit = case.circuit()
     bridge = 2 if case.reverse else 1
     numbers = REVERSE if case.reverse else FORWARD
     alpha = radians(case.alpha_deg)
-    circuit = case.circuit(natural_angle(numbers[0], circuit.line) + alpha)
+    circuit = case.circuit(natural_angle(numbers[0], case.line()) + alpha)
     if state.start_current_a:
         circuit.begin_with((numbers[4], numbers[5]), state.start_current_a)
     controller = ConstantAlpha(circuit, alpha, bridge=bridge)

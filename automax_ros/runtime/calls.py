@@ -148,9 +148,10 @@ def lower_block(emitter: Emitter, instance: BlockInstance) -> None:
 def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     bound, block = instance.bound, instance.bound.block
     values = {item.variable: _input(emitter, bound, item) for item in block.inputs if _is_value(block, item)}
+    facts = bound.facts
     for name in CALL_FACTS:
-        if name in bound.facts:
-            values.setdefault(name, build.constant(bound.facts[name]))
+        if name in facts:
+            values.setdefault(name, build.constant(facts[name]))
     _bind_coefficients(emitter, instance, values)
     held: dict[str, ast.expr] = {}
     for output in block.outputs:

@@ -126,7 +126,7 @@ def test_plot_without_matplotlib_says_what_to_do(automax, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("--r", "0.05", "--l", "-1e-3", "--alpha", "60"), "armature inductance in H is -0.001, it must be above 0"),
+        (("--r", "0.05", "--l", "-1e-3", "--alpha", "60"), "armature inductance in H is -0.001, it must be 1e-09 to"),
         (("--r", "-1", "--l", "1e-3", "--alpha", "60"), "armature resistance in ohm is -1"),
         (("--r", "0.05", "--l", "1e-3", "--alpha", "190"), "alpha in degrees is 190, it must be 0 to 180"),
         (("--r", "0.05", "--l", "1e-3", "--alpha", "-5"), "alpha in degrees is -5"),
@@ -138,6 +138,9 @@ def test_plot_without_matplotlib_says_what_to_do(automax, monkeypatch):
         ((*CASE, "--alpha", "60", "--inertia", "6"), "--inertia is for a motor's run"),
         ((*CASE, "--alpha", "60", "--motor-k", "1.7", "--duration", "1"), "a motor's run needs --inertia"),
         ((*CASE, "--alpha", "60", "--motor-k", "0", "--inertia", "6", "--duration", "1"), "motor constant k"),
+        (("--r", "0.05", "--l", "1e-3", "--alpha", "60", "--v-ll", "1e308"), "line-to-line voltage in V is 1e+308"),
+        ((*CASE, "--alpha", "60", "--motor-k", "1e200", "--inertia", "1e-200", "--duration", "1"), "motor constant k"),
+        ((*CASE, "--alpha", "60", "--motor-k", "100", "--inertia", "1e-3", "--duration", "1"), "take a larger inertia"),
         ((*CASE, "--alpha", "60", "--motor-k", "1", "--inertia", "6", "--duration", "-1"), "duration in s is -1"),
         ((*CASE, "--alpha", "60", *MOTOR, "--csv", "no/run.csv"), "no/run.csv cannot be written"),
         ((*CASE, "--alpha", "60", *MOTOR, "--plot", "run.png"), "--plot is for a steady state"),
