@@ -14,7 +14,14 @@ from automax_ros.blocks.scan_loop import END_TIMES
 from automax_ros.core.types import DataType
 
 COPIES = 40
-COEFFICIENTS = {"KP": "0.5", "KI": "0.5", "WLD": "2.0", "WLG": "10.0", "WM": "20.0"}
+COEFFICIENTS = {
+    **dict.fromkeys(("KP", "KI"), "0.5"),
+    **dict.fromkeys(("WLG", "WM", "WN"), "20.0"),
+    "KD": "0.05",
+    "LOOP_TIME": "0.011",
+    "Q_FACTOR": "2.0",
+    "WLD": "8.0",
+}
 LITERALS = {"WORD_SIZE": "12", "ABS_RAMP": "TRUE", "SCALE": "100", "MAX_COLUMNS": "20", "COMPARE_GTR": "TRUE"}
 INPUTS = ("IN_W%", "LOW_W%", "HIGH_W%", "IN_B@", "OFF_B@", "IN_D!")
 VALUES = (0, 1200, -700, 4095, 90, -4095, 2000, 3)
@@ -31,6 +38,8 @@ TABLE = 16
 
 def literal_of(item: Input) -> str:
     """Return a sensible literal for an input that must or should be one."""
+    if item.name == "ORDER":
+        return str(item.one_of[-1])
     if item.name in COEFFICIENTS:
         return COEFFICIENTS[item.name]
     if item.sample is not None and not isinstance(item.sample, bool):
@@ -127,7 +136,9 @@ def manual_us(block: Block) -> float:
     assert time is not None
     channels = sum(item.name[-1].isdigit() for item in block.inputs)
     pairs = sum(item.name.startswith("INPUT") for item in block.inputs)
-    return time.base + time.n * len(block.outputs) + time.j * channels + (time.k + time.p) * pairs + time.m * TABLE
+    orders = [item.one_of[-1] for item in block.inputs if item.name == "ORDER"]
+    ordered = time.base + time.o * sum(orders)
+    return ordered + time.n * len(block.outputs) + time.j * channels + (time.k + time.p) * pairs + time.m * TABLE
 
 
 def commons_ns(number: int) -> float:

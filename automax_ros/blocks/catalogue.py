@@ -11,16 +11,5 @@ CATALOGUE: dict[str, Block] = {
 }
 """Every control block, in alphabetical order."""
 
-NOT_YET: frozenset[str] = frozenset(
-    {
-        "DC_DRIVE_CML",
-        "DIFF_LAG",
-        "HIGH_PASS_FILTER",
-        "LEAD_LAG",
-        "LOW_PASS_FILTER",
-        "NOTCH",
-        "NOTCHN",
-        "PID",
-    }
-)
+NOT_YET: frozenset[str] = frozenset({"DC_DRIVE_CML"})
 """Blocks of the manual that the emulator does not have yet."""

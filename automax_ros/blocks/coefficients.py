@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from automax_ros.blocks.declaration import Block, Bound, Coefficients
 from automax_ros.core.numbers import stored_real
@@ -26,6 +26,16 @@ def mapping_constant(wm: float, period_s: float) -> float:
     return wm / math.tan(wm * period_s / 2.0)
 
 
+def no_defaults(_period_s: float) -> dict[str, float]:
+    """Return no defaults, for ``Coefficients.defaults``."""
+    return {}
+
+
+def order_default(order: int) -> Callable[[float], dict[str, float]]:
+    """Return what gives the default of ORDER, for ``Coefficients.defaults``."""
+    return lambda _period_s: {"ORDER": float(order)}
+
+
 def constant(value: float) -> Bound:
     """Return a limit that depends on nothing."""
     return lambda _period_s, _values: value
@@ -34,6 +44,11 @@ def constant(value: float) -> Bound:
 def per_period(factor: float) -> Bound:
     """Return the limit factor / T."""
     return lambda period_s, _values: factor / period_s
+
+
+def by_order(factors: Mapping[int, float]) -> Bound:
+    """Return the limit factor / T, the factor by ORDER; the Limit ``uses`` ORDER."""
+    return lambda period_s, values: factors[int(values["ORDER"])] / period_s
 
 
 def times_c(factor: float) -> Bound:
@@ -101,7 +116,7 @@ def evaluate_noting(
         return declared.compute(period_s, values), (), bits
     if not relation.holds(values):
         bits |= 1 << len(declared.limits)
-        last_good = dict(zip(relation.parameters, kept, strict=True)) if any(kept) else relation.first(values)
+        last_good = dict(zip(relation.parameters, kept, strict=True)) if any(kept) else relation.first(period_s, values)
         values = {**values, **last_good}
     keep = tuple(float(values[name]) for name in relation.parameters)
     return declared.compute(period_s, values), keep, bits

@@ -29,6 +29,7 @@ from dataclasses import dataclass
 from math import floor
 from typing import Any, Protocol
 
+from automax_ros.blocks.transfer import Transfer
 from automax_ros.core.numbers import clamp16, clamp32, round_count, sign_extended, truncated_quotient
 from automax_ros.core.types import DataType, Value
 
@@ -236,13 +237,13 @@ class Limit:
 class Relation:
     """A rule between parameters that are each within their limits.
 
-    Where ``holds`` is not met the last values that met it stay in force (36, 44.1). ``first(values)`` gives what is in
-    force as long as there are none. No parameter of a relation may be 0.
+    Where ``holds`` is not met the last values that met it stay in force (36, 44.1). ``first(period_s, values)`` gives
+    what is in force as long as there are none. No parameter of a relation may be 0.
     """
 
     parameters: tuple[str, ...]
     holds: Callable[[Mapping[str, float]], bool]
-    first: Callable[[Mapping[str, float]], Mapping[str, float]]
+    first: Callable[[float, Mapping[str, float]], Mapping[str, float]]
     text: str
 
 
@@ -254,7 +255,8 @@ class Coefficients:
     ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that is not programmed,
     such as WM, is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits is limited and
     logs AMX7004. A literal beyond them is an error of the task, unless ``limits_literals``: then it is limited and
-    logged too.
+    logged too. ``transfer(period_s, values)`` is the block's transfer function, None where it is not one of the
+    manual's dynamic blocks. ``executed_every`` names a literal that tells the time between executions in s.
     """
 
     parameters: tuple[str, ...]
@@ -264,6 +266,8 @@ class Coefficients:
     compute: Callable[[float, Mapping[str, float]], tuple[float, ...]]
     relation: Relation | None = None
     limits_literals: bool = False
+    transfer: Callable[[float, Mapping[str, float]], Transfer] | None = None
+    executed_every: str = ""
 
 
 class Access(enum.Enum):

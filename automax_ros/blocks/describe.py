@@ -132,7 +132,8 @@ def limit_rows(block: Block) -> list[tuple[str, ...]]:
     formulas = {part for row in rows for text in row[1:] for part in text.split()}
     if not formulas & {"T", "T)", "C"}:
         return rows
-    return [*rows, ("", "with T the scan period in s, C = WM / tan(WM T / 2)")]
+    mapping = ", C = WM / tan(WM T / 2)" if "C" in formulas else ""
+    return [*rows, ("", f"with T the scan period in s{mapping}")]
 
 
 def time_rows(block: Block) -> list[tuple[str, ...]]:
@@ -174,7 +175,7 @@ def _table(rows: Sequence[tuple[str, ...]], width: int | None = None) -> list[st
     lines: list[str] = []
     for row in rows:
         head = "".join(cell.ljust(widths[column]) + "  " for column, cell in enumerate(row[:-1]))
-        room = max(30, width - len(head)) if width else len(row[-1]) or 1
+        room = max(24, width - len(head)) if width else len(row[-1]) or 1
         wrapped = textwrap.wrap(row[-1], room) or [""]
         lines.append((head + wrapped[0]).rstrip())
         lines.extend(" " * len(head) + rest for rest in wrapped[1:])

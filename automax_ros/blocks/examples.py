@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -73,6 +74,12 @@ def _text(value: Value) -> str:
 def _steps(*pairs: tuple[Value, int]) -> Column:
     """Return values that each stay for a number of scans."""
     return tuple(value for value, scans in pairs for _ in range(scans))
+
+
+def _wave(amplitude: int, scans_a_period: int, scans: int) -> Column:
+    """Return a wave whose peaks stand at whole periods from its start."""
+    angles = (2.0 * math.pi * (scan + 1) / scans_a_period for scan in range(scans))
+    return tuple(round(amplitude * math.cos(angle)) for angle in angles)
 
 
 T, F = True, False
@@ -244,6 +251,22 @@ EXAMPLES: tuple[Example, ...] = (
         shift={"SHIFT": (T, T, T), "INPUT1": (11, 22, 33)},
     ),
     Example(
+        "DIFF_LAG",
+        "A step: OUTPUT jumps and decays with 10 rad/s; every 5th scan is shown, 0.11 s apart.",
+        {"INPUT": _steps((1000, 30))},
+        ("OUTPUT",),
+        {"WLG": 10.0},
+        every=5,
+    ),
+    Example(
+        "HIGH_PASS_FILTER",
+        "A step through second order at 10 rad/s; every 10th scan is shown, 0.1 s apart.",
+        {"INPUT": _steps((1000, 60))},
+        ("OUTPUT",),
+        {"WLD": 10.0, "ORDER": 2},
+        every=10,
+    ),
+    Example(
         "INTEGRATE",
         "1200 counts/s from an INPUT of 2000 (42.3); every 10th scan is shown, 0.22 s apart.",
         {"INPUT": _steps((2000, 50))},
@@ -258,6 +281,46 @@ EXAMPLES: tuple[Example, ...] = (
         ("OUTPUT",),
         {"WLG": 10.0},
         every=5,
+    ),
+    Example(
+        "LEAD_LAG",
+        "A step: OUTPUT jumps to nearly WLG / WLD = 4 times INPUT and settles on it; every 10th scan is shown.",
+        {"INPUT": _steps((1000, 60))},
+        ("OUTPUT",),
+        {"WLD": 2.5, "WLG": 10.0},
+        every=10,
+    ),
+    Example(
+        "LOW_PASS_FILTER",
+        "A step through third order at 20 rad/s; every 10th scan is shown, 0.1 s apart.",
+        {"INPUT": _steps((1000, 60))},
+        ("OUTPUT",),
+        {"WLG": 20.0, "ORDER": 3},
+        every=10,
+    ),
+    Example(
+        "NOTCH",
+        "A sine of 20 scans a period at the notch frequency dies out; every 3rd peak is shown.",
+        {"INPUT": _wave(1000, 20, 300)},
+        ("OUTPUT",),
+        {"WN": 14.27997, "Q_FACTOR": 2.0},
+        every=60,
+    ),
+    Example(
+        "NOTCHN",
+        "A sine of 20 scans a period at the notch frequency dies out; every 3rd peak is shown.",
+        {"INPUT": _wave(1000, 20, 300)},
+        ("OUTPUT",),
+        {"WN": 31.41593, "Q_FACTOR": 2.0, "ORDER": 4},
+        every=60,
+    ),
+    Example(
+        "PID",
+        "A constant error of 10: OUTPUT starts at KP x 10 and gains KI x 10 a second; every 25th scan, 0.55 s.",
+        {"INPUT": _steps((1010, 100)), "FEEDBACK": _steps((1000, 100))},
+        ("ERROR", "OUTPUT"),
+        {"KP": 2.0, "KI": 1.0, "LOOP_TIME": 0.022},
+        every=25,
     ),
     Example(
         "PROP_INT",

@@ -11,10 +11,13 @@ from automax_ros.blocks.columns import READ_BITS, READ_WORDS, WRITE_BITS, WRITE_
 from automax_ros.blocks.comparison import ALARM, COMPARE
 from automax_ros.blocks.counter import COUNTER
 from automax_ros.blocks.declaration import Block
-from automax_ros.blocks.filters import LAG
+from automax_ros.blocks.filters import DIFF_LAG, LAG, LEAD_LAG
 from automax_ros.blocks.integrators import INTEGRATE, PROP_INT
 from automax_ros.blocks.logic import AND, LATCH, OR, TRANSITION
 from automax_ros.blocks.mixing import AMPLIFIER, SELECT
+from automax_ros.blocks.notches import NOTCH, NOTCHN
+from automax_ros.blocks.pass_filters import HIGH_PASS_FILTER, LOW_PASS_FILTER
+from automax_ros.blocks.pid import PID
 from automax_ros.blocks.protection import TACHLOSS_OVERSPEED, THERMAL_OVERLOAD
 from automax_ros.blocks.pulse import PULSE_MULT
 from automax_ros.blocks.ramp import RAMP
@@ -62,7 +65,18 @@ FAMILIES: tuple[Family, ...] = (
         "filters",
         "Filters and controllers",
         "Laplace functions, whose coefficients depend on the scan period.",
-        (INTEGRATE, LAG, PROP_INT),
+        (
+            DIFF_LAG,
+            HIGH_PASS_FILTER,
+            INTEGRATE,
+            LAG,
+            LEAD_LAG,
+            LOW_PASS_FILTER,
+            NOTCH,
+            NOTCHN,
+            PID,
+            PROP_INT,
+        ),
     ),
     Family("protection", "Protection of a drive", "For UDC tasks.", (TACHLOSS_OVERSPEED, THERMAL_OVERLOAD)),
 )

@@ -126,9 +126,11 @@ class Instance:
             return
         given = _reals(self._literals, declared.parameters)
         if given.keys() >= {item.name for item in self.block.inputs if item.type is DataType.REAL and item.required}:
-            _, moved = limited(declared, self.period_s, given)
+            in_force, moved = limited(declared, self.period_s, given)
             if moved:
                 raise InstanceError(f"{self.block.name}: {', '.join(moved)} out of limits at {self.period_s} s")
+            if declared.relation is not None and not declared.relation.holds(in_force):
+                raise InstanceError(f"{self.block.name}: {declared.relation.text}")
 
     def _input(self, name: str) -> Input:
         if name not in self._inputs:

@@ -16,6 +16,7 @@ from automax_ros.blocks.coefficients import (
     times_c,
 )
 from automax_ros.blocks.declaration import Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
@@ -24,6 +25,11 @@ def integrate_coefficients(period_s: float, values: Mapping[str, float]) -> tupl
     """Return the gain Kx = KI / C of INPUT + INPUT(n-1) and the integrator's range."""
     kx = values["KI"] / mapping_constant(values["WM"], period_s)
     return kx, integrator_range(kx)
+
+
+def integrate_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
+    """Return INTEGRATE's transfer function."""
+    return mapped((values["KI"],), (1.0, 0.0), mapping_constant(values["WM"], period_s), period_s)
 
 
 def integrate_step(
@@ -97,6 +103,7 @@ INTEGRATE = Block(
         ),
         defaults=mapping_default,
         compute=integrate_coefficients,
+        transfer=integrate_transfer,
     ),
     times=Times(Time(39.14), Time(193.0), Time(58.60), Time(27.40)),
     notes=(
@@ -112,6 +119,12 @@ def prop_int_coefficients(period_s: float, values: Mapping[str, float]) -> tuple
     """Return KP, the integrator's gain Kx = KP WLD / C of INPUT + INPUT(n-1), and its range."""
     kx = values["KP"] * values["WLD"] / mapping_constant(values["WM"], period_s)
     return values["KP"], kx, integrator_range(kx)
+
+
+def prop_int_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
+    """Return PROP_INT's transfer function."""
+    c = mapping_constant(values["WM"], period_s)
+    return mapped((values["KP"], values["KP"] * values["WLD"]), (1.0, 0.0), c, period_s)
 
 
 def prop_int_step(
@@ -204,6 +217,7 @@ PROP_INT = Block(
         ),
         defaults=mapping_default,
         compute=prop_int_coefficients,
+        transfer=prop_int_transfer,
     ),
     times=Times(Time(40.32), Time(193.0), Time(70.85), Time(28.24)),
     notes=(

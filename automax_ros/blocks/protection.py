@@ -185,7 +185,7 @@ THERMAL_OVERLOAD = Block(
         relation=Relation(
             parameters=("LIM_BAR", "THRESHOLD"),
             holds=lambda values: values["LIM_BAR"] > values["THRESHOLD"],
-            first=lambda _values: {"LIM_BAR": LIM_BAR, "THRESHOLD": THRESHOLD},
+            first=lambda _period_s, _values: {"LIM_BAR": LIM_BAR, "THRESHOLD": THRESHOLD},
             text="LIM_BAR must be above THRESHOLD",
         ),
         limits_literals=True,

@@ -7,9 +7,12 @@ from collections.abc import Collection, Mapping
 from automax_ros.blocks.coefficients import is_within
 from automax_ros.blocks.declaration import Block, Limit
 from automax_ros.language.check_context import Context
-from automax_ros.language.tree import Expression, IntegerLiteral, RealLiteral
+from automax_ros.language.tree import BooleanLiteral, Expression, IntegerLiteral, RealLiteral
 
 _NUMBERS = (IntegerLiteral, RealLiteral)
+_CONSTANTS = (IntegerLiteral, RealLiteral, BooleanLiteral)
+LOOP_TIME_MISS = 0.02
+"""How far a LOOP_TIME may lie off a whole number of scan periods, as a share of it, without a warning (decision)."""
 
 
 def check_coefficients(
@@ -24,7 +27,7 @@ def check_coefficients(
     if block.coefficients is None or period is None:
         return
     known = {name: value for name, value in block.coefficients.defaults(period).items() if name not in given}
-    known.update({name: float(item.value) for name, item in values.items() if isinstance(item, _NUMBERS)})
+    known.update({name: float(item.value) for name, item in values.items() if isinstance(item, _CONSTANTS)})
     for limit in block.coefficients.limits:
         value = values.get(limit.parameter)
         if not isinstance(value, _NUMBERS) or not all(name in known for name in limit.uses):
@@ -36,11 +39,39 @@ def check_coefficients(
             else:
                 _report(context, limit, value, bounds, period)
             del known[limit.parameter]
+    _check_relation(context, block, values, known)
+    _check_loop_time(context, values.get(block.coefficients.executed_every), period)
+
+
+def _check_relation(
+    context: Context, block: Block, values: Mapping[str, Expression], known: Mapping[str, float]
+) -> None:
+    """Report constants that break the relation between them; ``known`` has those within their limits."""
+    assert block.coefficients is not None
     relation = block.coefficients.relation
-    if relation is not None and all(name in known for name in relation.parameters) and not relation.holds(known):
-        last = next((values[name] for name in reversed(relation.parameters) if name in values), None)
-        if last is not None:
-            context.report("AMX4098", f"{block.name}: {relation.text}", last.span, "it is logged at run time")
+    if relation is None or not all(name in known for name in relation.parameters) or relation.holds(known):
+        return
+    last = next((values[name] for name in reversed(relation.parameters) if name in values), None)
+    if last is None:
+        return
+    found = " and ".join(f"{name} = {known[name]:.7g}" for name in relation.parameters)
+    message = f"{block.name}: {relation.text}: {found}"
+    if block.coefficients.limits_literals:
+        context.report("AMX4098", message, last.span, "it is logged at run time")
+    else:
+        context.report("AMX4084", message, last.span, "choose others; `automax blocks` tells the rule of the block")
+
+
+def _check_loop_time(context: Context, given: Expression | None, period: float) -> None:
+    """Warn of a time between executions that cannot be: the block runs in each scan or each n-th (50)."""
+    if not isinstance(given, RealLiteral) or any("EVENT" in call.arguments for call in context.calls.values()):
+        return
+    scans = max(1, round(given.value / period)) if given.value < 1e6 * period else 0
+    if scans == 0 or abs(given.value - scans * period) <= LOOP_TIME_MISS * given.value:
+        return
+    message = f"LOOP_TIME = {given.value:.7g} s is {given.value / period:.4g} scan periods of {period * 1000.0:g} ms"
+    hint = f"write {scans * period:.7g} if the block runs in every{'' if scans == 1 else f' {scans}th'} scan"
+    context.report("AMX4099", message, given.span, hint)
 
 
 def _bounds(limit: Limit, period: float, values: dict[str, float]) -> tuple[float, float] | None:

@@ -17,6 +17,7 @@ from automax_ros.blocks.declaration import (
     COEFFICIENT_LIMITED,
     Block,
     Coefficients,
+    Form,
     Input,
     Output,
     Special,
@@ -134,7 +135,7 @@ def _literals(bound: BoundCall) -> dict[str, float]:
     return {
         name: float(given.value)
         for name in (declared.parameters if declared else ())
-        if isinstance(given := bound.arguments.get(name), (RealLiteral, IntegerLiteral))
+        if isinstance(given := bound.arguments.get(name), (RealLiteral, IntegerLiteral, BooleanLiteral))
     }
 
 
@@ -174,8 +175,11 @@ def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
 
 
 def _is_value(block: Block, item: Input) -> bool:
-    """Return whether the step takes an input as a value, not as a name or by its coefficients."""
-    return isinstance(item.type, DataType) and not (block.coefficients and item.name in block.coefficients.parameters)
+    """Return whether the step can take an input as a value: no name, and no variable that coefficients come from."""
+    if not isinstance(item.type, DataType):
+        return False
+    from_coefficients = block.coefficients is not None and item.name in block.coefficients.parameters
+    return item.form is Form.LITERAL or not from_coefficients
 
 
 def _input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:

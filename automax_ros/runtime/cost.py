@@ -100,7 +100,8 @@ def _programmed(bound: BoundCall) -> dict[str, int]:
     outputs = sum(item.name in bound.arguments for item in block.outputs)
     channels = sum(item.name in bound.arguments and item.name[-1].isdigit() for item in block.inputs)
     pairs = sum(item.name in bound.arguments and item.name.startswith("INPUT") for item in block.inputs)
-    return {"n": outputs, "j": channels, "k": pairs, "p": pairs, "m": bound.elements}
+    order = bound.facts.get("order", 0)
+    return {"n": outputs, "j": channels, "k": pairs, "p": pairs, "m": bound.elements, "o": int(order)}
 
 
 def _commons(symbols: Iterable[Symbol]) -> dict[str, int]:

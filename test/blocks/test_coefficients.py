@@ -16,7 +16,8 @@ PERIODS = (0.0005, 0.0055, 0.010, 0.110, 5.5)
 
 def inside(period):
     """Values within the limits at any WM and KP."""
-    return {"WLG": 0.1 / period, "KI": 0.1 / period, "KP": 1.0, "WLD": 1.4 / period}
+    frequencies = {"WLG": 0.1 / period, "WLD": 1.4 / period, "WN": 0.5 / period}
+    return {**frequencies, "KI": 0.1 / period, "KP": 1.0, "Q_FACTOR": 1.0, "LOOP_TIME": 1.0}
 
 
 def edges():
@@ -29,6 +30,11 @@ def edges():
 
 def parameters(block, limit, period, value):
     values = inside(period)
+    if block.name == "LEAD_LAG":
+        near = value if limit.parameter != "WM" else 0.1 / period
+        partner = math.sqrt(10.0) if near < 0.3 / period else 1.0 / math.sqrt(10.0)
+        other = min(max(near * partner, 0.001 * math.sqrt(10.0)), 0.4 / period)
+        values.update({"WLD": other, "WLG": near if limit.parameter == "WM" else other})
     others = {name: values[name] for name in block.coefficients.parameters if name in values}
     return {**others, limit.parameter: value}
 

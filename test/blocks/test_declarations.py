@@ -85,17 +85,19 @@ def test_coefficients_name_their_parameters(block):
     assert reals <= set(declared.parameters) <= set(inputs)
     assert len({limit.parameter for limit in declared.limits}) == len(declared.limits)
     seen = set()
+    choices = {name for name in declared.parameters if inputs[name].one_of or inputs[name].type is DataType.BOOLEAN}
     for limit in declared.limits:
-        assert set(limit.uses) <= seen, "a limit may read only what was limited before it"
+        assert set(limit.uses) - choices <= seen, "a limit may read only what was limited before it"
         seen.add(limit.parameter)
-    assert seen == set(declared.parameters)
+    assert seen | choices == set(declared.parameters)
     filled = set(declared.defaults(0.0055))
     assert filled == {name for name in declared.parameters if not inputs[name].required}
     for name, value in declared.defaults(0.0055).items():
         assert inputs[name].default in (None, value)
     if declared.relation is not None:
         assert set(declared.relation.parameters) <= set(declared.parameters)
-        assert declared.relation.holds(declared.relation.first(declared.defaults(0.0055)))
+        values = {**dict.fromkeys(declared.relation.parameters, 1.0), **declared.defaults(0.0055)}
+        assert declared.relation.holds(declared.relation.first(0.0055, values))
 
 
 def source_of(step):
@@ -111,7 +113,8 @@ def names_of(block):
     inputs = {
         item.variable
         for item in block.inputs
-        if item.name not in evaluated and (item.type is Special.TABLE or isinstance(item.type, DataType))
+        if (item.name not in evaluated or (item.one_of and block.coefficients.transfer))
+        and (item.type is Special.TABLE or isinstance(item.type, DataType))
     }
     states = {state.name for state in block.states}
     if block.structure is Access.USES:
@@ -225,7 +228,10 @@ def variables(block):
 def literals(block):
     chosen = {}
     for item in block.inputs:
-        if item.form is not Form.LITERAL or item.type is DataType.REAL:
+        if item.form is not Form.LITERAL or (item.type is DataType.REAL and not item.required):
+            continue
+        if item.type is DataType.REAL:
+            chosen[item.variable] = st.sampled_from([0.01, 0.022, 1.0])
             continue
         if item.one_of:
             chosen[item.variable] = st.sampled_from(item.one_of)
@@ -266,7 +272,8 @@ def test_any_values_give_values_of_the_declared_types_and_ranges(block):
 
 
 # Copied from the manual. Table 4: 7010 and 6010/6011; table 5: UDC; table 6: PC3000, SCAN_LOOP's with its lost term.
-# Table 5 forgets SEARCH, which has an estimate, and the n of its PACK_BITS counts inputs.
+# Table 5 forgets SEARCH, which has an estimate, calls the pass filters LEADN and LAGN, and the n of its PACK_BITS
+# counts inputs.
 TABLES = """
 ABSOLUTE_VALUE       9.16   41   8.30   6.44
 ALARM                11.16 + n(2.48)   44 + n(11)   10.10 + n(1.80)   7.8 + n(1.76)
@@ -276,17 +283,24 @@ BIT_SELECT           26.04 + n(1.20)   118 + n(6.5)   -   18.24 + n(0.84)
 COMPARE              11.24 + n(1.16)   45 + n(5.5)   7.50 + n(2.25)   7.88 + n(0.80)
 COUNTER              15.64   61   16.90   10.96
 DIFFERENCE           10.80   44   7.97   7.56
+DIFF_LAG             33.04   154   41.50   23.12
 END                  13.82 + t(2.0) + i(1.6) + b(2.2) + d(2.5)   60 + t(3.2) + i(2.8) + b(4.3) + d(4.9)   130.00 + i(2.40) + b(2.50) + d(3.30)   9.68 + t(1.40) + i(1.12) + b(1.56) + d(1.76)
 FUNCTION             23.56   93   20.30   16.48
+HIGH_PASS_FILTER     -   -   39.25 + o(4.00)   -
 INTEGRATE            39.14   193   58.60   27.40
 INVERTER             10.84   48   9.40   7.60
 LAG                  26.52   118   41.00   18.56
 LATCH                15.04   68   14.85   10.52
+LEAD_LAG             68.60   284   39.70   48.04
 LIMIT                18.20   69   15.05   12.76
+LOW_PASS_FILTER      -   -   39.25 + o(4.00)   -
 MOVE                 10.40 + p(2.32)   39 + p(11)   10.40 + p(1.80)   7.28 + p(1.64)
 MULTIPLY_DIVIDE      13.76   71   13.80   9.64
+NOTCH                85.16   393   -   59.60
+NOTCHN               -   -   64.25 + o(20.00)   -
 OR                   10.24 + j(1.88)   41 + j(8.3)   8.90 + j(1.45)   7.16 + j(1.32)
 PACK_BITS            24.28 + j(1.44)   110 + j(5)   16.16 + j(1.25)   17.00 + j(1.00)
+PID                  124.00   515   -   86.80
 PROP_INT             40.32   193   70.85   28.24
 PULSE_MULT           18.32   86   18.96   12.84
 RAMP                 27.72   122   24.96   19.40

@@ -58,6 +58,9 @@ Limits
   WLG  C x 2**-18  to  0.71 C
        with T the scan period in s, C = WM / tan(WM T / 2)
 
+Notes
+  - With Kx = WLG / C below 0.125 OUTPUT is limited to +-8191, below 0.25 to +-16383 (section 51).
+
 Logs
   - AMX7004 coefficient out of its limits
 

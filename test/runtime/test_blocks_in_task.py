@@ -31,7 +31,13 @@ VALUES = {
     ),
 }
 REAL_LITERALS = ("0.5", "2.0", "10.0")
-"""Inside the limits of every coefficient at this scan period."""
+"""Inside the limits of nearly every coefficient at this scan period."""
+OTHER_LITERALS = {
+    **dict.fromkeys(["HIGH_PASS_FILTER WLD", "LOW_PASS_FILTER WLG", "NOTCHN WN"], ("20.0", "100.0")),
+    "LEAD_LAG WLD": ("0.5", "2.0"),
+    "LEAD_LAG WLG": ("4.0", "10.0"),
+}
+"""Those that their block's limits allow where the others are not, by block and parameter."""
 SIMPLE = {
     DataType.DOUBLE: ["L1!", "K1!"],
     DataType.INTEGER: ["L1%", "L2%", "K1%", "K2%"],
@@ -69,9 +75,9 @@ def variables(kind: DataType) -> st.SearchStrategy[str]:
     return st.sampled_from(SIMPLE[kind]) | elements
 
 
-def literals(item) -> st.SearchStrategy[str]:
+def literals(block: Block, item) -> st.SearchStrategy[str]:
     if item.type is DataType.REAL:
-        return st.sampled_from(REAL_LITERALS)
+        return st.sampled_from(OTHER_LITERALS.get(f"{block.name} {item.name}", REAL_LITERALS))
     if item.type is DataType.BOOLEAN:
         return st.sampled_from(["TRUE", "FALSE"])
     if item.one_of:
@@ -93,7 +99,7 @@ def inputs(draw, block: Block, everything: bool) -> dict[str, str]:
         elif isinstance(item.type, Special):
             parameters[item.name] = f"QUEUE{item.type.element.value}"
         else:
-            choices = [] if item.form is Form.VARIABLE else [literals(item)]
+            choices = [] if item.form is Form.VARIABLE else [literals(block, item)]
             if item.form is not Form.LITERAL:
                 choices.append(variables(item.type))
                 if item.also is not None:

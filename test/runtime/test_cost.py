@@ -72,6 +72,8 @@ def value_of(item) -> str:
         return "T%"
     if isinstance(item.type, Special):
         return f"QUEUE{item.type.element.value}"
+    if getattr(item, "form", None) is Form.LITERAL and item.type is DataType.REAL:
+        return "0.022"
     if getattr(item, "form", None) is Form.LITERAL:
         return str(item.sample or item.default or 3).upper()
     return VARIABLES[item.type]
@@ -106,9 +108,18 @@ def test_every_block_takes_its_printed_time(block):
     channels = sum(isinstance(item, Input) and item.name[-1].isdigit() for item in given)
     pairs = sum(isinstance(item, Input) and item.name.startswith("INPUT") for item in given)
     expected = printed.base + printed.n * outputs + printed.j * channels + (printed.k + printed.p) * pairs
-    expected += printed.m * 17
+    order = block.parameter("ORDER")
+    expected += printed.m * 17 + printed.o * (order.default if order else 0)
     without = sum(times(model, f"{head}90 END\n", target))
     assert sum(times(model, f"{head}40 {call}\n90 END\n", target)) - without == pytest.approx(expected * 1000, abs=1)
+
+
+def test_a_filter_takes_longer_the_higher_its_order():
+    """Table 5: NOTCHN takes 64.25 + o(20.00)."""
+    call = "CALL NOTCHN(INPUT=A%, Q_FACTOR=1.0, WN=50.0, ORDER={}, OUTPUT=A%)"
+    text = f"10 LOCAL A%\n20 CALL SCAN_LOOP(TICKS=4)\n30 {call}\n40 END\n"
+    second, fourth = (sum(times(Model.UDC, text.format(order), Processor.UDC)) for order in (2, 4))
+    assert fourth - second == pytest.approx(40_000, abs=1)
 
 
 def test_cost_is_yielded_before_each_access_to_actual_memory():

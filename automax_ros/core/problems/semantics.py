@@ -85,6 +85,7 @@ _BLOCKS = (
     Problem("AMX4096", "variable should be COMMON", Severity.WARNING),
     Problem("AMX4097", "UDC task without THERMAL_OVERLOAD", Severity.WARNING),
     Problem("AMX4098", "constant is limited at run time", Severity.WARNING),
+    Problem("AMX4099", "LOOP_TIME is no whole number of scan periods", Severity.WARNING),
 )
 
 PROBLEMS: tuple[Problem, ...] = (*_DECLARATIONS, *_EXPRESSIONS, *_FLOW, *_EVENTS, *_BLOCKS)

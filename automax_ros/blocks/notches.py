@@ -1,0 +1,231 @@
+"""NOTCH and NOTCHN: the notch filters (sections 45 and 48)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from math import floor
+
+from automax_ros.blocks.coefficients import by_order, constant, mapping_constant, no_defaults, order_default, per_period
+from automax_ros.blocks.declaration import (
+    NOT_ON_UDC,
+    UDC_ONLY,
+    Block,
+    Coefficients,
+    Form,
+    Input,
+    Limit,
+    Output,
+    State,
+    Time,
+    Times,
+)
+from automax_ros.blocks.transfer import Polynomial, Transfer, mapped
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN
+from automax_ros.core.types import DataType
+
+_Q_LIMIT = Limit("Q_FACTOR", constant(0.5), constant(100.0), "0.5", "100.0")
+_Q_FACTOR = Input("Q_FACTOR", DataType.REAL, "Q", "Q factor, 1 / (2 x damping factor)", required=True)
+
+
+def notch_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
+    """Return NOTCH's transfer function, mapped at its own WN (decision)."""
+    wn, q = values["WN"], values["Q_FACTOR"]
+    return mapped((1.0, 0.0, wn * wn), (1.0, wn / q, wn * wn), mapping_constant(wn, period_s), period_s)
+
+
+def notch_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float, float]:
+    """Return the gain of INPUT - INPUT(n-2), and of the last two differences, as ``notch_step`` has them."""
+    c = 1.0 / math.tan(values["WN"] * period_s / 2.0)
+    width = c / values["Q_FACTOR"]
+    scale = c * c + width + 1.0
+    return -width / scale, 2.0 * (c * c - 1.0) / scale, -(c * c - width + 1.0) / scale
+
+
+def notch_step(
+    input: int, reset: bool, band: float, d1: float, d2: float, x1: int, x2: int, e1: float, e2: float
+) -> tuple[int, int, int, float, float]:
+    """INPUT plus E, the band that is taken out with its sign turned: -(s WN/Q) / (s**2 + s WN/Q + WN**2).
+
+    This is direct form I in other words: the histories of OUTPUT are those of INPUT plus E's. It takes differences of
+    whole counts, so that the filter settles on INPUT exactly, however low WN is. While RESET is TRUE all of INPUT's
+    history is INPUT, all of OUTPUT's 0: no step follows (decision).
+    """
+    if reset:
+        x1 = input
+        e1 = -input + 0.0
+        e2 = e1
+        output = 0
+    else:
+        e = band * (input - x2) + d1 * e1 + d2 * e2
+        e2 = e1
+        e1 = e
+        y = input + e
+        output = floor(y + 0.5) if y >= 0.0 else -floor(0.5 - y)
+        if output > INT16_MAX:
+            output = INT16_MAX
+        elif output < INT16_MIN:
+            output = INT16_MIN
+    x2 = x1
+    x1 = input
+    return output, x1, x2, e1, e2
+
+
+NOTCH = Block(
+    name="NOTCH",
+    section="45",
+    title="Notch filter",
+    function="(s**2 + WN**2) / (s**2 + s WN/Q_FACTOR + WN**2)",
+    inputs=(
+        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE),
+        _Q_FACTOR,
+        Input("WN", DataType.REAL, "WN", "notch frequency in rad/s", required=True),
+        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at 0", default=False),
+    ),
+    outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the filtered signal"),),
+    states=(
+        State("x1", DataType.INTEGER, 0),
+        State("x2", DataType.INTEGER, 0),
+        State("e1", DataType.REAL, 0.0),
+        State("e2", DataType.REAL, 0.0),
+    ),
+    coefficients=Coefficients(
+        parameters=("Q_FACTOR", "WN"),
+        names=("band", "d1", "d2"),
+        limits=(_Q_LIMIT, Limit("WN", constant(0.01), per_period(2.0 * math.pi / 10.0), "0.01", "2 pi / (10 T)")),
+        defaults=no_defaults,
+        compute=notch_coefficients,
+        transfer=notch_transfer,
+    ),
+    times=Times(Time(85.16), Time(393.0), None, Time(59.60)),
+    runs_on=NOT_ON_UDC,
+    notes=("WN maps onto itself: C = WN / tan(WN T / 2).",),
+    step=notch_step,
+)
+
+
+def notchn_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
+    """Return NOTCHN's transfer function, mapped at its own WN (decision)."""
+    wn, q = values["WN"], values["Q_FACTOR"]
+    numerator: Polynomial = (1.0, 0.0, wn * wn)
+    denominator: Polynomial = (1.0, wn / q, wn * wn)
+    if values["ORDER"] == 4.0:
+        numerator, denominator = _squared(numerator), _squared(denominator)
+    return mapped(numerator, denominator, mapping_constant(wn, period_s), period_s)
+
+
+def _squared(polynomial: Polynomial) -> Polynomial:
+    first, second, third = polynomial
+    return (
+        first * first,
+        2.0 * first * second,
+        second * second + 2.0 * first * third,
+        2.0 * second * third,
+        third * third,
+    )
+
+
+def notchn_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, ...]:
+    """Return the gains of INPUT and its four histories, then of the four histories of the output; 0 beyond ORDER."""
+    transfer = notchn_transfer(period_s, values)
+    missing = (0.0,) * (5 - len(transfer.b))
+    return (*transfer.b, *missing, *(-value for value in transfer.a[1:]), *missing)
+
+
+def notchn_step(
+    input: int,
+    order: int,
+    initial_value: int,
+    reset: bool,
+    b0: float,
+    b1: float,
+    b2: float,
+    b3: float,
+    b4: float,
+    a1: float,
+    a2: float,
+    a3: float,
+    a4: float,
+    x1: int,
+    x2: int,
+    x3: int,
+    x4: int,
+    y1: float,
+    y2: float,
+    y3: float,
+    y4: float,
+) -> tuple[int, int, int, int, int, float, float, float, float]:
+    """Direct form I of order 2 or 4; the clamp to 16 bits acts on the output alone.
+
+    While RESET is TRUE all of INPUT's history is INPUT, all of OUTPUT's INITIAL_VALUE: no step follows (decision).
+    """
+    if reset:
+        x1 = input
+        x2 = input
+        x3 = input
+        y1 = float(initial_value)
+        y2 = y1
+        y3 = y1
+        y4 = y1
+        output = initial_value
+    else:
+        y = b0 * input + b1 * x1 + b2 * x2 + a1 * y1 + a2 * y2
+        if order == 4:
+            y = y + b3 * x3 + b4 * x4 + a3 * y3 + a4 * y4
+            y4 = y3
+            y3 = y2
+        y2 = y1
+        y1 = y
+        output = floor(y + 0.5) if y >= 0.0 else -floor(0.5 - y)
+        if output > INT16_MAX:
+            output = INT16_MAX
+        elif output < INT16_MIN:
+            output = INT16_MIN
+    x4 = x3
+    x3 = x2
+    x2 = x1
+    x1 = input
+    return output, x1, x2, x3, x4, y1, y2, y3, y4
+
+
+NOTCHN = Block(
+    name="NOTCHN",
+    section="48",
+    title="Notch filter of order 2 or 4",
+    function="((s**2 + WN**2) / (s**2 + s WN/Q_FACTOR + WN**2)) ** (ORDER / 2)",
+    inputs=(
+        Input("INPUT", DataType.INTEGER, "INPUT", "signal input", required=True),
+        Input("Q_FACTOR", DataType.REAL, "Q_FACTOR", "Q factor, 1 / (2 x damping factor)", required=True),
+        Input("WN", DataType.REAL, "WN", "centre frequency in rad/s", required=True),
+        Input("ORDER", DataType.INTEGER, "ORDER", "order", default=2, form=Form.LITERAL, one_of=(2, 4)),
+        Input("INITIAL_VALUE", DataType.INTEGER, "INITIAL_VALUE", "the output while RESET is TRUE", default=0),
+        Input("RESET", DataType.BOOLEAN, "RESET", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+    ),
+    outputs=(Output("OUTPUT", DataType.INTEGER, "OUTPUT", "the filtered signal"),),
+    states=(
+        *(State(f"x{number}", DataType.INTEGER, 0) for number in (1, 2, 3, 4)),
+        *(State(f"y{number}", DataType.REAL, 0.0) for number in (1, 2, 3, 4)),
+    ),
+    coefficients=Coefficients(
+        parameters=("Q_FACTOR", "WN", "ORDER"),
+        names=("b0", "b1", "b2", "b3", "b4", "a1", "a2", "a3", "a4"),
+        limits=(
+            _Q_LIMIT,
+            Limit(
+                "WN",
+                by_order({2: 0.02, 4: 0.3}),
+                per_period(0.999 * math.pi),
+                "0.02 / T or 0.3 / T by ORDER",
+                "0.999 pi / T",
+                uses=("ORDER",),
+            ),
+        ),
+        defaults=order_default(2),
+        compute=notchn_coefficients,
+        transfer=notchn_transfer,
+    ),
+    times=Times(None, None, Time(64.25, o=20.0), None),
+    runs_on=UDC_ONLY,
+    notes=("WN maps onto itself: C = WN / tan(WN T / 2).",),
+    step=notchn_step,
+)
