@@ -40,7 +40,8 @@ def check_coefficients(
                 _report(context, limit, value, bounds, period)
             del known[limit.parameter]
     _check_relation(context, block, values, known)
-    _check_loop_time(context, values.get(block.coefficients.executed_every), period)
+    if block.coefficients.executed_every in known:
+        _check_loop_time(context, values[block.coefficients.executed_every], period)
 
 
 def _check_relation(
@@ -62,7 +63,7 @@ def _check_relation(
         context.report("AMX4084", message, last.span, "choose others; `automax blocks` tells the rule of the block")
 
 
-def _check_loop_time(context: Context, given: Expression | None, period: float) -> None:
+def _check_loop_time(context: Context, given: Expression, period: float) -> None:
     """Warn of a time between executions that cannot be: the block runs in each scan or each n-th (50)."""
     if not isinstance(given, RealLiteral) or any("EVENT" in call.arguments for call in context.calls.values()):
         return
