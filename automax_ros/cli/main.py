@@ -21,11 +21,15 @@ SUBCOMMANDS: dict[str, str] = {
     "run": "run a rack",
     "compare": "run a block beside the Logix instruction it becomes",
     "export": "write common memory of a recording to a CSV table",
+    "tune-info": "coefficients and limits of dynamic blocks in a task",
+    "response": "step response and Bode diagram of a dynamic block",
     "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
     "explain": "say what a problem code means and how to cure it",
 }
-"""Every subcommand and its line of help; the module of that name in this folder is imported when it is asked for."""
+"""Every subcommand and its line of help; the module of that name in this folder is imported when it is asked for.
+
+A dash in the name is an underscore in the module's."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
@@ -76,7 +80,9 @@ def _run(argv: list[str]) -> int:
 
 def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.ArgumentParser, argparse.ArgumentParser]:
     """Return the parser of the whole command line and the chosen subcommand's, which alone knows its arguments."""
-    parser = argparse.ArgumentParser(prog="automax", description="A Reliance Electric AutoMax rack, emulated.")
+    parser = argparse.ArgumentParser(
+        prog="automax", description="A Reliance Electric AutoMax rack, emulated.", formatter_class=_HelpFormatter
+    )
     parser.add_argument("--version", action="version", version=f"automax {__version__}")
     chosen_parser = parser
     subcommands = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND")
@@ -94,8 +100,17 @@ def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.Arg
     return parser, chosen_parser
 
 
+class _HelpFormatter(argparse.HelpFormatter):
+    """Leaves room for the longest subcommand: argparse forgets that they are indented twice."""
+
+    def add_argument(self, action: argparse.Action) -> None:
+        """Take in an argument for the width of the first column."""
+        super().add_argument(action)
+        self._action_max_length = max(self._action_max_length, max(map(len, SUBCOMMANDS)) + 4)
+
+
 def _module(name: str) -> ModuleType:
-    return importlib.import_module(f"automax_ros.cli.{name}")
+    return importlib.import_module(f"automax_ros.cli.{name.replace('-', '_')}")
 
 
 def _unknown(name: str) -> UsageError:

@@ -1,0 +1,235 @@
+"""The dynamic blocks of a task, by line, with the values of their parameters as far as they are known."""
+
+from __future__ import annotations
+
+import argparse
+import enum
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from automax_ros.blocks.declaration import Block
+from automax_ros.cli.csv_table import cell_value
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.decimal_text import real_text
+from automax_ros.core.types import DataType, Value
+from automax_ros.language.constant_values import range_text
+from automax_ros.language.program import BoundCall, Program, Symbol
+from automax_ros.language.statement_text import print_expression
+from automax_ros.language.tree import BooleanLiteral, Call, Expression, IntegerLiteral, RealLiteral, Unary
+from automax_ros.language.walk import statements_in_order
+from automax_ros.rack.findings import did_you_mean, quoted
+from automax_ros.runtime.memory import MemoryValueError, ViewSpec, fitting
+
+SIGNALS = ("INPUT", "FEEDBACK")
+"""The inputs that carry the signal through a block."""
+_LABEL = re.compile(r"0*([0-9]{1,6})(?:\.([0-9]{1,3}))?")
+
+
+class Source(enum.Enum):
+    """Where the value of a parameter comes from."""
+
+    LITERAL = "literal"
+    DEFAULT = "default"
+    TUNABLE = "tunable"
+    SET = "set"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An input of a CALL: its value, None where it is a variable of which nothing is known; ``variable`` its text."""
+
+    keyword: str
+    value: Value | None
+    source: Source
+    variable: str = ""
+
+
+@dataclass(frozen=True)
+class DynamicCall:
+    """A CALL of a block with coefficients: ``label`` is its line as in state names, ``output`` the variable it writes.
+
+    ``parameters`` are the inputs that are programmed, by keyword.
+    """
+
+    label: str
+    bound: BoundCall
+    output: str
+    parameters: Mapping[str, Parameter]
+
+    @property
+    def block(self) -> Block:
+        """The block."""
+        return self.bound.block
+
+    @property
+    def title(self) -> str:
+        """Line, block and output as a heading."""
+        return f"{self.label} {self.block.name} -> {self.output}"
+
+    @property
+    def coefficients(self) -> dict[str, float | None]:
+        """The programmed parameters of coefficients, None where a value is not known."""
+        declared = self.block.coefficients
+        assert declared is not None
+        found = {name: self.parameters[name].value for name in declared.parameters if name in self.parameters}
+        return {name: float(value) if isinstance(value, (int, float)) else None for name, value in found.items()}
+
+
+def add_call_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Add ``--block`` and ``--set``."""
+    parser.add_argument(
+        "--block",
+        required=required,
+        metavar="LINE",
+        help="the BASIC line of a block; LINE.2 is the second CALL of a line, as in the names of states",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="settings",
+        metavar="NAME=VALUE",
+        help="the value of a variable that a block takes, such as GAIN=2.0; repeatable",
+    )
+
+
+def dynamic_calls(
+    program: Program, settings: Sequence[str], label: str | None, *, driven: bool = False
+) -> list[DynamicCall]:
+    """Return the dynamic blocks of a task in the order of the text, or the one on a line.
+
+    ``settings`` are texts NAME=VALUE; they may set what coefficients come from and, of blocks that are to be driven,
+    every other input but the signal.
+
+    Raises:
+        UsageError: no dynamic block there, or a setting is at fault or for no block.
+    """
+    values = dict(_setting(program, text) for text in settings)
+    bound = _labelled(program)
+    if label is not None:
+        chosen = _chosen(label, bound, program)
+        bound = {chosen: bound[chosen]}
+    calls = [DynamicCall(name, item, _output(item), _parameters(program, item, values)) for name, item in bound.items()]
+    free = {item.variable for call in calls for item in _settable(call, driven=driven) if item.variable}
+    for name in values:
+        if name not in {_plain(item) for item in free}:
+            what = "no dynamic block takes it" if label is None else "the block does not take it"
+            raise UsageError(f"--set {name}: {what}", f"to be set are {', '.join(sorted(free))}" if free else None)
+    return calls
+
+
+def _settable(call: DynamicCall, *, driven: bool) -> list[Parameter]:
+    names = call.coefficients if not driven else [name for name in call.parameters if name not in SIGNALS]
+    return [call.parameters[name] for name in names]
+
+
+def value_text(value: Value | None) -> str:
+    """Return a parameter's value as the source has it."""
+    if isinstance(value, bool):
+        return str(value).upper()
+    return real_text(value) if isinstance(value, float) else str(value)
+
+
+def _labelled(program: Program) -> dict[str, BoundCall]:
+    """Return the dynamic blocks by line; a further CALL of one line counts from 2, whatever the first one is."""
+    found: dict[str, BoundCall] = {}
+    counts: dict[int, int] = {}
+    for statement, _ in statements_in_order(program.scan):
+        if not isinstance(statement, Call) or statement.span not in program.calls:
+            continue
+        bound = program.calls[statement.span]
+        number = counts[bound.line] = counts.get(bound.line, 0) + 1
+        if bound.block.coefficients is not None:
+            found[f"{bound.line}" if number == 1 else f"{bound.line}.{number}"] = bound
+    return found
+
+
+def _chosen(label: str, bound: Mapping[str, BoundCall], program: Program) -> str:
+    match = _LABEL.fullmatch(label.strip())
+    if match is None:
+        raise UsageError(f"--block {quoted(label)} is no BASIC line such as 210 or 210.2", _listed(bound))
+    line, number = int(match[1]), int(match[2] or 1)
+    name = f"{line}" if number == 1 else f"{line}.{number}"
+    if name in bound:
+        return name
+    there = {item.line for item in program.calls.values()}
+    what = "that is no dynamic block" if line in there else "there is no block on this line"
+    raise UsageError(f"--block {name}: {what}", _listed(bound))
+
+
+def _listed(bound: Mapping[str, BoundCall]) -> str:
+    if not bound:
+        return "the task has no dynamic block"
+    return "dynamic blocks are " + ", ".join(f"{name} {item.block.name}" for name, item in bound.items())
+
+
+def _output(bound: BoundCall) -> str:
+    """Return the text of the variable that gets the block's OUTPUT; THERMAL_OVERLOAD's is OVERLOAD."""
+    wanted = next((item.name for item in bound.block.outputs if item.name == "OUTPUT"), bound.block.outputs[0].name)
+    return print_expression(bound.arguments[wanted]) if wanted in bound.arguments else "-"
+
+
+def _parameters(program: Program, bound: BoundCall, values: Mapping[str, Value]) -> dict[str, Parameter]:
+    return {
+        item.name: _parameter(program, item.name, bound.arguments[item.name], values)
+        for item in bound.block.inputs
+        if item.name in bound.arguments
+    }
+
+
+def _parameter(program: Program, keyword: str, given: Expression, values: Mapping[str, Value]) -> Parameter:
+    if isinstance(given, (IntegerLiteral, RealLiteral, BooleanLiteral)):
+        return Parameter(keyword, given.value, Source.LITERAL)
+    inverted = isinstance(given, Unary)
+    text = print_expression(given.operand if isinstance(given, Unary) else given)
+    symbol = program.symbols.get(text)
+    if _plain(text) in values:
+        value, source = values[_plain(text)], Source.SET
+    elif symbol is not None and symbol.tuning is not None:
+        value, source = symbol.tuning.current, Source.TUNABLE
+    else:
+        return Parameter(keyword, None, Source.UNKNOWN, text)
+    return Parameter(keyword, not value if inverted else value, source, text)
+
+
+def _setting(program: Program, text: str) -> tuple[str, Value]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise UsageError(f"--set {quoted(text)} is not NAME=VALUE")
+    label = _plain(name)
+    symbol = program.symbols.get(label.partition("(")[0])
+    if symbol is None or bool(symbol.dimensions) != ("(" in label):
+        raise UsageError(f"--set: the task has no variable {quoted(name)}", did_you_mean(label, program.symbols))
+    return label, _value(label, symbol, value.strip())
+
+
+def _value(label: str, symbol: Symbol, text: str) -> Value:
+    value = cell_value(text, symbol.type) if text else None
+    if value is None:
+        raise UsageError(f"--set {label}: {quoted(text)} is no value of type {symbol.type.word}", _wanted(symbol))
+    try:
+        fit = fitting(ViewSpec(symbol.name, symbol.type, length=symbol.length), value)
+    except MemoryValueError as error:
+        raise UsageError(
+            f"--set {label}: {quoted(text)} does not fit type {symbol.type.word}", _wanted(symbol)
+        ) from error
+    tuning = symbol.tuning
+    if tuning is not None and not isinstance(fit, str) and not isinstance(tuning.low, str):
+        assert not isinstance(tuning.high, str)
+        if not tuning.low <= fit <= tuning.high:
+            limits = f"{value_text(tuning.low)} to {value_text(tuning.high)}"
+            raise UsageError(f"--set {label}: {quoted(text)} is beyond its tuning limits, {limits}")
+    return fit
+
+
+def _wanted(symbol: Symbol) -> str | None:
+    if symbol.type is DataType.BOOLEAN:
+        return "write TRUE or FALSE"
+    return f"a number from {range_text(symbol.type)}" if symbol.type.is_numeric else None
+
+
+def _plain(text: str) -> str:
+    """Return a variable's text without blanks, in capitals and round brackets."""
+    return "".join(text.split()).upper().replace("[", "(").replace("]", ")")

@@ -1,0 +1,145 @@
+"""The answer of ``automax tune-info --ki``: the KI of an INTEGRATE that gains so many counts a second (42.3)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from automax_ros.blocks.tuning import (
+    RATE_FACTOR,
+    IntegratorRange,
+    Verdict,
+    range_of,
+    rate_gain,
+    rate_limits,
+    verdict_of,
+)
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
+
+_DIGITS = 7
+"""Digits of the constant to write: a REAL has no more."""
+_SLOWEST, _FASTEST = 1e-9, 1e9
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A rate of ``y`` counts/s at a constant INPUT of ``x`` counts, and the KI for it; ``period_s`` may be None."""
+
+    y: float
+    x: float
+    ki: float
+    period_s: float | None
+
+    @classmethod
+    def of(cls, y: float, x: float, period_s: float | None) -> Rate:
+        """Return the rate with its KI, checked against the limits where the scan time is known.
+
+        Raises:
+            UsageError: no number, INPUT 0 or beyond 16 bits, KI not above 0, or beyond its limits at this scan time.
+        """
+        _require(y, x)
+        ki = rate_gain(y, x)
+        rate = cls(y, x, ki, period_s)
+        if period_s is not None:
+            rate._require_possible(period_s)
+        return rate
+
+    @property
+    def constant(self) -> float:
+        """KI as it is to be written."""
+        return float(f"{self.ki:.{_DIGITS}g}")
+
+    @property
+    def text(self) -> str:
+        """The REAL constant to write, without an exponent where that is readable."""
+        text = f"{self.constant:.{_DIGITS}g}"
+        if "e" in text:
+            return text.upper().replace("E", ".0E") if "." not in text else text.upper()
+        return text if "." in text else f"{text}.0"
+
+    @property
+    def range(self) -> IntegratorRange | None:
+        """Section 51 at the scan time, None without one."""
+        return None if self.period_s is None else range_of(self.ki * self.period_s / (2.0 * RATE_FACTOR), "KI / C")
+
+    def report(self) -> str:
+        """Return the answer as an engineer reads it."""
+        lines = [
+            f"INTEGRATE, {self.y:g} counts/s at a constant INPUT of {self.x:g} counts, WM not programmed",
+            f"  KI            (pi/20) / tan(pi/20) Y/X = {RATE_FACTOR:.7f} x {self.y / self.x:.7g} = {self.ki:.7g}",
+            f"  write         KI={self.text}",
+        ]
+        found = self.range
+        if self.period_s is None or found is None:
+            low, high = rate_limits(1.0)
+            lines.append(f"  limits        {low:.6g} / T to {high:.6g} / T (C x 2**-18 to 0.9 pi / T)")
+            lines.append("  scan time     not known: give FILE, or --ticks and --tick-ms, to check limits and range")
+            return "\n".join(lines) + "\n"
+        low, high = rate_limits(self.period_s)
+        near = {
+            Verdict.NEAR_LOW: "  ! within 10 % of the low limit",
+            Verdict.NEAR_HIGH: "  ! within 10 % of the high limit",
+        }
+        edge = (
+            "" if found.near_edge is None else f"  ! Kx is within 10 % of {found.near_edge:g}, where the range changes"
+        )
+        time_s = found.counts / abs(self.y)
+        lines += [
+            f"  limits        {low:.6g} to {high:.6g} at T = {self.period_s * 1e3:g} ms{near.get(self._verdict(), '')}",
+            f"  Kx            KI / C = Y T / (2 X) = {found.kx:.6g}, range +-{found.counts} (section 51){edge}",
+            f"  a scan        {self.y * self.period_s:.6g} counts; from 0 to {found.counts} takes {time_s:.4g} s",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def record(self) -> dict[str, object]:
+        """Return the answer for ``--json``."""
+        found = self.range
+        limits = None if self.period_s is None else rate_limits(self.period_s)
+        return {
+            "y_counts_per_s": self.y,
+            "x_counts": self.x,
+            "factor": RATE_FACTOR,
+            "ki": self.ki,
+            "constant": self.text,
+            "period_s": self.period_s,
+            "low": None if limits is None else limits[0],
+            "high": None if limits is None else limits[1],
+            "verdict": self._verdict().value,
+            "kx": None if found is None else found.kx,
+            "range_counts": None if found is None else found.counts,
+            "near_edge": None if found is None else found.near_edge,
+            "counts_per_scan": None if self.period_s is None else self.y * self.period_s,
+        }
+
+    def _verdict(self) -> Verdict:
+        limits = (None, None) if self.period_s is None else rate_limits(self.period_s)
+        return verdict_of(stored_real(self.constant)[0], *limits)
+
+    def _require_possible(self, period_s: float) -> None:
+        low, high = rate_limits(period_s)
+        verdict = self._verdict()
+        if verdict not in (Verdict.ABOVE, Verdict.BELOW):
+            return
+        side = f"above its high limit {high:.6g} (0.9 pi / T)"
+        if verdict is Verdict.BELOW:
+            side = f"below its low limit {low:.6g} (C x 2**-18)"
+        slow, fast = sorted(limit * self.x / RATE_FACTOR for limit in (low, high))
+        raise UsageError(
+            f"--ki: KI = {self.ki:.7g} is {side} at T = {period_s * 1e3:g} ms",
+            f"with INPUT = {self.x:g} it can be {slow:.6g} to {fast:.6g} counts/s; take another INPUT or scan time",
+        )
+
+
+def _require(y: float, x: float) -> None:
+    if not math.isfinite(y) or not math.isfinite(x):
+        raise UsageError(f"--ki {y:g} {x:g}: Y and X must be numbers")
+    if x == 0.0:
+        raise UsageError("--ki: X is 0, and an integrator of 0 does not move", "X is the constant INPUT in counts")
+    if not INT16_MIN <= x <= INT16_MAX or x != int(x):
+        raise UsageError(f"--ki: X = {x:g} is no INPUT: that is a whole number from {INT16_MIN} to {INT16_MAX}")
+    if y and not _SLOWEST <= abs(y) <= _FASTEST:
+        raise UsageError(f"--ki: Y = {y:g} counts/s is {'more' if abs(y) > 1.0 else 'less'} than any scan time allows")
+    if y / x <= 0.0:
+        what = "OUTPUT would not move" if y == 0.0 else "OUTPUT moves in the direction of INPUT"
+        raise UsageError(f"--ki: KI = {rate_gain(y, x):.7g}, but KI must be above 0: {what}", "turn the sign of INPUT")

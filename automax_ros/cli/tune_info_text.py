@@ -1,0 +1,226 @@
+"""What ``automax tune-info`` prints for a person."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from automax_ros.blocks.coefficients import default_wm
+from automax_ros.blocks.tuning import Corner, LimitNow, Tuning, Verdict
+from automax_ros.cli.dynamic_calls import DynamicCall, Parameter, Source, value_text
+from automax_ros.cli.transfer_text import digits_for, discrete_text, equation_text, gain_text, laplace_text, number
+from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.language.program import Program
+
+_LABEL = 12
+_WIDTH = 106
+_JOINED = "\u00a0"
+"""A blank at which no line is wrapped."""
+_HINTS = {
+    Verdict.NEAR_LOW: "! within 10 % of the low limit",
+    Verdict.NEAR_HIGH: "! within 10 % of the high limit",
+    Verdict.BELOW: "! too low: the limit is in force and AMX7004 is logged",
+    Verdict.ABOVE: "! too high: the limit is in force and AMX7004 is logged",
+}
+
+Found = Sequence[tuple[DynamicCall, Tuning]]
+
+
+def report(path: Path, program: Program, found: Found) -> str:
+    """Return what there is to know about all dynamic blocks of a task."""
+    if not found:
+        return f"{path}: no dynamic block (sections 36 and 41 to 50)\n"
+    parts = [heading(path, program), *(_block(call, tuning, program) for call, tuning in found)]
+    return "\n".join(parts)
+
+
+def heading(path: Path, program: Program) -> str:
+    """Return the scan time and the frequencies that follow from it."""
+    period_s = program.period_ns / 1e9
+    text = (
+        f"{path}: T = {program.ticks} x {program.tick_ns / NS_PER_MS:g} ms = {period_s * 1e3:g} ms,"
+        f" scan frequency {frequency_text(2.0 * math.pi / period_s)}, Nyquist {frequency_text(math.pi / period_s)}\n"
+    )
+    if program.event is not None:
+        text += (
+            f"The event {program.event} starts the scan: all holds only where it comes every {period_s * 1e3:g} ms.\n"
+        )
+    return text
+
+
+def frequency_text(rad_s: float) -> str:
+    """Return a frequency in both units."""
+    return f"{number(rad_s, 5)} rad/s = {number(rad_s / (2.0 * math.pi), 4)} Hz"
+
+
+def _block(call: DynamicCall, tuning: Tuning, program: Program) -> str:
+    lines = [f"{call.title}   (section {call.block.section})"]
+    rows = [*_values(call, tuning), *_functions(tuning, call), *_corners(tuning), *_range(tuning)]
+    rows += [*_limits(call, tuning), *_ratio(tuning), *_loop_time(call, tuning, program)]
+    last = ""
+    for label, text in rows:
+        lines.append(f"  {(label if label != last else '').ljust(_LABEL)}{text}".rstrip())
+        last = label
+    return "\n".join(lines) + "\n"
+
+
+Rows = Iterator[tuple[str, str]]
+
+
+def _values(call: DynamicCall, tuning: Tuning) -> Rows:
+    """Yield where the values of variables come from."""
+    for name in call.coefficients:
+        given = call.parameters[name]
+        if not given.variable:
+            continue
+        if given.value is None:
+            yield "values", f"{name} = {given.variable}, 0 at first: give --set {given.variable}=VALUE"
+        else:
+            what = "its CURRENT" if given.source is Source.TUNABLE else "as set"
+            yield "values", f"{name} = {given.variable} = {value_text(given.value)}, {what}"
+    if tuning.missing:
+        yield "values", "limits follow; function, corners and range need the values"
+
+
+def _functions(tuning: Tuning, call: DynamicCall) -> Rows:
+    transfer = tuning.transfer
+    if transfer is None:
+        return
+    digits = digits_for(tuning)
+    yield "Laplace", laplace_text(tuning)
+    above, below = discrete_text(transfer, digits)
+    if len(above) + len(below) > _WIDTH - 8:
+        yield "discrete", f"({above})"
+        yield "discrete", f"/ ({below})"
+    else:
+        yield "discrete", above if below == "1" else f"({above}) / ({below})"
+    yield "as run", equation_text(tuning)
+    for line in textwrap.wrap(_coefficients(tuning, digits), _WIDTH):
+        yield "as run", line.replace(_JOINED, " ")
+    if transfer.mapping is not None:
+        yield "mapping", f"C = {number(transfer.mapping, 7)}/s, {_exact_at(tuning, call)}"
+    elif call.block.name == "PID":
+        yield "mapping", f"steps of LOOP_TIME = {tuning.period_s:.7g} s: trapezoids for the I term, differences for D"
+
+
+def _coefficients(tuning: Tuning, digits: int) -> str:
+    """Return the coefficients that the block has at its order."""
+    order = tuning.values.get("ORDER", 9.0)
+    shown = {name: value for name, value in tuning.coefficients.items() if name != "span"}
+    return ", ".join(
+        f"{name}{_JOINED}{number(value, digits)}"
+        for name, value in shown.items()
+        if not name[-1].isdigit() or int(name[-1]) <= order
+    )
+
+
+def _exact_at(tuning: Tuning, call: DynamicCall) -> str:
+    """Return where the discrete function is the Laplace function itself."""
+    if "WM" in tuning.values:
+        wm = tuning.values["WM"]
+        source = "" if "WM" in call.parameters else ", the default: 1/20 of the scan frequency"
+        assert "WM" in call.parameters or wm == default_wm(tuning.scan_s)
+        return f"exact at WM = {frequency_text(wm)}{source}"
+    own = next((name for name in ("WN", "WLD", "WLG") if name in tuning.values), None)
+    return "2 / T: plain bilinear" if own is None else f"exact at {own} itself"
+
+
+def _corners(tuning: Tuning) -> Rows:
+    width = max((len(corner.name) for corner in tuning.corners), default=0)
+    for corner in tuning.corners:
+        time = "" if "WN" in tuning.values else f", 1/w = {number(corner.time_constant_s, 4)} s"
+        yield "corner", f"{corner.name.ljust(width)}  {frequency_text(corner.rad_s)}{time}"
+        if corner.discrete is None:
+            yield "corner", f"{' ' * width}  ! above the Nyquist frequency"
+            continue
+        gains = f"Laplace {gain_text(corner.laplace)}, discrete {gain_text(corner.discrete)}"
+        yield "corner", f"{' ' * width}  {gains}{_moved(corner)}"
+
+
+def _moved(corner: Corner) -> str:
+    if corner.warping is None or corner.mapped_rad_s is None or abs(corner.warping) < 5e-5:
+        return ""
+    return f"; mapped to {number(corner.mapped_rad_s, 5)} rad/s ({corner.warping * 100.0:+.2f} %)"
+
+
+def _range(tuning: Tuning) -> Rows:
+    found = tuning.integrator
+    if found is None:
+        return
+    what = {"DIFF_LAG": "the integrator in the feedback path", "LAG": "OUTPUT"}.get(tuning.block.name, "the integrator")
+    yield "range", f"Kx = {found.formula} = {number(found.kx)}: {what} goes to +-{found.counts} (section 51)"
+    if found.near_edge is not None:
+        yield "range", f"! Kx is within 10 % of {found.near_edge:g}, where the range changes"
+    if tuning.block.name == "DIFF_LAG" and found.counts < 32767:
+        yield "range", f"an INPUT of 32767 settles at 32767 - {found.counts} = {32767 - found.counts}, not at 0"
+
+
+def _limits(call: DynamicCall, tuning: Tuning) -> Rows:
+    order = tuning.values.get("ORDER")
+    rows = [_limit_cells(item, call.parameters.get(item.parameter), order) for item in tuning.limits]
+    widths = [max(len(row[column]) for row in rows) for column in range(5)]
+    for row in rows:
+        name, value, low, high, formulas, hint = row
+        yield (
+            "limits",
+            f"{name.ljust(widths[0])}  {value.ljust(widths[1])}  {low.rjust(widths[2])} .. {high.ljust(widths[3])}"
+            f"  {formulas.ljust(widths[4])}  {hint}".rstrip(),
+        )
+
+
+def _limit_cells(limit: LimitNow, given: Parameter | None, order: float | None) -> tuple[str, str, str, str, str, str]:
+    value = "?" if limit.value is None else number(limit.value, 7)
+    hint = "" if limit.given else "default"
+    if given is not None:
+        hint = _HINTS.get(limit.verdict, "")
+    return (
+        limit.parameter,
+        value,
+        limit.low_text if limit.low is None else number(limit.low),
+        limit.high_text if limit.high is None else number(limit.high),
+        _formulas(limit, order),
+        hint,
+    )
+
+
+def _formulas(limit: LimitNow, order: float | None) -> str:
+    """Return the formulas of a limit, nothing where they are numbers; of those by ORDER the one in force."""
+    low = limit.low_text
+    if not any(text.count("T") or text.count("C") for text in (low, limit.high_text)):
+        return ""
+    formulas, by_order, _ = low.partition(" by ORDER")
+    if by_order and order is not None:
+        choices = formulas.replace(" or ", ", ").split(", ")
+        low = choices[int(order) - 1 if len(choices) == 3 else int(order) // 2 - 1]
+    return f"({low} .. {limit.high_text})"
+
+
+def _ratio(tuning: Tuning) -> Rows:
+    found = tuning.ratio
+    if found is None:
+        return
+    hints = {
+        Verdict.NEAR_LOW: f"  ! within 10 % of {found.low:g}:1",
+        Verdict.NEAR_HIGH: f"  ! within 10 % of {found.high:g}:1",
+        Verdict.BELOW: "  ! beyond: WLD is moved at first, and AMX7004 is logged",
+        Verdict.ABOVE: "  ! beyond: WLD is moved at first, and AMX7004 is logged",
+    }
+    yield (
+        "ratio",
+        f"{number(found.value, 5)}:1 of WLD and WLG, {found.low:g}:1 .. {found.high:g}:1{hints.get(found.verdict, '')}",
+    )
+
+
+def _loop_time(call: DynamicCall, tuning: Tuning, program: Program) -> Rows:
+    if call.block.name != "PID":
+        return
+    scans = tuning.period_s / tuning.scan_s
+    every = round(scans)
+    text = f"{tuning.period_s:.7g} s = {number(scans, 5)} x the scan of {program.period_ns / NS_PER_MS:g} ms"
+    if every < 1 or abs(scans - every) > 0.02 * scans:
+        text += "  ! no whole number of scans"
+    elif every > 1:
+        text += f": the CALL must run in one scan of {every} only"
+    yield "LOOP_TIME", text
