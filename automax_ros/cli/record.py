@@ -11,6 +11,7 @@ import argparse
 import re
 import sys
 import time
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.messages import VariableTable, WriterKind
 from automax_ros.bags.rack_files import RACK_FILE, RackFile, RackFilesError
 from automax_ros.bags.writer import StorageOptions
+from automax_ros.cli.record_options import split_period, storage_options
 from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.signals import StopRequest, stop_signals
@@ -51,6 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", metavar="S", help="seconds after which the recording ends by itself")
     parser.add_argument("--tasks", metavar="A,B", help="record scans and states of these tasks only (default: all)")
     parser.add_argument(
+        "--split-mb", metavar="MB", help="begin a new file when one has so many megabytes (1 MB is 10^6 bytes)"
+    )
+    parser.add_argument("--split-s", metavar="S", help="begin a new file each S seconds of rack time")
+    parser.add_argument("--compression", metavar="zstd|lz4|none", help="how the files are compressed (default: zstd)")
+    parser.add_argument(
         "--wait", metavar="S", default=DEFAULT_WAIT_S, help=f"seconds to look for the rack (default: {DEFAULT_WAIT_S})"
     )
 
@@ -59,6 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Record until Ctrl-C, the duration has passed or the rack starts anew; 1 where recording broke off."""
     duration_ns = _seconds("--duration", arguments.duration) if arguments.duration is not None else None
     wait_ns = _seconds("--wait", arguments.wait)
+    storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
+    how = _Storing(storage, split_period(arguments.split_s, "--"), arguments.tasks)
     with stop_signals() as stop:
         domain = prepare_ros()
         own, own_files = _rack(arguments.rack)
@@ -75,12 +84,21 @@ def run(arguments: argparse.Namespace) -> int:
             raise UsageError(str(error)) from error
         session = _Session(recorder, own, domain, stop)
         try:
-            return session.record(folder, wait_ns, duration_ns, arguments.tasks, own_files)
+            return session.record(folder, wait_ns, duration_ns, how, own_files)
         except BagError as error:
             print(error, file=sys.stderr)
             return 2
         finally:
             recorder.close()
+
+
+@dataclass(frozen=True)
+class _Storing:
+    """How the recording is stored, and the tasks that the person named."""
+
+    storage: StorageOptions
+    split_ns: int
+    tasks: str | None
 
 
 class _Session:
@@ -94,16 +112,16 @@ class _Session:
         self._next_presence = 0.0
 
     def record(
-        self, folder: Path, wait_ns: int, duration_ns: int | None, tasks: str | None, own_files: list[RackFile]
+        self, folder: Path, wait_ns: int, duration_ns: int | None, how: _Storing, own_files: list[RackFile]
     ) -> int:
         table = self._found(wait_ns)
         if table is None:
             return 0
-        chosen = _chosen(table, tasks)
+        chosen = _chosen(table, how.tasks)
         files = self._files(own_files)
         if self._stop.requested:
             return 0
-        recording = self._recorder.open(folder, files, chosen, StorageOptions(chunk_ns=LIVE_CHUNK_NS))
+        recording = self._recorder.open(folder, files, chosen, how.storage, how.split_ns)
         self._line.message(
             f"rack {table.rack}: {count_of(len(table.variables), 'common variable')}, tasks "
             f"{' '.join(sorted(chosen) if chosen else _tasks(table))}\n"
@@ -190,7 +208,7 @@ class _Session:
             f"{scans * NS_PER_S / passed:.0f} scans/s",
             f"{writes * NS_PER_S / passed:.0f} writes/s",
         ]
-        if recording.wants_image or recording.wants_states:
+        if recording.rests:
             parts.append("waiting for the rack's image or states")
         self._line.show([*parts, count_of(len(recording.gaps), "gap")])
 

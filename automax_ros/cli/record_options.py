@@ -1,4 +1,4 @@
-"""The options of `automax run` that say how a run is recorded."""
+"""The options of `automax run` and `automax record` that say how a run is recorded."""
 
 from __future__ import annotations
 
@@ -51,40 +51,58 @@ def recording_options(arguments: argparse.Namespace, config: RackConfig) -> Reco
     given = [name for name in _NAMES if getattr(arguments, f"record_{name}") not in (None, False)]
     if given and arguments.record is None:
         raise UsageError(f"--record-{given[0].replace('_', '-')} says how to record", "add --record DIR")
-    compression = "zstd" if arguments.record_compression is None else arguments.record_compression
-    if compression not in COMPRESSIONS:
-        hint = did_you_mean(compression, COMPRESSIONS) or f"there are {', '.join(COMPRESSIONS)}"
-        raise UsageError(f"--record-compression: no compression {quoted(compression)}", hint)
-    try:
-        storage = StorageOptions(compression, split_bytes=_split_bytes(arguments.record_split_mb))
-    except ValueError as error:
-        raise UsageError(f"--record-split-mb: {error}") from error
+    storage = storage_options(arguments.record_compression, arguments.record_split_mb, "--record-")
     tasks = _tasks(arguments.record_tasks, config)
-    return RecordingOptions(storage, _split_ns(arguments.record_split_s), tasks, arguments.record_locals)
+    return RecordingOptions(
+        storage, split_period(arguments.record_split_s, "--record-"), tasks, arguments.record_locals
+    )
 
 
-def _split_bytes(text: str | None) -> int:
-    if text is None:
-        return 0
+def storage_options(
+    compression: str | None, split_mb: str | None, prefix: str, chunk_ns: int = NS_PER_S
+) -> StorageOptions:
+    """Return how a recording is stored; ``prefix`` begins the names of the options.
+
+    Raises:
+        UsageError: an unknown compression, or a size out of range.
+    """
+    chosen = "zstd" if compression is None else compression
+    if chosen not in COMPRESSIONS:
+        hint = did_you_mean(chosen, COMPRESSIONS) or f"there are {', '.join(COMPRESSIONS)}"
+        raise UsageError(f"{prefix}compression: no compression {quoted(chosen)}", hint)
     try:
-        size = float(text)
-    except ValueError:
-        raise UsageError(f"--record-split-mb: {quoted(text)} is no number of megabytes") from None
-    if not 0 < size <= _MAX_MB:
-        raise UsageError(f"--record-split-mb: {text} lies outside 0 to {_MAX_MB}")
-    return max(1, round(size * _BYTES_PER_MB))
+        return StorageOptions(chosen, _split_bytes(split_mb, f"{prefix}split-mb"), chunk_ns)
+    except ValueError as error:
+        raise UsageError(f"{prefix}split-mb: {error}") from error
 
 
-def _split_ns(text: str | None) -> int:
+def split_period(text: str | None, prefix: str) -> int:
+    """Return the rack time in ns after which another file begins, 0 for never.
+
+    Raises:
+        UsageError: no time, or too short a one.
+    """
     if text is None:
         return 0
     try:
         period_ns = seconds_ns(text)
     except ValueError as error:
-        raise UsageError(f"--record-split-s: {error}") from error
+        raise UsageError(f"{prefix}split-s: {error}") from error
     if period_ns < MIN_SPLIT_NS:
-        raise UsageError(f"--record-split-s: {text} s is too short", "1 s is the shortest")
+        raise UsageError(f"{prefix}split-s: {text} s is too short", "1 s is the shortest")
     return period_ns
+
+
+def _split_bytes(text: str | None, option: str) -> int:
+    if text is None:
+        return 0
+    try:
+        size = float(text)
+    except ValueError:
+        raise UsageError(f"{option}: {quoted(text)} is no number of megabytes") from None
+    if not 0 < size <= _MAX_MB:
+        raise UsageError(f"{option}: {text} lies outside 0 to {_MAX_MB}")
+    return max(1, round(size * _BYTES_PER_MB))
 
 
 def _tasks(text: str | None, config: RackConfig) -> frozenset[str] | None:

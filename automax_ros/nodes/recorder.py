@@ -128,6 +128,7 @@ class LiveRecorder:
         self._knocks: list[RawSubscription] = []
         self._next_knock = 0
         self._knock_count = 0
+        self._files_begun = 1
 
     def racks(self) -> list[str]:
         """Return the namespaces of the racks that are there."""
@@ -170,15 +171,20 @@ class LiveRecorder:
             raise RackFilesError(str(error)) from error
 
     def open(
-        self, folder: Path, files: list[RackFile], tasks: Collection[str] | None, storage: StorageOptions
+        self,
+        folder: Path,
+        files: list[RackFile],
+        tasks: Collection[str] | None,
+        storage: StorageOptions,
+        split_ns: int = 0,
     ) -> LiveRecording:
-        """Create the bag and subscribe; messages come with ``step``.
+        """Create the bag and subscribe; messages come with ``step``. ``split_ns`` is that of ``LiveRecording``.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.
         """
         self._topics = topics = LiveTopics(self._space, _table(self._table))
-        self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage)
+        self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
         kinds = topics.all
         # The rack answers each new reader of these: an image first, then states and full scans that follow it.
         first = [topics.variables, topics.backplane, *topics.values, topics.snapshot, topics.scans, topics.states]
@@ -197,7 +203,8 @@ class LiveRecorder:
             self._last_due = now
         elif now - self._last_due > HOLD_NS:
             self.recording.flush(now - self._last_due)
-        if now >= self._next_knock:
+        if now >= self._next_knock or self.recording.files_begun > self._files_begun:
+            self._files_begun = self.recording.files_begun
             self._knock(now)
 
     def finish(self) -> None:

@@ -22,6 +22,8 @@ from automax_ros.bags.rack_files import RackFile, files_of
 from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder
+from automax_ros.bags.replay.engine import replay
+from automax_ros.bags.writer import StorageOptions
 from automax_ros.rack.rack import Rack
 
 from .live_racks import build
@@ -174,6 +176,41 @@ def test_late_recording_begins_with_the_image_and_executes_again(wire, tmp_path)
     (tmp_path / "again").mkdir()
     outcome = Reexecution(tmp_path / "bag", tmp_path / "again").execute()
     assert min(outcome.scans.values()) > 250
+
+
+def test_each_file_of_a_split_recording_replays_alone(wire, tmp_path):
+    for _ in range(4):
+        wire.run(1.3)
+        wire.join()
+    recording = recording_of(wire, tmp_path / "bag", split_ns=1_000_000_000)
+    waited = 0
+    for number, (topic, payload) in enumerate(wire.end()):
+        recording.take(topic, number * SENT + 1, payload)
+        waited += recording.wants_image and recording.first_stamp is not None
+    recording.close()
+    assert waited > 100, "the rack is asked for an image when a file is due"
+    assert (recording.gaps, recording.lacks) == ([], [])
+    files = sorted((tmp_path / "bag").glob("*.mcap"))
+    assert len(files) == recording.files_begun == 5
+    whole = replay(tmp_path / "bag")
+    assert whole.identical
+    alone = [replay(file) for file in files[:-1]]
+    assert all(report.identical for report in alone)
+    assert sum(report.scans for report in alone) == whole.scans
+
+
+def test_files_end_by_size(wire, tmp_path):
+    for _ in range(8):
+        wire.run(1.0)
+        wire.join()
+    storage = StorageOptions("none", split_bytes=1 << 16)
+    recording = recording_of(wire, tmp_path / "bag", storage=storage)
+    feed(recording, wire.end())
+    recording.close()
+    sizes = [file.stat().st_size for file in sorted((tmp_path / "bag").glob("*.mcap"))]
+    assert len(sizes) > 2
+    assert min(sizes[:-1]) >= 1 << 16
+    assert replay(tmp_path / "bag").identical
 
 
 def test_image_older_than_the_first_write_is_waited_over(wire, tmp_path):

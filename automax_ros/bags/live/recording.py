@@ -13,14 +13,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import automax_ros
 from automax_ros.bags.cdr import CdrError, decode
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.heads import WriteHead, image_head, scan_head, write_head
+from automax_ros.bags.live.provenance import provenance
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
 from automax_ros.bags.live.tracks import Gap, TaskTrack
 from automax_ros.bags.messages import VariableTable, WriterKind
-from automax_ros.bags.rack_files import RACK_FILE, RackFile, fingerprint
+from automax_ros.bags.rack_files import RACK_FILE, RackFile
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
 
 SETTLE_NS = 1_000_000_000
@@ -29,7 +29,6 @@ MAX_PENDING = 100_000
 """So many messages wait for the next write at most."""
 _SECOND = 1_000_000_000
 _RESTARTED = "the rack was started again"
-_GAPS_NAMED = 20
 _MALFORMED_NAMED = 3
 
 
@@ -48,8 +47,12 @@ class LiveRecording:
         files: Sequence[RackFile] = (),
         tasks: Collection[str] | None = None,
         storage: StorageOptions | None = None,
+        split_ns: int = 0,
     ) -> None:
         """Create the bag with the rack's files in it. ``table`` is the VariableTable, ``tasks`` those to record.
+
+        A further file begins with the first image behind each multiple of ``split_ns`` of rack time, 0 for never, or
+        behind the size that ``storage`` tells; the rack is asked for that image.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.
@@ -76,7 +79,10 @@ class LiveRecording:
         self._proven_ns = 0
         self._open_gap: int | None = None
         self._last_values: dict[str, bytes] = {}
+        self._values_now: dict[str, bytes] = {}
         self._last_sent = 0
+        self.files_begun = 1
+        self._split_ns, self._next_split = split_ns, 0
         self._takers: dict[str, Callable[[str, int, bytes], None]] = {
             topics.variables: self._take_table,
             topics.snapshot: self._take_image,
@@ -97,13 +103,18 @@ class LiveRecording:
 
     @property
     def wants_image(self) -> bool:
-        """Whether recording rests until the rack sends an image."""
-        return not self._recording and self._image is None
+        """Whether recording rests until the rack sends an image, or the next file does."""
+        return self._split_due if self._recording else self._image is None
 
     @property
     def wants_states(self) -> bool:
         """Whether a task waits for a full scan or a state."""
-        return self._recording and not all(track.ready for track in self._tasks.values())
+        return self._recording and not all(track.alone for track in self._tasks.values())
+
+    @property
+    def rests(self) -> bool:
+        """Whether something is not recorded, or could not be replayed, before the rack sends an image or states."""
+        return not self._recording or not all(track.ready for track in self._tasks.values())
 
     @property
     def lacks(self) -> list[str]:
@@ -158,24 +169,11 @@ class LiveRecording:
             except RecordingError as error:
                 self.failure = error
         if self.failure is None:
-            self._writer.custom_data.update(self._custom_data())
+            replayable_s = None if self.replayable_from is None else self.seconds(self.replayable_from)
+            gaps = [f"{self.seconds(gap.stamp):.6f} s: {gap}" for gap in self.gaps]
+            data = provenance(self._facts.rack, self._files, self.lacks, replayable_s, gaps, self.ended)
+            self._writer.custom_data.update(data)
             self._writer.close()
-
-    def _custom_data(self) -> dict[str, str]:
-        data = {"rack": self._facts.rack, "version": automax_ros.__version__, "recorder": "automax record"}
-        lacks = self.lacks
-        if not any("file" in item or "source" in item for item in lacks):
-            data["fingerprint"] = f"{fingerprint(self._files):016x}"
-        if lacks:
-            data["lacks"] = "; ".join(lacks)
-        if self.replayable_from is not None:
-            data["replayable_from_s"] = f"{self.seconds(self.replayable_from):.6f}"
-        if self.gaps:
-            named = [f"{self.seconds(gap.stamp):.6f} s: {gap}" for gap in self.gaps[:_GAPS_NAMED]]
-            data["gaps"] = f"{len(self.gaps)}: " + "; ".join(named)
-        if self.ended is not None:
-            data["ended"] = self.ended
-        return data
 
     def _take_table(self, topic: str, sent_ns: int, payload: bytes) -> None:  # noqa: ARG002
         self._check_run(_decoded(payload).run_id)
@@ -189,6 +187,8 @@ class LiveRecording:
         if self._recording and head.sequence <= self._sequence:
             if head.sequence == self._sequence:
                 self._prove(sent_ns)
+                if self._split_due:
+                    self._split(head.stamp)
                 self._write(topic, sent_ns, head.stamp, payload)
             return
         if self._recording:
@@ -254,6 +254,7 @@ class LiveRecording:
 
     def _record_value(self, topic: str, sent_ns: int, payload: bytes) -> None:
         self.values += 1
+        self._values_now[topic] = payload
         # A value carries no stamp: it belongs to the instant of the message before, or came so much later.
         later = max(0, sent_ns - self._last_sent) if self._last_sent else 0
         self._write(topic, 0, self.last_stamp + (later if later > _SECOND // 1000 else 0), payload)
@@ -326,11 +327,31 @@ class LiveRecording:
         self._recording, self._sequence = True, head.sequence
         if self.first_stamp is None:
             self.first_stamp = head.stamp
+            self._plan_split(head.stamp)
             self._write(self._topics.variables, 0, head.stamp, self._table)
         self._write(self._topics.snapshot, sent_ns, head.stamp, payload)
         for topic, value in self._last_values.items():
             self._record_value(topic, 0, value)
         self._last_values.clear()
+
+    @property
+    def _split_due(self) -> bool:
+        return self._writer.split_due or bool(self._split_ns and self.last_stamp >= self._next_split)
+
+    def _plan_split(self, stamp: int) -> None:
+        origin, period = self._facts.stamp, self._split_ns or 1
+        self._next_split = origin + ((stamp - origin) // period + 1) * period
+
+    def _split(self, stamp: int) -> None:
+        """Begin a further file, with all that is needed to read it alone but the image, which comes next."""
+        self._plan_split(stamp)
+        self._writer.split()
+        self.files_begun += 1
+        self._write(self._topics.variables, 0, stamp, self._table)
+        for topic, payload in self._values_now.items():
+            self._write(topic, 0, stamp, payload)
+        for track in self._tasks.values():
+            track.begin_file()
 
     def _rest(self, stamp: int, missing: int) -> None:
         """Wait for an image: writes did not come."""
