@@ -1,8 +1,9 @@
-"""What recordings cost: encoding, writing, reading, exporting."""
+"""What recordings cost: encoding, writing, reading, exporting, and the share of a rack's time that recording takes."""
 
 from __future__ import annotations
 
 import tempfile
+import time
 import timeit
 from collections.abc import Callable
 from pathlib import Path
@@ -22,9 +23,16 @@ from automax_ros.bags.messages import (
     VariableType,
 )
 from automax_ros.bags.qos import LATCHED, SCAN
+from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.reader import BagReader
-from automax_ros.bags.writer import BagWriter
+from automax_ros.bags.recorder import Recorder, RecordingOptions
+from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack, scans_per_second
 
+RACK = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
+SECONDS = 60
+REPEATS = 5
 MESSAGES = 100_000
 STEP = 5_500_000
 CHANGES = Values((1, 2, 3, 4, 5, 6), (0,) * 6, (1.0, 0.0, -300.0, 4.0, 1.0, 0.125))
@@ -85,7 +93,47 @@ def print_recording(folder: Path) -> None:
     print_rate("export 10 variables to CSV", timeit.timeit(lambda: export_csv(bag, table_file), number=1), size)
 
 
+def run_seconds(folder: Path | None, compression: str = "zstd") -> float:
+    """Return the wall time in seconds of a simulated run of the example rack, with the closing of the bag."""
+    config = load(RACK).config
+    assert config is not None
+    rack = Rack(config)
+    stream = RackStream(rack, rack.fingerprint)
+    began = time.perf_counter()
+    if folder is None:
+        rack.start()
+        rack.run(SECONDS)
+    else:
+        recorder = Recorder(rack, stream, folder, RecordingOptions(StorageOptions(compression)))
+        stream.begin()
+        rack.start()
+        rack.run(SECONDS)
+        stream.end()
+        recorder.close()
+    return time.perf_counter() - began
+
+
+def print_share_of_a_rack(folder: Path) -> None:
+    """Print what recording adds to a simulated run: the best of several runs each."""
+    config = load(RACK).config
+    assert config is not None
+    scans = scans_per_second(Rack(config)) * SECONDS
+    plain = min(run_seconds(None) for _ in range(REPEATS))
+    print(f"example rack, {SECONDS} simulated s: {plain / SECONDS * 1e3:.2f} ms a second without recording")
+    for compression in COMPRESSIONS:
+        bags = [folder / f"rack_{compression}_{number}" for number in range(REPEATS)]
+        taken = min(run_seconds(bag, compression) for bag in bags)
+        size = sum(path.stat().st_size for path in bags[0].iterdir())
+        print(
+            f"  {compression:6}{taken / SECONDS * 1e3:6.2f} ms a second {scans / taken:10,.0f} scans/s"
+            f"{size / scans:7.0f} bytes a scan{size / taken / 1e6:7.1f} MB/s"
+            f"   recording takes {100 * (taken - plain) / taken:.0f} % of the time, wanted: under 20 %;"
+            f" in real time {(taken - plain) / SECONDS * 100:.2f} % of a core"
+        )
+
+
 if __name__ == "__main__":
     print_codec()
     with tempfile.TemporaryDirectory() as name:
         print_recording(Path(name))
+        print_share_of_a_rack(Path(name))

@@ -18,6 +18,7 @@ from typing import Any
 
 from automax_ros.bags.definitions import TIME, Field, message_types
 from automax_ros.bags.messages import CLASSES, NAMES
+from automax_ros.bags.triples import triple_decoder
 
 Message = tuple[Any, ...]
 """An instance of one of the classes of bags/messages.py."""
@@ -78,6 +79,9 @@ def decode(type_name: str, data: bytes) -> Message:
 @functools.cache
 def encoder(type_name: str) -> Callable[[Message], bytes]:
     """The function that turns a message of the type into bytes; a caller in a hurry keeps it."""
+    fields = message_types()[type_name].definition.fields
+    if all(field.kind in _CODES and not field.array for field in fields):
+        return _plain_encoder(type_name, fields)
     steps = tuple(_encode_steps(type_name))
 
     def encode_message(message: Message) -> bytes:
@@ -88,6 +92,20 @@ def encoder(type_name: str) -> Callable[[Message], bytes]:
         except (struct.error, OverflowError, TypeError, AttributeError, UnicodeEncodeError) as error:
             raise CdrError(f"{type_name}: {error}") from error
         return bytes(out)
+
+    return encode_message
+
+
+def _plain_encoder(type_name: str, fields: Sequence[Field]) -> Callable[[Message], bytes]:
+    """The same for a message of nothing but numbers, such as a variable's value."""
+    layout, _ = _padded(len(HEADER), [_CODES[field.kind] for field in fields])
+    pack = struct.Struct(f"<{len(HEADER)}s{layout}").pack
+
+    def encode_message(message: Message) -> bytes:
+        try:
+            return pack(HEADER, *message)
+        except (struct.error, OverflowError, TypeError) as error:
+            raise CdrError(f"{type_name}: {error}") from error
 
     return encode_message
 
@@ -279,7 +297,11 @@ def _decode_steps(type_name: str) -> Iterator[_DecodeStep]:
         if group == "numbers":
             yield _numbers_decoder(fields)
         elif group == "sequences":
-            yield from (_sequence_decoder(_CODES[field.kind], _SIZES[field.kind]) for field in fields)
+            steps = [_sequence_decoder(_CODES[field.kind], _SIZES[field.kind]) for field in fields]
+            if len(steps) == 3:
+                yield triple_decoder([_CODES[field.kind] for field in fields], steps)
+            else:
+                yield from steps
         elif group == "string":
             yield _decode_string
         elif group == "strings":

@@ -8,28 +8,25 @@ and at the end for the rest.
 from __future__ import annotations
 
 import io
+import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, TypeVar
 
-import lz4.frame
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
 
 from automax_ros.bags.errors import BagError
+from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.bags.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Unpacker
 
-MAX_RECORD_BYTES = 64 << 20
-"""Longest record, longest chunk after decompression, and sum of all schemas and channels that is read (decision)."""
-_MAGIC = b"\x89MCAP0\r\n"
-_RECORD_HEAD = struct.Struct("<BQ")
-_MESSAGE_HEAD = struct.Struct("<HIQQ")
-_TRUNCATED_HINT = "the recording was not finished or copied in part; all whole chunks before this place are sound"
-_DAMAGED_HINT = "copy the file again from where it was recorded"
+_FIRST_PRIVATE_OPCODE = 0x80
+"""From here on opcodes belong to others; readers pass over what they do not know."""
+_TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
 
 _Record = TypeVar("_Record")
 
@@ -46,15 +43,28 @@ class RawMessage(NamedTuple):
 
 
 class McapFile:
-    """One mcap file with ROS 2 messages, to be read once."""
+    """One mcap file with ROS 2 messages, to be read once.
+
+    ``chunks``, ``stored_bytes`` and ``unpacked_bytes`` count the chunks read so far and the bytes in them, as they
+    stand in the file and decompressed.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._channels: dict[int, Channel] = {}
-        self._schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.schemas: dict[int, Schema] = {}
         self._definition_bytes = 0
         self._position = 0
         self._crc = 0
+        self._unpacker = Unpacker(path, 0)
+        self.chunks = 0
+        self.stored_bytes = 0
+        self.unpacked_bytes = 0
+
+    @property
+    def position(self) -> int:
+        """How many bytes of the file are read."""
+        return self._position
 
     def records(self, *, messages: bool = True) -> Iterator[RawMessage | Attachment | Metadata]:
         """Return messages (if wanted), attachments and metadata in the order of the file.
@@ -64,6 +74,7 @@ class McapFile:
         """
         try:
             with self.path.open("rb") as file:
+                self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
                 yield from self._records(file, messages)
         except OSError as error:
             raise BagError("AMX6810", self.path, f"cannot be read: {error.strerror or error}") from error
@@ -71,11 +82,11 @@ class McapFile:
             raise BagError("AMX6814", self.path, "not enough memory for a record of this file") from error
 
     def _records(self, file: BinaryIO, messages: bool) -> Iterator[RawMessage | Attachment | Metadata]:
-        if file.read(len(_MAGIC)) != _MAGIC:
+        if file.read(len(MAGIC)) != MAGIC:
             raise BagError(
                 "AMX6810", self.path, "is not an mcap file", "give the folder or the .mcap file of a recording"
             )
-        self._position, self._crc = len(_MAGIC), zlib.crc32(_MAGIC)
+        self._position, self._crc = len(MAGIC), zlib.crc32(MAGIC)
         self._check_header(*self._next_record(file)[1:])
         while True:
             crc_before, opcode, content = self._next_record(file)
@@ -106,16 +117,16 @@ class McapFile:
         while opcode != Opcode.FOOTER:
             crc_before, opcode, content = self._next_record(file)
         expected = self._parsed(Footer.read, content).summary_crc
-        covered = _RECORD_HEAD.pack(opcode, len(content)) + content[: -len(b"crc4")]
+        covered = RECORD_HEAD.pack(opcode, len(content)) + content[: -len(b"crc4")]
         self._check_crc(expected, zlib.crc32(covered, crc_before), "the summary")
-        if file.read(len(_MAGIC) + 1) != _MAGIC:
+        if file.read(len(MAGIC) + 1) != MAGIC:
             raise self._damaged("the closing mark is missing or does not end the file")
 
     def _next_record(self, file: BinaryIO) -> tuple[int, int, bytes]:
         """Read a record: the checksum of all before it, its opcode and its content."""
         crc = self._crc
-        head = self._read(file, _RECORD_HEAD.size)
-        opcode, length = _RECORD_HEAD.unpack(head)
+        head = self._read(file, RECORD_HEAD.size)
+        opcode, length = RECORD_HEAD.unpack(head)
         if length > MAX_RECORD_BYTES:
             raise self._too_large(f"a record of {length} bytes, at most {MAX_RECORD_BYTES} are read")
         return crc, opcode, self._read(file, length)
@@ -155,36 +166,44 @@ class McapFile:
         """Take over a schema or channel; files may repeat them, the first one counts."""
         if opcode == Opcode.SCHEMA:
             schema = self._parsed(Schema.read, content)
-            if schema.id in self._schemas:
+            if schema.id in self.schemas:
                 return
-            self._schemas[schema.id] = schema
+            self.schemas[schema.id] = schema
         else:
             channel = self._parsed(Channel.read, content)
-            if channel.id in self._channels:
+            if channel.id in self.channels:
                 return
-            self._channels[channel.id] = channel
+            self.channels[channel.id] = channel
         self._definition_bytes += len(content)
         if self._definition_bytes > MAX_RECORD_BYTES:
             raise self._too_large(f"schemas and channels of more than {MAX_RECORD_BYTES} bytes")
 
     def _message(self, content: bytes) -> RawMessage:
-        if len(content) < _MESSAGE_HEAD.size:
+        if len(content) < MESSAGE_FIELDS.size:
             raise self._damaged(f"a message record of {len(content)} bytes")
-        number, sequence, log_time, publish_time = _MESSAGE_HEAD.unpack_from(content)
-        channel = self._channels.get(number)
+        number, sequence, log_time, publish_time = MESSAGE_FIELDS.unpack_from(content)
+        channel = self.channels.get(number)
         if channel is None:
             raise self._damaged(f"a message on channel {number}, which is not defined")
-        schema = self._schemas.get(channel.schema_id)
-        return RawMessage(channel, schema, sequence, log_time, publish_time, content[_MESSAGE_HEAD.size :])
+        schema = self.schemas.get(channel.schema_id)
+        return RawMessage(channel, schema, sequence, log_time, publish_time, content[MESSAGE_FIELDS.size :])
 
     def _chunk_messages(self, chunk: Chunk) -> Iterator[RawMessage]:
-        data = self._decompressed(chunk)
+        try:
+            data = self._unpacker.unpacked(chunk)
+        except BagError as error:
+            raise BagError(
+                error.code, self.path, f"{error.message} (before byte {self._position})", error.hint
+            ) from error
+        self.chunks += 1
+        self.stored_bytes += len(chunk.data)
+        self.unpacked_bytes += len(data)
         position = 0
         while position < len(data):
-            start = position + _RECORD_HEAD.size
+            start = position + RECORD_HEAD.size
             if start > len(data):
                 raise self._damaged("a chunk ends inside a record")
-            opcode, length = _RECORD_HEAD.unpack_from(data, position)
+            opcode, length = RECORD_HEAD.unpack_from(data, position)
             position = start + length
             if position > len(data):
                 raise self._damaged(f"a record of {length} bytes in the last {len(data) - start} bytes of a chunk")
@@ -192,36 +211,11 @@ class McapFile:
                 yield self._message(data[start:position])
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._define(opcode, data[start:position])
-
-    def _decompressed(self, chunk: Chunk) -> bytes:
-        size = chunk.uncompressed_size
-        if size > MAX_RECORD_BYTES:
-            raise self._too_large(f"a chunk of {size} bytes, at most {MAX_RECORD_BYTES} are read")
-        try:
-            data = self._unpacked(chunk.compression, chunk.data, size)
-        except (zstandard.ZstdError, RuntimeError, EOFError) as error:  # lz4 raises RuntimeError
-            raise self._damaged(f"a chunk cannot be decompressed: {error}") from error
-        if len(data) != size:
-            raise self._damaged(f"a chunk has {len(data)} bytes and should have {size}")
-        self._check_crc(chunk.uncompressed_crc, zlib.crc32(data), "a chunk")
-        return data
-
-    def _unpacked(self, compression: str, data: bytes, size: int) -> bytes:
-        if not compression:
-            return data
-        if compression == "lz4":
-            unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-            return unpacked
-        if compression != "zstd":
-            raise BagError("AMX6811", self.path, f"is compressed with {compression[:40]!r}; zstd and lz4 can be read")
-        # zstandard allocates what the frame states, so that has to be looked at too.
-        stated = zstandard.get_frame_parameters(data).content_size
-        if stated not in (size, zstandard.CONTENTSIZE_UNKNOWN):
-            raise self._damaged(f"a chunk holds {stated} bytes and should hold {size}")
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size) if size else b""
+            elif opcode < _FIRST_PRIVATE_OPCODE:
+                raise self._damaged(f"a record of kind {opcode} inside a chunk")
 
     def _too_large(self, message: str) -> BagError:
         return BagError("AMX6814", self.path, message)
 
     def _damaged(self, message: str) -> BagError:
-        return BagError("AMX6813", self.path, f"{message} (before byte {self._position})", _DAMAGED_HINT)
+        return BagError("AMX6813", self.path, f"{message} (before byte {self._position})", DAMAGED_HINT)

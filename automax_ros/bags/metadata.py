@@ -10,7 +10,6 @@ import yaml
 
 VERSION = 9
 ROS_DISTRO = "jazzy"
-DATA_FILE = "scans_0.mcap"
 METADATA_FILE = "metadata.yaml"
 
 
@@ -33,26 +32,34 @@ class TopicSummary:
 
 
 @dataclass(frozen=True)
-class BagMetadata:
-    """What a recording holds; times in nanoseconds."""
+class FileSummary:
+    """One data file of a recording; times in nanoseconds."""
 
+    name: str
     starting_time: int
     duration: int
     message_count: int
+
+
+@dataclass(frozen=True)
+class BagMetadata:
+    """What a recording holds: its data files in the order of time, at least one, and its topics."""
+
+    files: Sequence[FileSummary]
     topics: Sequence[TopicSummary] = ()
     custom_data: Mapping[str, str] = field(default_factory=dict)
-    data_files: Sequence[str] = (DATA_FILE,)
 
     def information(self) -> dict[str, Any]:
         """The fields of ``rosbag2_bagfile_information``, in the order in which rosbag2 writes them."""
-        starting_time = {"nanoseconds_since_epoch": self.starting_time}
-        duration = {"nanoseconds": self.duration}
+        filled = [file for file in self.files if file.message_count] or self.files[:1]
+        start = min(file.starting_time for file in filled)
+        end = max(file.starting_time + file.duration for file in filled)
         return {
             "version": VERSION,
             "storage_identifier": "mcap",
-            "duration": duration,
-            "starting_time": starting_time,
-            "message_count": self.message_count,
+            "duration": {"nanoseconds": end - start},
+            "starting_time": {"nanoseconds_since_epoch": start},
+            "message_count": sum(file.message_count for file in self.files),
             "topics_with_message_count": [
                 {
                     "topic_metadata": {
@@ -68,19 +75,24 @@ class BagMetadata:
             ],
             "compression_format": "",
             "compression_mode": "",
-            "relative_file_paths": list(self.data_files),
+            "relative_file_paths": [file.name for file in self.files],
             "files": [
                 {
-                    "path": name,
-                    "starting_time": starting_time,
-                    "duration": duration,
-                    "message_count": self.message_count,
+                    "path": file.name,
+                    "starting_time": {"nanoseconds_since_epoch": file.starting_time},
+                    "duration": {"nanoseconds": file.duration},
+                    "message_count": file.message_count,
                 }
-                for name in self.data_files
+                for file in self.files
             ],
             "custom_data": dict(sorted(self.custom_data.items())),
             "ros_distro": ROS_DISTRO,
         }
+
+
+def data_file_name(number: int) -> str:
+    """Return the name of a data file by its number from 0."""
+    return f"scans_{number}.mcap"
 
 
 def yaml_text(data: object) -> str:

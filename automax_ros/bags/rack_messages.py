@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from itertools import groupby
-from operator import itemgetter
+from itertools import compress, groupby
+from operator import itemgetter, ne
 from typing import Any
 
 from automax_ros.bags.messages import (
@@ -65,6 +65,12 @@ _ARRAYS: dict[DataType, Any] = {
 """The classes of arrays' topics: each takes the layout and the values. std_msgs has none for strings."""
 _ENTRY = itemgetter(4, 5, 6)
 """View, element and value of an entry of the write log."""
+_new = tuple.__new__
+"""Makes a message of a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
+_MOST = 0xFFFFFFFF
+"""The greatest uint32."""
+_GROUP = itemgetter(1, 2, 3)
+"""Time, writer and kind of an entry: those that have them in common travel together."""
 
 
 def values_of(entries: Sequence[tuple[int, int, Value]]) -> Values:
@@ -72,9 +78,14 @@ def values_of(entries: Sequence[tuple[int, int, Value]]) -> Values:
     if not entries:
         return NO_VALUES
     variables, elements, values = zip(*entries, strict=True)
-    texts = [value for value in values if isinstance(value, str)]
-    numbers = [0.0 if isinstance(value, str) else value for value in values] if texts else values
-    return Values(variables, elements, numbers, texts)
+    return _values(variables, elements, values)
+
+
+def _values(variables: Sequence[int], elements: Sequence[int], values: Sequence[Value]) -> Values:
+    if str not in map(type, values):
+        return _new(Values, (variables, elements, values, ()))
+    numbers = [0.0 if isinstance(value, str) else value for value in values]
+    return Values(variables, elements, numbers, [value for value in values if isinstance(value, str)])
 
 
 def value_type_name(variable: CommonVariable) -> str | None:
@@ -104,6 +115,19 @@ def _layout(dimensions: tuple[int, ...]) -> MultiArrayLayout:
     return MultiArrayLayout(parts, 0)
 
 
+class _TaskFacts:
+    """What every message of a task repeats, and what it latched last."""
+
+    def __init__(self, task: Task) -> None:
+        layout = task.layout
+        self.name, self.slot = task.name, task.slot
+        self.views = tuple(task.memory.view(name) for name in task.compiled.latched)
+        self.layout_hash, self.source_hash = layout.hash, task.compiled.program.source_hash
+        self.fields = [field.name for field in layout.fields]
+        self.sizes = [field.size for field in layout.fields]
+        self.latched: Latched | None = None
+
+
 class RackMessages:
     """Makes the messages of one run of a rack.
 
@@ -118,12 +142,11 @@ class RackMessages:
         self.epoch_ns = 0
         self._sequence = 0
         self._slots = {writer.id: writer.slot for writer in rack.writers}
-        self._latched: dict[str, Latched] = {}
         image = rack.memory.image()
         self._image_variables = [view for view, _, _ in image]
         self._image_elements = [element for _, element, _ in image]
         self._text_positions = [position for position, entry in enumerate(image) if isinstance(entry[2], str)]
-        self._views = {task.name: [rack.memory.view(name) for name in task.compiled.latched] for task in rack.tasks}
+        self._tasks = {task: _TaskFacts(task) for task in rack.tasks}
 
     def stamp(self, now_ns: int) -> int:
         """Return the stamp of an instant of rack time."""
@@ -170,65 +193,73 @@ class RackMessages:
 
     def writes(self, writes: Sequence[Write]) -> list[CommonWrite]:
         """Return entries of the write log, those of one writer, kind and instant together."""
-        messages = []
-        for (time_ns, writer, kind), group in groupby(writes, key=itemgetter(1, 2, 3)):
-            self._sequence += 1
-            messages.append(
-                CommonWrite(
-                    self.stamp(time_ns),
-                    self._run_id,
-                    writer,
-                    self._slots[writer],
-                    kind,
-                    self._sequence,
-                    values_of([_ENTRY(entry) for entry in group]),
-                )
-            )
-        return messages
+        if len(set(map(_GROUP, writes))) == 1:
+            return [self._write(_GROUP(writes[0]), map(_ENTRY, writes))]
+        return [self._write(key, map(_ENTRY, entries)) for key, entries in groupby(writes, key=_GROUP)]
+
+    def _write(self, key: tuple[int, int, int], entries: Iterable[tuple[int, int, Value]]) -> CommonWrite:
+        time_ns, writer, kind = key
+        self._sequence += 1
+        variables, elements, values = zip(*entries, strict=True)
+        fields = (
+            self.epoch_ns + time_ns,
+            self._run_id,
+            writer,
+            self._slots[writer],
+            int(kind),
+            self._sequence,
+            _values(variables, elements, values),
+        )
+        return _new(CommonWrite, fields)
 
     def scan(self, task: Task, record: ScanRecord, *, full: bool) -> Scan:
         """Return the message of a scan; unless ``full``, only what was latched anew since the task's last message."""
-        name = task.name
-        latched, before = record.latched, self._latched.get(name)
-        if record.scan:
-            self._latched[name] = latched
-        full = full or before is None
-        views = self._views[name]
+        known = self._tasks[task]
+        latched, before, views = record.latched, known.latched, known.views
+        known.latched = latched if record.scan else None
+        full = full or before is None or not record.scan
+        changed = NO_VALUES
         if full or before is None:
-            changed = [(view, 0, value) for view, value in zip(views, latched, strict=False)]
-        elif latched == before:
-            changed = []
-        else:
-            triples = zip(views, latched, before, strict=True)
-            changed = [(view, 0, value) for view, value, old in triples if value != old]
-        return Scan(
-            self.stamp(record.time_ns),
-            task.slot,
-            name,
+            if latched:
+                changed = _values(views, (0,) * len(views), latched)
+        elif latched != before:
+            differs = list(map(ne, latched, before))
+            changed = _values(tuple(compress(views, differs)), (0,) * sum(differs), tuple(compress(latched, differs)))
+        committed = NO_VALUES
+        if record.commits:
+            variables, values = zip(*record.commits, strict=True)
+            committed = _values(variables, (0,) * len(variables), values)
+        reads, writes, errors = record.reads, record.writes, record.errors
+        duration, skipped = record.duration_ns, record.skipped
+        fields = (
+            self.epoch_ns + record.time_ns,
+            known.slot,
+            known.name,
             record.scan,
-            min(record.duration_ns, 0xFFFFFFFF),
-            min(record.skipped, 0xFFFFFFFF),
+            duration if duration <= _MOST else _MOST,
+            skipped if skipped <= _MOST else _MOST,
             full,
-            values_of(changed),
-            values_of(record.reads),
-            values_of(record.writes),
-            values_of([(view, 0, value) for view, value in record.commits]),
-            [ScanError(line, code) for line, code in record.errors],
+            changed,
+            values_of(reads) if reads else NO_VALUES,
+            values_of(writes) if writes else NO_VALUES,
+            committed,
+            [ScanError(line, code) for line, code in errors] if errors else (),
         )
+        return _new(Scan, fields)
 
     def state(self, task: Task, now_ns: int) -> TaskState:
         """Return a snapshot of a task's state."""
-        layout = task.layout
+        known = self._tasks[task]
         values = task.snapshot()
         return TaskState(
             self.stamp(now_ns),
-            task.slot,
-            task.name,
+            known.slot,
+            known.name,
             task.scan_number,
-            layout.hash,
-            task.compiled.program.source_hash,
-            [field.name for field in layout.fields],
-            [field.size for field in layout.fields],
+            known.layout_hash,
+            known.source_hash,
+            known.fields,
+            known.sizes,
             [0.0 if isinstance(value, str) else float(value) for value in values],
             [value for value in values if isinstance(value, str)],
         )

@@ -6,7 +6,7 @@ more often than a variable's rate limit allows; the last value before a pause al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,6 +14,7 @@ from automax_ros.bags.cdr import encoder
 from automax_ros.bags.messages import NAMES
 from automax_ros.bags.qos import LATCHED, SCAN, VALUE, QosProfile
 from automax_ros.bags.rack_messages import Message, RackMessages, message_maker, value_type_name
+from automax_ros.bags.scan_encoding import scan_encoder, write_encoder
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
@@ -57,6 +58,17 @@ class _ValueTopic:
         self.waits = False
 
 
+class _TaskStream:
+    """What of one task goes where: its scans and states to ``sinks``, a state behind each scan to ``watchers``."""
+
+    def __init__(self, scans: Topic, states: Topic) -> None:
+        self.scans = scans
+        self.states = states
+        self.sinks: list[Sink] = []
+        self.watchers: list[Sink] = []
+        self.next_full_ns = 0
+
+
 class RackStream:
     """Observes a rack and streams it to ``sinks``. ``run_id`` is that of ``RackMessages``."""
 
@@ -75,8 +87,12 @@ class RackStream:
         }
         self._values = self._value_topics(space)
         self._sinks: list[Sink] = []
+        self._tasks = {
+            task: _TaskStream(self.scans_topics[task.slot], self.states_topics[task.slot]) for task in rack.tasks
+        }
         self._encoders = {name: encoder(name) for name in NAMES.values() if name.startswith("automax_msgs/")}
-        self._next_snapshot: dict[str, int] = {}
+        self._encode_scan, self._encode_write = scan_encoder(), write_encoder()
+        self._next_image_ns = SNAPSHOT_PERIOD_NS
         self._begun = False
 
     @property
@@ -95,9 +111,21 @@ class RackStream:
         value = self._values.get(view)
         return value.topic if value else None
 
-    def add_sink(self, sink: Sink) -> None:
-        """Hand every message to a further taker."""
+    def add_sink(self, sink: Sink, *, tasks: Collection[str] | None = None, every_state: bool = False) -> None:
+        """Hand every message to a further taker.
+
+        With ``tasks`` it gets scans and states of these alone, with ``every_state`` a state behind each of these scans.
+        """
         self._sinks.append(sink)
+        for task, stream in self._tasks.items():
+            if tasks is None or task.name in tasks:
+                stream.sinks.append(sink)
+                if every_state:
+                    stream.watchers.append(sink)
+
+    def stamp(self, now_ns: int) -> int:
+        """Return the stamp of an instant of rack time."""
+        return self._messages.stamp(now_ns)
 
     def begin(self, epoch_ns: int = 0) -> None:
         """Send the facts that stand at the start, and observe the rack: to be called just before ``Rack.start``.
@@ -116,6 +144,30 @@ class RackStream:
         if self._begun:
             self._send_image(self._rack.now_ns)
 
+    def send_states(self, slot: int) -> None:
+        """Send the states of a Processor's tasks, for somebody who joins; the next scan of each is a full one."""
+        now = self._rack.now_ns
+        for task, stream in self._tasks.items():
+            if self._begun and task.slot == slot:
+                self._send_state(task, now)
+                stream.next_full_ns = now
+
+    def repeat_facts(self, sink: Sink) -> None:
+        """Send one taker what stands now, between two scans: table, image, values of commons, states of its tasks.
+
+        The next scan of each task is a full one. So a recording can begin here, or a further file of one.
+        """
+        now = self._rack.now_ns
+        self._put(self.variables_topic, self._messages.stamp(now), self._messages.table(), [sink])
+        self._send_image(now, [sink])
+        for value in self._values.values():
+            if value.last_payload:
+                sink(value.topic, self._messages.stamp(now), value.last_payload)
+        for task, stream in self._tasks.items():
+            stream.next_full_ns = now
+            if sink in stream.sinks:
+                self._send_state(task, now, [sink])
+
     def end(self) -> None:
         """Send what is held back by rate limits and the final states."""
         now = self._rack.now_ns
@@ -129,18 +181,24 @@ class RackStream:
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
         """Send a scan, its writes and the values that changed; every now and then a snapshot behind them."""
+        stream = self._tasks[task]
         now = record.time_ns
-        full = now >= self._next_snapshot.get(task.name, 0) and record.scan > 0
-        message = self._messages.scan(task, record, full=full)
-        self._put(self.scans_topics[task.slot], message.stamp, message)
+        full = now >= stream.next_full_ns and record.scan > 0
+        if stream.sinks:
+            message = self._messages.scan(task, record, full=full)
+            payload = self._encode_scan(message)
+            for sink in stream.sinks:
+                sink(stream.scans, message[0], payload)
         if writes:
             self._send_writes(writes, now)
         if full or not record.scan:
             self._send_state(task, now)
+        elif stream.watchers:
+            self._send_state(task, now, stream.watchers)
         if full:
-            self._next_snapshot[task.name] = (now // SNAPSHOT_PERIOD_NS + 1) * SNAPSHOT_PERIOD_NS
-            if now >= self._next_snapshot.get("", SNAPSHOT_PERIOD_NS):
-                self._next_snapshot[""] = self._next_snapshot[task.name]
+            stream.next_full_ns = (now // SNAPSHOT_PERIOD_NS + 1) * SNAPSHOT_PERIOD_NS
+            if now >= self._next_image_ns:
+                self._next_image_ns = stream.next_full_ns
                 self._send_image(now)
 
     def written(self, writes: list[Write]) -> None:
@@ -166,17 +224,22 @@ class RackStream:
                 topics[view] = _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
         return topics
 
-    def _send_state(self, task: Task, now_ns: int) -> None:
-        message = self._messages.state(task, now_ns)
-        self._put(self.states_topics[task.slot], message.stamp, message)
+    def _send_state(self, task: Task, now_ns: int, sinks: Sequence[Sink] | None = None) -> None:
+        stream = self._tasks[task]
+        takers = stream.sinks if sinks is None else sinks
+        if takers:
+            message = self._messages.state(task, now_ns)
+            self._put(stream.states, message.stamp, message, takers)
 
-    def _send_image(self, now_ns: int) -> None:
-        self._put(self.snapshot_topic, self._messages.stamp(now_ns), self._messages.image(now_ns))
+    def _send_image(self, now_ns: int, sinks: Sequence[Sink] | None = None) -> None:
+        self._put(self.snapshot_topic, self._messages.stamp(now_ns), self._messages.image(now_ns), sinks)
 
     def _send_writes(self, writes: list[Write], now_ns: int) -> None:
         for message in self._messages.writes(writes):
-            self._put(self.backplane_topic, message.stamp, message)
-        self._send_values({entry.view: None for entry in writes}, now_ns)
+            payload = self._encode_write(message)
+            for sink in self._sinks:
+                sink(self.backplane_topic, message[0], payload)
+        self._send_values({entry[4]: None for entry in writes}, now_ns)
 
     def _send_values(self, views: Iterable[int], now_ns: int) -> None:
         for view in views:
@@ -197,14 +260,16 @@ class RackStream:
 
     def _send_value(self, view: int, value: _ValueTopic, now_ns: int) -> None:
         value.waits = False
-        payload = value.encode(value.make(self._rack.memory.present(view)))
+        present = self._rack.memory.present(view)
+        # A message of a simple variable has one field: a plain tuple is as good, and cheaper.
+        payload = value.encode(value.make(present) if value.variable.is_array else (present,))
         if payload != value.last_payload:
             value.last_ns, value.last_payload = now_ns, payload
             stamp = self._messages.stamp(now_ns)
             for sink in self._sinks:
                 sink(value.topic, stamp, payload)
 
-    def _put(self, topic: Topic, stamp: int, message: Message) -> None:
+    def _put(self, topic: Topic, stamp: int, message: Message, sinks: Sequence[Sink] | None = None) -> None:
         payload = self._encoders[topic.type_name](message)
-        for sink in self._sinks:
+        for sink in self._sinks if sinks is None else sinks:
             sink(topic, stamp, payload)

@@ -19,6 +19,8 @@ MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read (decision)."""
 _MAX_YAML_DEPTH = 16
 _MAX_FILES = 10_000
+_PROGRESS_MASK = 0x3FF
+"""Progress is told once in so many records."""
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 """Leaves every scalar a string: numbers and dates of a hostile file cost nothing."""
 _NO_BAG_HINT = "give the folder of a recording, which holds metadata.yaml, or one .mcap file"
@@ -40,7 +42,9 @@ class BagMessage(NamedTuple):
 class BagReader:
     """A recording: a rosbag2 folder or one .mcap file. It may be read any number of times, always as a stream.
 
-    ``custom_data`` is what the recorder wrote into metadata.yaml (empty for a single file).
+    ``custom_data`` is what the recorder wrote into metadata.yaml (empty for a single file). ``on_progress``, if set, is
+    called now and then while messages are read, with the share of all bytes that is read by then (0 to 1).
+    ``last_stamp`` is the stamp of the message read last, be it wanted or not; None before the first.
 
     Raises:
         BagError: there is no recording at the path, or its metadata.yaml cannot be used.
@@ -49,8 +53,10 @@ class BagReader:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.custom_data: dict[str, str] = {}
+        self.on_progress: Callable[[float], None] | None = None
+        self.last_stamp: int | None = None
         if path.is_dir():
-            information = _information(path)
+            information = read_information(path)
             self.files = _data_files(path, information)
             custom = information.get("custom_data")
             if isinstance(custom, dict):
@@ -69,11 +75,17 @@ class BagReader:
             BagError: the recording is truncated, damaged or beyond the limits, or holds a wanted message of a type that
                 we do not know or that was recorded with another definition.
         """
+        total = sum(size_of(file) for file in self.files)
+        before = 0
         for file in self.files:
             channels: dict[int, _ChannelReader] = {}
-            for record in McapFile(file).records():
+            data = McapFile(file)
+            for number, record in enumerate(data.records()):
+                if not number & _PROGRESS_MASK and self.on_progress is not None:
+                    self.on_progress(min(1.0, (before + data.position) / total))
                 if not isinstance(record, RawMessage):
                     continue
+                self.last_stamp = record.publish_time
                 channel = channels.get(record.channel.id)
                 if channel is None:
                     wanted = _is_wanted(record, topics, types)
@@ -82,6 +94,7 @@ class BagReader:
                     yield BagMessage(
                         channel.topic, channel.type_name, record.publish_time, record.log_time, channel.decoded(record)
                     )
+            before += data.position
 
     def attachments(self) -> Iterator[Attachment]:
         """Return the files stored in the recording; messages are not unpacked.
@@ -133,6 +146,14 @@ class _ChannelReader:
             ) from error
 
 
+def size_of(file: Path) -> int:
+    """Return the size of a file in bytes, at least 1; 1 if the system does not tell."""
+    try:
+        return max(1, file.stat().st_size)
+    except OSError:
+        return 1
+
+
 def _is_wanted(record: RawMessage, topics: Collection[str] | None, types: Collection[str] | None) -> bool:
     type_name = record.schema.name if record.schema else ""
     return (topics is None or record.channel.topic in topics) and (types is None or type_name in types)
@@ -172,22 +193,27 @@ def _check_schema(file: Path, topic: str, schema: Schema | None) -> None:
         )
 
 
-def _information(folder: Path) -> dict[str, Any]:
-    """The content of metadata.yaml, checked as far as it is used."""
+def read_information(folder: Path) -> dict[str, Any]:
+    """Return the content of a folder's metadata.yaml, checked as far as it is used; all scalars are strings.
+
+    Raises:
+        BagError: it is not there, cannot be read, or describes no mcap files.
+    """
     path = folder / METADATA_FILE
     try:
         with path.open("rb") as file:
             text = file.read(MAX_METADATA_BYTES + 1)
     except FileNotFoundError:
         hint = (
-            "the recording was not finished, or this is another folder; a single .mcap file can be read by its own name"
+            "the recording was not finished: `automax bag repair` completes it; or this is another folder; "
+            "a single .mcap file can be read by its own name"
         )
         raise BagError("AMX6810", folder, "has no metadata.yaml", hint) from None
     except OSError as error:
         raise BagError("AMX6810", path, f"cannot be read: {error.strerror or error}") from error
     if len(text) > MAX_METADATA_BYTES:
         raise BagError("AMX6814", path, f"is longer than {MAX_METADATA_BYTES} bytes")
-    data = _load_yaml(path, text)
+    data = load_yaml(path, text)
     information = data.get("rosbag2_bagfile_information") if isinstance(data, dict) else None
     if not isinstance(information, dict):
         raise BagError("AMX6813", path, "does not describe a recording (rosbag2_bagfile_information is missing)")
@@ -198,8 +224,12 @@ def _information(folder: Path) -> dict[str, Any]:
     return information
 
 
-def _load_yaml(path: Path, text: bytes) -> Any:
-    """Load YAML without aliases and of bounded depth, which keeps the loader's effort and stack in bounds."""
+def load_yaml(path: object, text: bytes) -> Any:
+    """Load YAML without aliases and of bounded depth, which keeps the loader's effort and stack in bounds.
+
+    Raises:
+        BagError: it is not YAML of that kind; ``path`` names it.
+    """
     depth = 0
     try:
         for event in yaml.parse(text, Loader=_Loader):

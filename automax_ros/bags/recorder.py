@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import automax_ros
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.rack_stream import RackStream, Topic
-from automax_ros.bags.writer import BagWriter, Channel
+from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
 from automax_ros.rack.rack import Rack
+from automax_ros.runtime.scheduler import EventClass, EventKey
+
+_FIRST = EventKey(EventClass.OUTSIDE, -1, "")
+"""Before everything else of an instant: the rack stands as the instant before has left it."""
+
+
+@dataclass(frozen=True)
+class RecordingOptions:
+    """What is recorded, and into how many files.
+
+    A file ends at each multiple of ``split_ns`` of rack time, 0 for never. ``tasks`` are those whose scans and states
+    are recorded, None for all; common memory is always recorded whole. ``every_state``: a state behind each such scan.
+    """
+
+    storage: StorageOptions = field(default_factory=StorageOptions)
+    split_ns: int = 0
+    tasks: frozenset[str] | None = None
+    every_state: bool = False
 
 
 class Recorder:
@@ -17,13 +36,15 @@ class Recorder:
     When the disk refuses, recording ends and ``failure`` tells why; the rack goes on.
     """
 
-    def __init__(self, rack: Rack, stream: RackStream, folder: Path) -> None:
+    def __init__(self, rack: Rack, stream: RackStream, folder: Path, options: RecordingOptions | None = None) -> None:
         """Create the bag and take part in the stream.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.
         """
         self.failure: RecordingError | None = None
+        self._rack, self._stream = rack, stream
+        options = options or RecordingOptions()
         config = rack.config
         self._writer = BagWriter(
             folder,
@@ -32,6 +53,7 @@ class Recorder:
                 "version": automax_ros.__version__,
                 "fingerprint": f"{rack.fingerprint:016x}",
             },
+            options=options.storage,
         )
         self._writer.attach("rack.yaml", "application/yaml", config.text.encode())
         for name, source in rack.sources.items():
@@ -39,16 +61,35 @@ class Recorder:
         self._channels: dict[str, Channel] = {
             topic.name: self._writer.channel(topic.name, topic.type_name, topic.qos) for topic in stream.topics
         }
-        stream.add_sink(self._take)
+        self._split_posted = False
+        self._sink = self._take_and_measure if options.storage.split_bytes else self._take
+        if options.split_ns:
+            first_ns = (rack.now_ns // options.split_ns + 1) * options.split_ns
+            rack.scheduler.every(options.split_ns, first_ns, _FIRST, lambda now_ns, _: self._split(now_ns))
+        stream.add_sink(self._sink, tasks=options.tasks, every_state=options.every_state)
 
-    def close(self) -> None:
-        """Finish the bag.
+    def flush(self, now_ns: int) -> None:
+        """Hand the chunk whose time is over at a rack time to the operating system, though nothing has happened since.
 
-        Raises:
-            RecordingError: the disk refuses.
+        On the wall clock to be called every now and then; in simulated time the next message does it.
         """
         if self.failure is None:
-            self._writer.close()
+            try:
+                self._writer.flush(self._stream.stamp(now_ns))
+            except RecordingError as error:
+                self.failure = error
+
+    def sync(self) -> None:
+        """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
+        self._writer.sync()
+
+    def close(self) -> None:
+        """Finish the bag; a disk that refuses is a ``failure`` as before."""
+        if self.failure is None:
+            try:
+                self._writer.close()
+            except RecordingError as error:
+                self.failure = error
 
     def _take(self, topic: Topic, stamp: int, payload: bytes) -> None:
         if self.failure is not None:
@@ -57,3 +98,20 @@ class Recorder:
             self._writer.write(self._channels[topic.name], stamp, payload)
         except RecordingError as error:
             self.failure = error
+
+    def _take_and_measure(self, topic: Topic, stamp: int, payload: bytes) -> None:
+        self._take(topic, stamp, payload)
+        if self._writer.split_due and not self._split_posted:
+            self._split_posted = True
+            self._rack.scheduler.at(self._rack.now_ns + 1, _FIRST, self._split)
+
+    def _split(self, now_ns: int) -> None:  # noqa: ARG002
+        """Begin the next file: an event of the scheduler, so that no scan is under way."""
+        self._split_posted = False
+        if self.failure is not None:
+            return
+        try:
+            self._writer.split()
+        except RecordingError as error:
+            self.failure = error
+        self._stream.repeat_facts(self._sink)

@@ -23,12 +23,13 @@ class WatchError(ValueError):
 
 @dataclass(frozen=True)
 class Watched:
-    """One column of an export: a simple variable, or the element of an array at a flat index."""
+    """One column of an export: a simple variable, or the element of an array at a flat index; the engineer's unit."""
 
     label: str
     variable: int
     element: int
     kind: VariableType
+    unit: str = ""
 
 
 def checked_table(table: VariableTable) -> dict[str, Variable]:
@@ -53,7 +54,7 @@ def checked_table(table: VariableTable) -> dict[str, Variable]:
 def watched_by_default(variables: dict[str, Variable]) -> list[Watched]:
     """Return all simple numeric and boolean variables, in the order of the table."""
     return [
-        Watched(name, entry.id, 0, VariableType(entry.type))
+        Watched(name, entry.id, 0, VariableType(entry.type), entry.unit)
         for name, entry in variables.items()
         if not entry.dimensions and entry.type != VariableType.STRING
     ]
@@ -78,7 +79,7 @@ def _find(variables: dict[str, Variable], asked: str) -> Watched:
     if match["subscripts"] is None:
         if entry.dimensions:
             raise WatchError(f"{entry.name} is an array", f"name one element, such as {_element_name(entry)}")
-        return Watched(entry.name, entry.id, 0, kind)
+        return Watched(entry.name, entry.id, 0, kind, entry.unit)
     subscripts = [int(text) for text in match["subscripts"].split(",")]
     if not entry.dimensions:
         raise WatchError(f"{entry.name} is not an array", f"write {entry.name}")
@@ -91,7 +92,7 @@ def _find(variables: dict[str, Variable], asked: str) -> Watched:
         if subscript >= size:
             raise WatchError(f"subscript {subscript} of {asked[:80]} is out of range", f"the largest is {size - 1}")
     label = f"{entry.name}({','.join(map(str, subscripts))})"
-    return Watched(label, entry.id, flat_index(subscripts, entry.dimensions), kind)
+    return Watched(label, entry.id, flat_index(subscripts, entry.dimensions), kind, entry.unit)
 
 
 def flat_index(subscripts: Sequence[int], dimensions: Sequence[int]) -> int:

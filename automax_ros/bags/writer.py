@@ -1,40 +1,79 @@
-"""Writes a recording: a folder with ``scans_0.mcap`` and ``metadata.yaml``, as rosbag2 makes them.
+"""Writes a recording: a folder with ``scans_0.mcap``, ... and ``metadata.yaml``, as rosbag2 makes them.
 
 The same messages give the same bytes: nothing depends on the folder's name, the host or the wall clock. Chunks end by
-size or with a simulated second, and reach the operating system when they end, so that a killed process loses little.
+size or with a second, always between two instants, and reach the operating system when they end, so that a killed
+process loses little and no instant by half.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import re
+import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
 
-from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
+from mcap.records import Attachment, Metadata, Schema
+from mcap.records import Channel as ChannelRecord
 
 import automax_ros
 from automax_ros.bags.definitions import message_types, schema_text
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.metadata import DATA_FILE, METADATA_FILE, BagMetadata, TopicSummary, yaml_text
+from automax_ros.bags.mcap_output import ChunkBuilder, McapOutput
+from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary, data_file_name, yaml_text
 from automax_ros.bags.qos import QosProfile
+from automax_ros.core.ticks import NS_PER_S
 
 CHUNK_BYTES = 1 << 20
-"""A chunk ends when it holds more bytes than this, uncompressed."""
+"""A chunk ends before the next instant when it holds more bytes than this, uncompressed."""
+LONGEST_CHUNK_BYTES = 24 << 20
+"""A chunk of more bytes than this ends even inside an instant, so that every reader takes it."""
 MAX_PAYLOAD_BYTES = 32 << 20
 """Longest message and attachment (decision: what our own reader is sure to accept)."""
-MAX_STAMP = (2**31 - 1) * 1_000_000_000
+MAX_STAMP = (2**31 - 1) * NS_PER_S
 """Latest time of a message in nanoseconds: the seconds of a ROS time have 31 bits."""
-_SECOND = 1_000_000_000
+COMPRESSIONS = {"zstd": "zstd", "lz4": "lz4", "none": ""}
+"""How chunks can be compressed: the word for it, and what the file calls it."""
+MIN_SPLIT_BYTES = 1 << 16
+"""Smallest size to split at: a file that holds little more than the facts at its beginning helps nobody (decision)."""
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _MAX_TOPIC = 247
 
 
+@dataclass(frozen=True)
+class StorageOptions:
+    """How a recording is stored.
+
+    ``compression`` is a key of COMPRESSIONS. A file ends when it has ``split_bytes`` bytes, 0 for never. A chunk ends
+    each ``chunk_ns`` of the messages' time: what a killed process loses.
+    """
+
+    compression: str = "zstd"
+    split_bytes: int = 0
+    chunk_ns: int = NS_PER_S
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense.
+
+        Raises:
+            ValueError: an unknown compression, or a size or time out of range.
+        """
+        if self.compression not in COMPRESSIONS:
+            raise ValueError(f"{self.compression!r} is no compression: there are {', '.join(COMPRESSIONS)}")
+        if self.split_bytes and self.split_bytes < MIN_SPLIT_BYTES:
+            raise ValueError(
+                f"files of {self.split_bytes} bytes are too small: at least {MIN_SPLIT_BYTES}, or 0 for no limit"
+            )
+        if self.chunk_ns <= 0:
+            raise ValueError(f"chunks of {self.chunk_ns} ns")
+
+
 class Channel:
-    """One topic of a recording; :meth:`BagWriter.channel` makes them."""
+    """One topic of a recording; :meth:`BagWriter.channel` makes them. ``message_count`` counts over all files."""
 
     __slots__ = ("message_count", "number", "qos", "topic", "type_name")
 
@@ -53,6 +92,7 @@ class _DataFile:
         self.path = path
         self._file = FileIO(path, "xb")
         self._size = 0
+        self._lock = threading.Lock()
 
     def write(self, data: bytes) -> int:
         rest = memoryview(data)
@@ -68,11 +108,19 @@ class _DataFile:
     def tell(self) -> int:
         return self._size
 
-    def flush(self) -> None:
-        """Nothing waits here."""
+    def sync(self) -> None:
+        """Wait until everything has reached the disk itself. May be called from another thread."""
+        with self._lock:
+            descriptor = -1 if self._file.closed else os.dup(self._file.fileno())
+        if descriptor >= 0:
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
 
     def close(self) -> None:
-        self._file.close()
+        with self._lock:
+            self._file.close()
 
 
 class BagWriter:
@@ -80,20 +128,37 @@ class BagWriter:
 
     ``custom_data`` goes into the metadata (provenance: hashes of program and YAML file, version).
 
+    To begin a further file the caller asks ``split_due`` between two instants (or has reasons of its own), calls
+    ``split`` and repeats the facts without which that file could not be read alone.
+
     Raises:
         RecordingError: the folder exists already, or cannot be written.
     """
 
-    def __init__(self, folder: Path, *, custom_data: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        custom_data: Mapping[str, str] | None = None,
+        options: StorageOptions | None = None,
+    ) -> None:
         self.folder = folder
         self.custom_data = dict(custom_data or {})
+        self._options = options or StorageOptions()
         self._channels: dict[str, Channel] = {}
+        self._definitions: list[Schema | ChannelRecord] = []
         self._schemas: dict[str, int] = {}
-        self._first_time: int | None = None
+        self._attachments: list[Attachment] = []
+        self._files: list[FileSummary] = []
+        self._counts_before: dict[str, int] = {}
         self._last_time = -1
-        self._message_count = 0
+        self._stamp: int | None = None
+        """Time of the message before; None when the next one has to be looked at closely."""
         self._chunk_end = 0
         self._open = True
+        self._sync_error: OSError | None = None
+        self._finished: list[Path] = []
+        """Files, and the folder with their names, that ``sync`` has not yet seen to the disk."""
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -106,14 +171,7 @@ class BagWriter:
         except OSError as error:
             raise self._write_error(error) from error
         try:
-            self._file = _DataFile(folder / DATA_FILE)
-            self._mcap = McapWriter(
-                self._file,  # type: ignore[arg-type]  # it needs write, tell and flush, and gets them
-                chunk_size=CHUNK_BYTES,
-                compression=CompressionType.ZSTD,
-                enable_data_crcs=True,
-            )
-            self._mcap.start(profile="ros2", library=f"automax_ros {automax_ros.__version__}")
+            self._begin_file()
         except OSError as error:
             raise self._write_error(error) from error
 
@@ -141,43 +199,38 @@ class BagWriter:
         kind = message_types().get(type_name)
         if kind is None:
             raise self._refusal(f"messages of type {type_name!r} cannot be recorded")
-        metadata = {"offered_qos_profiles": yaml_text([qos.as_yaml_data()]), "topic_type_hash": kind.hash}
         schema = self._schemas.get(type_name)
         if schema is None:
-            schema = self._mcap.register_schema(type_name, "ros2msg", schema_text(type_name).encode())
-            self._schemas[type_name] = schema
-        number = self._mcap.register_channel(topic, "cdr", schema, metadata)
+            schema = self._schemas[type_name] = len(self._schemas) + 1
+            self._define(Schema(id=schema, data=schema_text(type_name).encode(), encoding="ros2msg", name=type_name))
+        metadata = {"offered_qos_profiles": yaml_text([qos.as_yaml_data()]), "topic_type_hash": kind.hash}
+        number = len(self._channels) + 1
+        self._define(ChannelRecord(id=number, topic=topic, message_encoding="cdr", metadata=metadata, schema_id=schema))
         channel = self._channels[topic] = Channel(number, topic, type_name, qos)
         return channel
 
     def write(self, channel: Channel, stamp: int, payload: bytes) -> None:
-        """Add a message (CDR bytes) at a time in nanoseconds.
+        """Add a message (CDR bytes) at a time in nanoseconds; messages of one time belong to one instant.
 
         Its log time is the stamp, or one nanosecond behind the message before if that is later: log times increase.
 
         Raises:
             RecordingError: time or length out of range, writer closed, or the disk refuses.
         """
-        if not 0 <= stamp <= MAX_STAMP or len(payload) > MAX_PAYLOAD_BYTES or not self._open:
-            raise self._bad_message(channel, stamp, payload)
+        if stamp != self._stamp:
+            self._begin_instant(channel, stamp, payload)
         log_time = self._last_time + 1
-        if stamp > log_time or self._first_time is None:
+        if stamp > log_time or not log_time:
             log_time = stamp
-        try:
-            if log_time >= self._chunk_end:
-                self._mcap.flush()  # type: ignore[no-untyped-call]
-                self._chunk_end = (log_time // _SECOND + 1) * _SECOND
-            channel.message_count += 1
-            self._mcap.add_message(channel.number, log_time, payload, stamp, channel.message_count & 0xFFFFFFFF)
-        except OSError as error:
-            raise self._failed(error) from error
-        if self._first_time is None:
-            self._first_time = log_time
+        chunk = self._chunk
+        if len(payload) + len(chunk.data) > LONGEST_CHUNK_BYTES:
+            chunk = self._relieved_chunk(channel, stamp, payload)
+        channel.message_count = count = channel.message_count + 1
+        chunk.add_message(channel.number, count & 0xFFFFFFFF, log_time, stamp, payload)
         self._last_time = log_time
-        self._message_count += 1
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Store a file that belongs to the recording, such as the rack's YAML or a task's source.
+        """Store a file that belongs to the recording, such as the rack's YAML or a task's source; in each data file.
 
         Raises:
             RecordingError: it is too long, the writer is closed, or the disk refuses.
@@ -186,44 +239,150 @@ class BagWriter:
             raise self._refusal(
                 f"attachment {name} of {len(data)} bytes: the limit is {MAX_PAYLOAD_BYTES}, before close()"
             )
+        attachment = Attachment(
+            create_time=0, log_time=max(self._last_time, 0), name=name, media_type=media_type, data=data
+        )
+        self._attachments.append(attachment)
         try:
-            self._mcap.add_attachment(0, max(self._last_time, 0), name, media_type, data)
+            self._mcap.add_attachment(attachment)
         except OSError as error:
             raise self._failed(error) from error
 
+    @property
+    def split_due(self) -> bool:
+        """Whether the file has reached the size at which another one begins; the open chunk does not count."""
+        return 0 < self._options.split_bytes <= self._file.tell()
+
+    def split(self) -> None:
+        """Finish the file and begin the next one, with the same attachments and channels; between two instants only.
+
+        Raises:
+            RecordingError: the writer is closed, or the disk refuses.
+        """
+        if not self._open:
+            raise self._refusal("a new file after the recording was closed")
+        try:
+            self._finish_file()
+            self._begin_file()
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def flush(self, now: int | None = None) -> None:
+        """Hand the open chunk to the operating system; with a time only if the chunk's own time is over by then.
+
+        Raises:
+            RecordingError: the disk refuses.
+        """
+        if self._open and (now is None or now >= self._chunk_end):
+            try:
+                self._end_chunk()
+            except OSError as error:
+                raise self._failed(error) from error
+
+    def sync(self) -> None:
+        """Wait until what was flushed is on the disk itself; from another thread too, for it may take long.
+
+        When the disk refuses, the next ``write`` tells.
+        """
+        try:
+            while self._finished:
+                _sync_path(self._finished.pop())
+            self._file.sync()
+        except OSError as error:
+            self._sync_error = error
+
     def close(self) -> None:
-        """Finish both files. After a failed write only what stands on disk is kept.
+        """Finish the files. After a failed write only what stands on disk is kept.
 
         Raises:
             RecordingError: the disk refuses.
         """
         if not self._open:
             return
-        self._open = False
-        information = self._metadata().information()
+        self._open, self._stamp = False, None
         try:
-            self._mcap.flush()  # type: ignore[no-untyped-call]
-            self._mcap.add_metadata("rosbag2", {"serialized_metadata": yaml_text(information)})
-            self._mcap.finish()  # type: ignore[no-untyped-call]
-            self._file.close()
-            text = yaml_text({"rosbag2_bagfile_information": information})
+            self._finish_file()
+            text = yaml_text({"rosbag2_bagfile_information": self._metadata(self._files).information()})
             (self.folder / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
+            self._finished += [self.folder / METADATA_FILE, self.folder]
         except OSError as error:
             raise self._failed(error) from error
 
-    def _metadata(self) -> BagMetadata:
-        start = self._first_time or 0
+    def _begin_file(self) -> None:
+        self._file = _DataFile(self.folder / data_file_name(len(self._files)))
+        self._finished.append(self.folder)
+        self._mcap = McapOutput(
+            self._file,
+            library=f"automax_ros {automax_ros.__version__}",
+            compression=COMPRESSIONS[self._options.compression],
+        )
+        for attachment in self._attachments:
+            self._mcap.add_attachment(attachment)
+        self._chunk = ChunkBuilder()
+        self._counts_before = {topic: channel.message_count for topic, channel in self._channels.items()}
+        definitions, self._definitions = self._definitions, []
+        for definition in definitions:
+            self._define(definition)
+
+    def _finish_file(self) -> None:
+        """Write what is behind the messages of a file: description, index, summary."""
+        self._end_chunk()
+        statistics = self._mcap.statistics
+        start, end = statistics.message_start_time, statistics.message_end_time
+        summary = FileSummary(self._file.path.name, start, end - start, statistics.message_count)
+        self._files.append(summary)
+        own = self._metadata([summary]).information()
+        self._mcap.add_metadata(Metadata(name="rosbag2", metadata={"serialized_metadata": yaml_text(own)}))
+        self._mcap.finish()
+        self._file.close()
+        self._finished.append(self._file.path)
+
+    def _define(self, record: Schema | ChannelRecord) -> None:
+        """Put a schema or channel into the open chunk, so that it stands before the first message that needs it."""
+        self._definitions.append(record)
+        if isinstance(record, Schema):
+            self._mcap.schemas[record.id] = record
+        else:
+            self._mcap.channels[record.id] = record
+        self._chunk.add_record(record)
+
+    def _begin_instant(self, channel: Channel, stamp: int, payload: bytes) -> None:
+        """End the chunk before a message at another time than the one before, if its time is over or it is full."""
+        if not self._open or not 0 <= stamp <= MAX_STAMP:
+            raise self._bad_message(channel, stamp, payload)
+        if self._sync_error is not None:
+            raise self._failed(self._sync_error)
+        time = max(stamp, self._last_time + 1)
+        if time >= self._chunk_end or len(self._chunk.data) > CHUNK_BYTES:
+            self.flush()
+            period = self._options.chunk_ns
+            self._chunk_end = (time // period + 1) * period
+        self._stamp = stamp
+
+    def _relieved_chunk(self, channel: Channel, stamp: int, payload: bytes) -> ChunkBuilder:
+        """Return an empty chunk for a long message, if it is not too long."""
+        if len(payload) > MAX_PAYLOAD_BYTES:
+            raise self._bad_message(channel, stamp, payload)
+        self.flush()
+        return self._chunk
+
+    def _end_chunk(self) -> None:
+        if self._chunk.index:
+            self._mcap.add_chunk(self._chunk)
+            self._chunk = ChunkBuilder()
+
+    def _metadata(self, files: list[FileSummary]) -> BagMetadata:
+        """Describe the whole recording, or its last file alone."""
+        before = self._counts_before if len(files) < len(self._files) else {}
         return BagMetadata(
-            starting_time=start,
-            duration=max(self._last_time - start, 0),
-            message_count=self._message_count,
+            files=files,
             topics=[
                 TopicSummary(
                     item.topic,
                     item.type_name,
                     message_types()[item.type_name].hash,
                     [item.qos.as_yaml_data()],
-                    item.message_count,
+                    item.message_count - before.get(item.topic, 0),
                 )
                 for item in self._channels.values()
             ],
@@ -243,7 +402,7 @@ class BagWriter:
         return RecordingError("AMX6802", self.folder, message)
 
     def _failed(self, error: OSError) -> RecordingError:
-        self._open = False
+        self._open, self._stamp = False, None
         with contextlib.suppress(OSError):
             self._file.close()
         return self._write_error(error)
@@ -255,3 +414,12 @@ class BagWriter:
             f"cannot write the recording: {error.strerror or error}",
             "check free space and permissions; what was recorded so far is kept",
         )
+
+
+def _sync_path(path: Path) -> None:
+    """Wait until a file or folder is on the disk itself."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,4 +1,8 @@
-"""Write common memory of a recording to a CSV table: one row for each instant at which a watched variable changed."""
+"""Write a recording to a table, as CSV or as NumPy arrays.
+
+Without --scans: common memory, one row for each instant at which a watched variable changed, or every S seconds. With
+--scans TASK: one row for each scan of the task, with what it latched and what it wrote back.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +10,70 @@ import argparse
 import sys
 from pathlib import Path
 
+from automax_ros.bags.columns import Table, require_another_file
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import export_csv
+from automax_ros.bags.export import CommonTable, write_csv
+from automax_ros.bags.scan_table import ScanTable
+from automax_ros.bags.series import Progress
+from automax_ros.cli.progress import share_shown
 from automax_ros.cli.terminal import count_of
+from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
+from automax_ros.cli.window import add_grid_argument, add_window_arguments, window_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax export``."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
-    parser.add_argument("--output", type=Path, required=True, metavar="OUT.csv", help="the table to write")
+    parser.add_argument(
+        "--output",
+        "-o",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="the table to write: OUT.csv, or OUT.npz for NumPy",
+    )
     add_watch_argument(parser, "every simple common that is no string")
+    parser.add_argument("--scans", metavar="TASK", help="the scans of a task instead of common memory")
+    add_window_arguments(parser)
+    add_grid_argument(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Export the recording."""
+    as_numpy = arguments.output.suffix.lower() == ".npz"
     try:
-        rows = export_csv(arguments.bag, arguments.output, watch_list(arguments.watch))
+        require_another_file(arguments.bag, arguments.output)
+        if not as_numpy and arguments.output.suffix.lower() in _OTHER_FORMATS:
+            raise UsageError(f"{arguments.output}: this format cannot be written", "name it OUT.csv or OUT.npz")
+        with share_shown("export") as progress:
+            rows = _written(arguments, as_numpy, progress)
     except BagError as error:
         print(error, file=sys.stderr)
         return 2
     if sys.stderr.isatty():
         print(f"{arguments.output}: {count_of(rows, 'row')}", file=sys.stderr)
     return 0
+
+
+def _written(arguments: argparse.Namespace, as_numpy: bool, progress: Progress) -> int:
+    table = _table(arguments, progress)
+    if as_numpy:
+        from automax_ros.bags.export_npz import write_npz  # NumPy takes its time to load
+
+        return write_npz(arguments.bag, table, arguments.output)
+    return write_csv(table, arguments.output)
+
+
+def _table(arguments: argparse.Namespace, progress: Progress) -> Table:
+    window = window_of(arguments)
+    watch = watch_list(arguments.watch)
+    if arguments.scans is None:
+        return CommonTable(arguments.bag, watch, window, progress)
+    if watch is not None or window.step_ns:
+        raise UsageError("--scans gives every scan and all it used: without --watch and --every")
+    return ScanTable(arguments.bag, arguments.scans, window, progress)
+
+
+_OTHER_FORMATS = {".parquet", ".xlsx", ".xls", ".json", ".mat", ".npy", ".feather", ".h5", ".mcap", ".db3", ".yaml"}
+"""Suffixes that promise what a CSV table is not."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 _PATIENCE_S = 2.0
+_SHARES = 1000
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
@@ -49,3 +51,10 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         bar = Progress(console=Console(stderr=True), transient=True)
         bar.start()
         return bar
+
+
+@contextmanager
+def share_shown(title: str) -> Iterator[Callable[[float], None]]:
+    """Return what takes the share that is done, 0 to 1, and shows it as a progress bar."""
+    with ProgressBar(title, _SHARES) as bar:
+        yield lambda share: bar.show(int(share * _SHARES))

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.record_options import add_record_arguments, recording_options
 from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="settings",
         help="write a common variable before the tasks start; may be given again",
     )
+    add_record_arguments(parser)
     add_watch_argument(parser, "the first published ones")
     parser.add_argument(
         "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
@@ -61,14 +63,15 @@ def run(arguments: argparse.Namespace) -> int:
             return 1
         settings = _settings(config, arguments.settings)
         watch = _watched(config, arguments.watch)
+        recording = recording_options(arguments, config)
         try:
             if arguments.simulated:
                 from automax_ros.cli.run_simulated import run_simulated
 
-                return run_simulated(config, duration_ns, arguments.record, settings, watch, stop)
+                return run_simulated(config, duration_ns, arguments.record, recording, settings, watch, stop)
             from automax_ros.cli.run_live import run_live
 
-            return run_live(config, duration_ns, arguments.record, settings, watch, stop)
+            return run_live(config, duration_ns, arguments.record, recording, settings, watch, stop)
         except RackError as error:
             return _refused(error)
         except BagError as error:

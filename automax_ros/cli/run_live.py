@@ -6,7 +6,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from automax_ros.bags.recorder import Recorder
+from automax_ros.bags.recorder import Recorder, RecordingOptions
+from automax_ros.cli.recording_watch import DiskSync, RecordingWatch, live_options
 from automax_ros.cli.run import warn
 from automax_ros.cli.run_simulated import report_end
 from automax_ros.cli.signals import StopRequest
@@ -25,6 +26,7 @@ def run_live(
     config: RackConfig,
     duration_ns: int | None,
     record: Path | None,
+    options: RecordingOptions,
     settings: list[tuple[str, Value]],
     watch: Sequence[Watched],
     stop: StopRequest,
@@ -33,7 +35,7 @@ def run_live(
     try:
         domain = domain_id()
         with RackLock(config.namespace, domain):
-            return _run_locked(config, duration_ns, record, settings, watch, stop, domain)
+            return _run_locked(config, duration_ns, record, options, settings, watch, stop, domain)
     except (LockError, RosUnavailable) as error:
         raise UsageError(str(error)) from error
 
@@ -42,6 +44,7 @@ def _run_locked(
     config: RackConfig,
     duration_ns: int | None,
     record: Path | None,
+    options: RecordingOptions,
     settings: list[tuple[str, Value]],
     watch: Sequence[Watched],
     stop: StopRequest,
@@ -51,22 +54,26 @@ def _run_locked(
     warn(rack)
     live = LiveRack(rack)
     recorder: Recorder | None = None
+    sync: DiskSync | None = None
     display = StatusDisplay(rack, watch, live=True)
-    told = [False, False]
+    recording = RecordingWatch(None, display)
+    told = False
 
     def on_idle(now_ns: int) -> None:
+        nonlocal told
         live.stopping = stop.requested
         display.update(now_ns)
-        if rack.stop_reason is not None and not told[0]:
-            told[0] = True
+        if rack.stop_reason is not None and not told:
+            told = True
             display.message(f"STOP ALL: {rack.stop_reason}")
-        if recorder is not None and recorder.failure is not None and not told[1]:
-            told[1] = True
-            display.message(f"recording ended, the rack goes on: {recorder.failure}")
+        recording.flush(now_ns)
+        recording.tell()
 
     try:
         if record is not None:
-            recorder = Recorder(rack, live.stream, record)
+            recorder = Recorder(rack, live.stream, record, live_options(options))
+            recording = RecordingWatch(recorder, display)
+            sync = DiskSync(recorder.sync)
         display.message(_opening(rack, domain))
         live.start(settings)
         live.run(duration_ns, on_idle)
@@ -74,10 +81,14 @@ def _run_locked(
         try:
             live.close()
         finally:
+            if sync is not None:
+                sync.stop()
             if recorder is not None:
                 recorder.close()
-    display.finish(record)
-    return report_end(rack, recorder)
+                recorder.sync()
+    recording.tell()
+    display.finish(record, complete=not recording.failed)
+    return report_end(rack, failed=recording.failed)
 
 
 def _opening(rack: Rack, domain: int) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from automax_ros.bags.rack_stream import RackStream
-from automax_ros.bags.recorder import Recorder
+from automax_ros.bags.recorder import Recorder, RecordingOptions
+from automax_ros.cli.recording_watch import RecordingWatch
 from automax_ros.cli.run import warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.status import StatusDisplay
@@ -25,6 +26,7 @@ def run_simulated(
     config: RackConfig,
     duration_ns: int | None,
     record: Path | None,
+    options: RecordingOptions,
     settings: list[tuple[str, Value]],
     watch: Sequence[Watched],
     stop: StopRequest,
@@ -33,8 +35,9 @@ def run_simulated(
     rack = Rack(config)
     warn(rack)
     stream = RackStream(rack, rack.fingerprint)
-    recorder = Recorder(rack, stream, record) if record is not None else None
+    recorder = Recorder(rack, stream, record, options) if record is not None else None
     display = StatusDisplay(rack, watch, live=False)
+    recording = RecordingWatch(recorder, display)
     try:
         if recorder is not None:
             stream.begin()
@@ -44,21 +47,19 @@ def run_simulated(
             rack.scheduler.run_until(end if duration_ns is None else min(end, duration_ns))
             display.printed()
             display.update(rack.now_ns)
+            recording.tell()
     finally:
         if recorder is not None:
             stream.end()
             recorder.close()
-    display.finish(record)
-    return report_end(rack, recorder)
+    recording.tell()
+    display.finish(record, complete=not recording.failed)
+    return report_end(rack, failed=recording.failed)
 
 
-def report_end(rack: Rack, recorder: Recorder | None) -> int:
-    """Print what went wrong and return the exit code: 1 after a fault or a recording that broke off."""
-    code = 0
+def report_end(rack: Rack, *, failed: bool) -> int:
+    """Print what stopped the rack and return the exit code: 1 after a fault or a recording that ``failed``."""
     if rack.stop_reason is not None:
         print(f"automax run: STOP ALL: {rack.stop_reason}", file=sys.stderr)
-        code = 1
-    if recorder is not None and recorder.failure is not None:
-        print(recorder.failure, file=sys.stderr)
-        code = 1
-    return code
+        return 1
+    return 1 if failed else 0

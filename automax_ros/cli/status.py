@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from automax_ros.cli.status_line import fitting
 from automax_ros.cli.terminal import rewrites_lines
 from automax_ros.core.diagnostics import printable
 from automax_ros.core.ticks import NS_PER_S
@@ -51,8 +52,8 @@ class StatusDisplay:
             while task.printed:
                 self.message(f"{task.name}: {printable(task.printed.popleft())}")
 
-    def finish(self, bag: Path | None) -> None:
-        """Print the last state and the summary."""
+    def finish(self, bag: Path | None, *, complete: bool = True) -> None:
+        """Print the last state and the summary; ``complete`` tells whether all of the run is in the recording."""
         wall = time.monotonic_ns()
         self._clear()
         rack = self._rack
@@ -77,7 +78,8 @@ class StatusDisplay:
             print("  " + "  ".join(self._values()))
         if bag is not None:
             size = sum(item.stat().st_size for item in bag.iterdir())
-            print(f"recorded {bag}: {size / 1e6:.2f} MB")
+            rest = "" if complete else f", not to the end of the run; to complete the file: automax bag repair {bag}"
+            print(f"recorded {bag}: {size / 1e6:.2f} MB{rest}")
         sys.stdout.flush()
 
     def _show(self, now_ns: int, wall: int) -> None:
@@ -92,7 +94,7 @@ class StatusDisplay:
         parts += self._values()
         self._last, self._last_rack_ns, self._last_scans = wall, now_ns, scans
         if self._terminal:
-            sys.stdout.write(f"\r\x1b[K{_fitting(parts, shutil.get_terminal_size().columns - 1)}")
+            sys.stdout.write(f"\r\x1b[K{fitting(parts, shutil.get_terminal_size().columns - 1)}")
             self._drawn = True
         else:
             sys.stdout.write("  ".join(parts) + "\n")
@@ -113,16 +115,6 @@ class StatusDisplay:
         if self._drawn:
             sys.stdout.write("\r\x1b[K")
             self._drawn = False
-
-
-def _fitting(parts: Sequence[str], width: int) -> str:
-    """Return as many parts as a line holds: none is cut, for half a number is a wrong one."""
-    line = parts[0][:width]
-    for part in parts[1:]:
-        if len(line) + 2 + len(part) > width:
-            break
-        line += f"  {part}"
-    return line
 
 
 def _shown(value: Value) -> str:

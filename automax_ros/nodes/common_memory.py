@@ -1,8 +1,9 @@
 """The node ``common_memory``: the rack's common variables as topics.
 
-Publishes: ``variables`` (automax_msgs/VariableTable, latched), ``backplane`` (automax_msgs/CommonWrite),
-``backplane/snapshot`` (automax_msgs/CommonImage, latched, sent anew to each late joiner), ``common/NAME`` (std_msgs,
-latched) for each variable with ``ros: out`` or ``ros: in``.
+Publishes: ``variables`` (automax_msgs/VariableTable, latched), ``config`` (std_msgs/String, latched: the rack's YAML
+file and the tasks' sources as JSON), ``backplane`` (automax_msgs/CommonWrite), ``backplane/snapshot``
+(automax_msgs/CommonImage, latched, sent anew to each late joiner of either), ``common/NAME`` (std_msgs, latched) for
+each variable with ``ros: out`` or ``ros: in``.
 
 Subscribes: ``common/NAME/set`` (std_msgs, reliable) for each variable with ``ros: in``, and for no other.
 """
@@ -16,11 +17,14 @@ from rclpy.context import Context
 from rclpy.event_handler import QoSPublisherMatchedInfo
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from std_msgs.msg import String
 
+from automax_ros.bags.qos import LATCHED
+from automax_ros.bags.rack_files import files_of, files_text
 from automax_ros.bags.rack_stream import RackStream, Topic
 from automax_ros.core.types import Value
 from automax_ros.nodes.throttle import Throttle
-from automax_ros.nodes.topics import COMMAND_QOS, message_class, publisher
+from automax_ros.nodes.topics import COMMAND_QOS, message_class, publisher, ros_qos
 from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import set_topic
@@ -43,12 +47,13 @@ class CommonMemoryNode(Node):  # type: ignore[misc]
         """
         super().__init__("common_memory", namespace=f"/{rack.config.namespace}", context=context)
         self._rack, self._stream, self._catch_up = rack, stream, catch_up
-        self._readers = 0
         self._publishers_by_name: dict[str, Publisher[Any]] = {}
         for own in stream.topics:
             if own.slot is None:
-                joined = self._joined if own == stream.snapshot_topic else None
-                self._publishers_by_name[own.name] = publisher(self, own, joined)
+                joined = own in (stream.snapshot_topic, stream.backplane_topic)
+                self._publishers_by_name[own.name] = publisher(self, own, self._join if joined else None)
+        self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
+        self._config.publish(String(data=files_text(rack.config.name, files_of(rack))))
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
@@ -60,12 +65,11 @@ class CommonMemoryNode(Node):  # type: ignore[misc]
         if found is not None:
             found.publish(payload)
 
-    def _joined(self, matched: QoSPublisherMatchedInfo) -> None:
+    def _join(self, matched: QoSPublisherMatchedInfo) -> None:
         """Send the image anew to a late joiner: the one that waits for it may be as old as the run."""
-        if matched.total_count > self._readers:
+        if matched.total_count_change > 0:
             self._catch_up()
             self._stream.send_image()
-        self._readers = matched.total_count
 
     def _subscribe(self, view: int, variable: CommonVariable, topic: Topic) -> None:
         self.create_subscription(

@@ -1,7 +1,8 @@
 """The node ``processor_SLOT``: a Processor module with its tasks.
 
-Publishes: ``/RACK/scans`` (automax_msgs/Scan) and ``/RACK/states`` (automax_msgs/TaskState) of its tasks,
-``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once a second and when a task's state changes.
+Publishes: ``/RACK/scans`` (automax_msgs/Scan) and ``/RACK/states`` (automax_msgs/TaskState) of its tasks, with a state
+and a full Scan of each for whoever joins late; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once a second and
+when a task's state changes.
 
 Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the
 task.
@@ -17,6 +18,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
+from rclpy.event_handler import QoSPublisherMatchedInfo
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -52,9 +54,11 @@ class ProcessorNode(Node):  # type: ignore[misc]
     ) -> None:
         """Create publishers and parameters, and observe the rack; ``catch_up`` brings rack time to the present."""
         super().__init__(f"processor_{processor.slot}", namespace=f"/{rack.config.namespace}", context=context)
-        self._rack, self._processor, self._catch_up = rack, processor, catch_up
+        self._rack, self._processor, self._stream, self._catch_up = rack, processor, stream, catch_up
         own = [topic for topic in stream.module_topics if topic.slot == processor.slot]
-        self._publishers_by_topic: dict[Topic, Publisher[Any]] = {topic: publisher(self, topic) for topic in own}
+        self._publishers_by_topic: dict[Topic, Publisher[Any]] = {
+            topic: publisher(self, topic, self._join) for topic in own
+        }
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(processor.tasks)}
         for tunable in self._tunables.values():
@@ -95,6 +99,12 @@ class ProcessorNode(Node):  # type: ignore[misc]
         found = self._publishers_by_topic.get(topic)
         if found is not None:
             found.publish(payload)
+
+    def _join(self, matched: QoSPublisherMatchedInfo) -> None:
+        """Send a late joiner of scans or states what it needs to follow the tasks."""
+        if matched.total_count_change > 0:
+            self._catch_up()
+            self._stream.send_states(self._processor.slot)
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         """Refuse what a task would refuse, before any of the parameters is set; those that are no tunables pass."""

@@ -42,10 +42,21 @@ def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
     path = Path(path)
     findings = Findings()
     source = SourceText(str(path), _text_of(path, findings))
+    return _loaded(source, TaskReader(path.parent, allow_outside, findings), path, findings)
+
+
+def load_stored(source: SourceText, path: Path) -> LoadResult:
+    """Read a rack file whose text stands in a recording, with its sources under the names of their tasks.
+
+    ``path`` is what the configuration calls the file. No file is touched.
+    """
+    findings = Findings()
+    return _loaded(source, TaskReader(None, False, findings), path, findings)
+
+
+def _loaded(source: SourceText, tasks: TaskReader, path: Path, findings: Findings) -> LoadResult:
     root = read_yaml(source, findings) if not findings.errors else None
-    config = None
-    if root is not None:
-        config = _RackReader(path, source.text, allow_outside, findings).read(root)
+    config = _RackReader(path, source.text, tasks, findings).read(root) if root is not None else None
     return LoadResult(config if not findings.errors else None, findings.in_order(), source)
 
 
@@ -67,11 +78,11 @@ def _text_of(path: Path, findings: Findings) -> str:
 
 
 class _RackReader:
-    def __init__(self, path: Path, text: str, allow_outside: bool, findings: Findings) -> None:
+    def __init__(self, path: Path, text: str, tasks: TaskReader, findings: Findings) -> None:
         self._path = path
         self._text = text
         self._findings = findings
-        self._tasks = TaskReader(path.parent, allow_outside, findings)
+        self._tasks = tasks
 
     def read(self, root: Node) -> RackConfig | None:
         entries = entries_of(root, "a rack file", self._findings)

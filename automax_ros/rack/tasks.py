@@ -29,10 +29,11 @@ _LISTED_FILES = 1000
 class TaskReader:
     """Reads the tasks of all Processors of a rack, whose names must differ.
 
-    ``folder`` is the rack file's; sources lie in it unless ``allow_outside``.
+    ``folder`` is the rack file's; sources lie in it unless ``allow_outside``. Without a folder no file is touched: the
+    sources are stored under their tasks' names, whatever the rack file calls them.
     """
 
-    folder: Path
+    folder: Path | None
     allow_outside: bool
     findings: Findings
     seen: dict[str, Span] = field(default_factory=dict)
@@ -85,6 +86,8 @@ class TaskReader:
 
     def _file(self, node: Node | None, key: Scalar, name: str | None, what: str) -> Path | None:
         """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1)."""
+        if self.folder is None:
+            return Path(f"{name}.BLK") if name is not None else None
         if node is None:
             return self._usable(f"{name}.BLK", key.span) if name is not None else None
         text = text_value(node, f"file of {what}", self.findings, limit=_PATH_LIMIT)
@@ -97,18 +100,14 @@ class TaskReader:
             message = f"{other} ({suffix}) are not supported yet" if other else "a task's source is a .BLK file"
             self.findings.add("AMX6304", f"{quoted(text)}: {message}", span)
             return None
+        assert self.folder is not None
         path = self.folder / text
-        if not self.allow_outside and not self._stays_inside(text, path):
+        if not self.allow_outside and not _stays_inside(text, path, self.folder):
             message = f"{quoted(text)} lies outside the rack file's folder"
             hint = "put the source beside the rack file, or allow it with --allow-outside"
             self.findings.add("AMX6305", message, span, hint)
             return None
         return path if self._readable(text, path, span) else None
-
-    def _stays_inside(self, text: str, path: Path) -> bool:
-        windows = PureWindowsPath(text)
-        absolute = PurePosixPath(text).is_absolute() or bool(windows.drive or windows.root)
-        return not absolute and ".." not in windows.parts and is_inside(path, self.folder)
 
     def _readable(self, text: str, path: Path, span: Span) -> bool:
         try:
@@ -119,6 +118,12 @@ class TaskReader:
             self.findings.add(code, f"{quoted(text)} {fault}", span, hint)
             return False
         return True
+
+
+def _stays_inside(text: str, path: Path, folder: Path) -> bool:
+    windows = PureWindowsPath(text)
+    absolute = PurePosixPath(text).is_absolute() or bool(windows.drive or windows.root)
+    return not absolute and ".." not in windows.parts and is_inside(path, folder)
 
 
 def _is_file_name(node: Node) -> TypeGuard[Scalar]:

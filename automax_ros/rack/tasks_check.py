@@ -55,8 +55,12 @@ def _checked(
         place = SourceText(str(config.path), config.text)
         gone = Diagnostic("AMX6306", f"the source {task.file.name} of task {task.name} {fault}", Span(task.line, 1, 2))
         return CheckedTask(task, place, CheckResult(None, [gone]))
-    result = check(source, name=task.name, catalogue=CATALOGUE, tick_ns=processor.tick_ns, commons=commons)
-    return CheckedTask(task, source, _with_events_checked(result))
+    return CheckedTask(task, source, check_source(source, task.name, processor.tick_ns, commons))
+
+
+def check_source(source: SourceText, name: str, tick_ns: int, commons: Mapping[str, CommonSpec]) -> CheckResult:
+    """Check the text of one task against a rack's commons and the tick of the Processor that runs it."""
+    return _with_events_checked(check(source, name=name, catalogue=CATALOGUE, tick_ns=tick_ns, commons=commons))
 
 
 def _with_events_checked(result: CheckResult) -> CheckResult:

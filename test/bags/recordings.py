@@ -130,3 +130,11 @@ def _single(kind: str) -> st.SearchStrategy[Any]:
     if kind in _RANGES:
         return st.integers(*_RANGES[kind])
     return messages(kind)
+
+
+def table_like() -> st.SearchStrategy[Values]:
+    """Random values of numbers as racks send them: as many variables as elements and values, often none."""
+    entry = st.tuples(st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1), st.floats(allow_nan=False))
+    return st.lists(entry, max_size=12).map(
+        lambda entries: Values(*zip(*entries, strict=True)) if entries else Values()
+    )

@@ -17,7 +17,7 @@ from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.compiler import CompiledTask
 from automax_ros.runtime.layout import Layout
-from automax_ros.runtime.task import Task
+from automax_ros.runtime.task import Status, Task
 
 
 class RecordedMemory:
@@ -117,7 +117,7 @@ class Reexecution:
         if message.scan == 0:
             record = task.run(message.stamp)
         else:
-            task.scan_number = message.scan - 1
+            task.scan_number, task.status = message.scan - 1, Status.RUNNING
             record = task.scan(message.stamp, message.skipped)
         assert record is not None
         assert memory.written == self._typed(message.written)

@@ -7,6 +7,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 from mcap.records import ChunkIndex
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -159,6 +162,80 @@ def test_chunks_end_with_a_simulated_second(tmp_path: Path) -> None:
     chunks = chunks_of(sample_recording(tmp_path / "a", seconds=3.4))
     assert [chunk.message_start_time // 10**9 for chunk in chunks] == [0, 1, 2, 3]
     assert [chunk.message_end_time // 10**9 for chunk in chunks] == [0, 1, 2, 3]
+
+
+def test_the_official_writer_would_write_the_same_bytes(tmp_path: Path) -> None:
+    """Only the framing of messages is our own; here the package mcap frames the same messages."""
+    ours = sample_recording(tmp_path / "a") / "scans_0.mcap"
+    output = BytesIO()
+    again = McapWriter(output, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    with ours.open("rb") as file:
+        reader = make_reader(file)
+        again.start(profile="ros2", library=reader.get_header().library)
+        for item in reader.iter_attachments():
+            again.add_attachment(item.create_time, item.log_time, item.name, item.media_type, item.data)
+        summary = reader.get_summary()
+        assert summary is not None
+        for channel in summary.channels.values():
+            schema = summary.schemas[channel.schema_id]
+            again.register_schema(schema.name, schema.encoding, schema.data)
+            again.register_channel(channel.topic, "cdr", channel.schema_id, channel.metadata)
+        second = 0
+        for _, channel, message in reader.iter_messages():
+            if message.log_time // 10**9 > second:
+                again.flush()
+                second = message.log_time // 10**9
+            again.add_message(channel.id, message.log_time, message.data, message.publish_time, message.sequence)
+        again.flush()
+        for record in reader.iter_metadata():
+            again.add_metadata(record.name, record.metadata)
+    again.finish()
+    assert output.getvalue() == ours.read_bytes()
+
+
+def test_an_instant_is_in_one_chunk(tmp_path: Path) -> None:
+    """Whatever its size, and though its log times run over the second's end."""
+    with BagWriter(tmp_path / "a") as writer:
+        channel = writer.channel("/text", "std_msgs/msg/String", SCAN)
+        for stamp in (0, 999_999_999, 1_000_000_005, 2_000_000_000):
+            for _ in range(20):
+                writer.write(channel, stamp, encode(String("x" * 100_000)))
+    assert [chunk.message_start_time for chunk in chunks_of(tmp_path / "a")] == [
+        0,
+        999_999_999,
+        1_000_000_019,
+        2 * 10**9,
+    ]
+
+
+def test_a_huge_instant_does_not_make_a_chunk_too_long_to_read(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "a") as writer:
+        channel = writer.channel("/text", "std_msgs/msg/String", SCAN)
+        for _ in range(9):
+            writer.write(channel, 5, encode(String("x" * (8 << 20))))
+    assert (
+        max(chunk.uncompressed_size for chunk in chunks_of(tmp_path / "a")) <= writer_module.LONGEST_CHUNK_BYTES + 4000
+    )
+    assert len(list(BagReader(tmp_path / "a").messages())) == 9
+
+
+def test_sync_reaches_every_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[str] = []
+    monkeypatch.setattr(os, "fsync", lambda number: synced.append(Path(f"/proc/self/fd/{number}").resolve().name))
+    writer = BagWriter(tmp_path / "a")
+    channel = writer.channel("/a", INT16, VALUE)
+    writer.write(channel, 0, encode(Int16(1)))
+    writer.sync()
+    assert set(synced) == {"a", "scans_0.mcap"}
+    writer.split()
+    writer.write(channel, 1, encode(Int16(1)))
+    synced.clear()
+    writer.sync()
+    assert set(synced) == {"a", "scans_0.mcap", "scans_1.mcap"}
+    writer.close()
+    synced.clear()
+    writer.sync()
+    assert set(synced) == {"a", "scans_1.mcap", "metadata.yaml"}
 
 
 def test_chunks_end_by_size(tmp_path: Path) -> None:

@@ -30,8 +30,9 @@ from automax_ros.bags.messages import (
     String,
     Values,
 )
+from automax_ros.bags.scan_encoding import scan_encoder, write_encoder
 
-from .recordings import messages
+from .recordings import messages, table_like
 
 ALL = sorted(CLASSES)
 REPEATABLE = settings(deadline=None, derandomize=True, max_examples=60)
@@ -280,3 +281,33 @@ def test_mutated_bytes_decode_or_are_refused(position: int, value: int, end: int
     for mutant in (bytes(data), bytes(data[:end])):
         with contextlib.suppress(CdrError):
             decoder("automax_msgs/msg/Scan")(mutant)
+
+
+@REPEATABLE
+@given(messages("automax_msgs/msg/Scan"))
+def test_scans_of_any_form_are_encoded_to_the_same_bytes(message: Any) -> None:
+    """The encoder that a recording uses for most of its messages is a second one, so it must agree with the first."""
+    assert scan_encoder()(message) == encode(message)
+
+
+@REPEATABLE
+@given(messages("automax_msgs/msg/CommonWrite"))
+def test_writes_of_any_form_are_encoded_to_the_same_bytes(message: Any) -> None:
+    assert write_encoder()(message) == encode(message)
+
+
+@REPEATABLE
+@given(st.lists(table_like(), min_size=4, max_size=4), st.text("ABCDEFGH", min_size=1, max_size=9))
+def test_scans_and_writes_of_racks_are_encoded_to_the_same_bytes(values: list[Values], task: str) -> None:
+    scan = Scan(5_500_000_001, 3, task, 7, 1, 2, True, *values)
+    write = CommonWrite(5_500_000_001, 77, 3, 1, 2, 9, values[0])
+    assert scan_encoder()(scan) == encode(scan)
+    assert write_encoder()(write) == encode(write)
+
+
+def test_encoders_in_one_step_refuse_what_does_not_fit() -> None:
+    values = Values((70_000,), (0,), (1.0,))
+    with pytest.raises(CdrError, match="Scan"):
+        scan_encoder()(Scan(0, 1, "A", 1, latched=values))
+    with pytest.raises(CdrError, match="CommonWrite"):
+        write_encoder()(CommonWrite(0, 1, 1, 1, 1, 1, values))

@@ -1,5 +1,8 @@
 """`automax export`: a thin caller of the bags' export."""
 
+from contextlib import contextmanager
+
+import numpy as np
 import pytest
 from bags.recordings import sample_recording
 
@@ -37,6 +40,69 @@ def test_what_cannot_be_exported_is_2(automax, bag, arguments, code):
     assert (result.code, result.out) == (2, "")
     assert f"error[{code}]" in result.err
     assert "Traceback" not in result.err
+
+
+def test_numpy_by_suffix(automax, bag):
+    assert automax("export", bag, "-o", "OUT.npz", "--watch", "REF%,RUN@") == (0, "", "")
+    automax("export", bag, "-o", "OUT.csv", "--watch", "REF%,RUN@")
+    table = columns_of((automax.folder / "OUT.csv").read_text())
+    with np.load(automax.folder / "OUT.npz") as arrays:
+        assert list(arrays["names"]) == ["time_s", "REF%", "RUN@"] == list(table)
+        assert arrays["REF%"].tolist() == [int(cell) for cell in table["REF%"]]
+
+
+def test_range_and_grid(automax, bag):
+    assert automax("export", bag, "-o", "OUT.csv", "--watch", "REF%", "--from", "0.05", "--to", "0.07").code == 0
+    table = columns_of((automax.folder / "OUT.csv").read_text())
+    assert table == {"time_s": ["0.05", "0.055", "0.0605", "0.066"], "REF%": ["8", "9", "10", "11"]}
+    assert automax("export", bag, "-o", "OUT.csv", "--watch", "REF%", "--every", "0.05", "--to", "1").code == 0
+    table = columns_of((automax.folder / "OUT.csv").read_text())
+    assert table == {"time_s": ["0", "0.05", "0.1", "0.15"], "REF%": ["0", "8", "17", "26"]}
+
+
+def test_scans_of_a_task(automax, bag):
+    assert automax("export", bag, "-o", "OUT.csv", "--scans", "speed", "--to", "0.05") == (0, "", "")
+    table = columns_of((automax.folder / "OUT.csv").read_text())
+    assert table["scan"] == [str(number) for number in range(1, 10)]
+    assert table["out.REF%"] == [str(number) for number in range(9)]
+    assert table["error_line"] == ["1030" if index % 7 == 0 else "0" for index in range(9)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--scans", "SPED"], "did you mean SPEED?"),
+        (["--scans", "SPEED", "--watch", "REF%"], "without --watch and --every"),
+        (["--scans", "SPEED", "--every", "1"], "without --watch and --every"),
+        (["--every", "0"], "--every has to be above 0"),
+        (["--every", "1e-12"], "no whole number of nanoseconds"),
+        (["--every", "-1"], "is not a number of seconds from 0 on"),
+        (["--from", "2", "--to", "1"], "--to lies before --from"),
+        (["--from", "1"], "error[AMX6825]"),
+        (["--every", "1e-9"], "error[AMX6826]"),
+        (["--watch", "NOTE$", "-o", "OUT.npz"], "error[AMX6828]"),
+        (["-o", "OUT.parquet"], "name it OUT.csv or OUT.npz"),
+    ],
+)
+def test_wrong_use_is_2(automax, bag, monkeypatch, arguments, text):
+    monkeypatch.setattr("automax_ros.bags.series.MAX_GRID_ROWS", 1000)
+    result = automax("export", bag, "-o", "OUT.csv", *arguments)
+    assert (result.code, result.out) == (2, "")
+    assert text in result.err
+    assert "Traceback" not in result.err
+
+
+def test_progress_is_shown_where_it_lasts(automax, bag, monkeypatch):
+    shares = []
+
+    @contextmanager
+    def shown(title):
+        yield lambda share: shares.append((title, share))
+
+    monkeypatch.setattr("automax_ros.cli.export.share_shown", shown)
+    assert automax("export", bag, "-o", "OUT.csv").code == 0
+    assert shares
+    assert all(title == "export" and 0 <= share <= 1 for title, share in shares)
 
 
 def test_output_has_to_be_named(automax, bag):

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from automax_ros.cli import progress
-from automax_ros.cli.progress import ProgressBar
+from automax_ros.cli.progress import ProgressBar, share_shown
 
 
 class Terminal(io.StringIO):
@@ -47,3 +47,15 @@ def test_no_terminal_no_bar(seconds, monkeypatch):
 
 def test_bar_can_be_unwanted(seconds, monkeypatch):
     assert shown(Terminal(), seconds, monkeypatch, [3.0], wanted=False) == ""
+
+
+def test_share_of_the_work(seconds, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with share_shown("export") as progress:
+        for seconds[0], share in ((1.0, 0.1), (3.0, 0.25)):
+            progress(share)
+    assert "export" in stream.getvalue()
+    assert "25%" in stream.getvalue()
+    assert "10%" not in stream.getvalue()

@@ -7,6 +7,7 @@ import pytest
 
 from automax_ros.cli import status as status_module
 from automax_ros.cli.status import StatusDisplay
+from automax_ros.cli.status_line import fitting
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import Watched
@@ -214,8 +215,60 @@ def test_recording_that_breaks_off_is_told_and_the_run_goes_on(run, automax, mon
     result = run("--duration", "100", "--record", "bag")
     assert result.code == 1
     assert "ran 100.000 s" in result.out
-    assert "AMX6801" in result.err
+    assert result.err.count("AMX6801") == 1
     assert "No space left" in result.err
+    assert "recording ended, the rack goes on" in result.out
+    assert "not to the end of the run; to complete the file: automax bag repair bag" in result.out
+
+
+def test_recording_options(run, automax):
+    result = run("--duration", "3.5", "--record", "bag", "--record-split-s", "1", "--record-compression", "none")
+    assert result.code == 0
+    names = [path.name for path in sorted((automax.folder / "bag").iterdir())]
+    assert names == ["metadata.yaml", *(f"scans_{number}.mcap" for number in range(4))]
+    data = (automax.folder / "bag" / "scans_1.mcap").read_bytes()
+    assert b"zstd" not in data
+    run(
+        "--duration",
+        "40",
+        "--record",
+        "locals",
+        "--record-locals",
+        "--record-tasks",
+        "task",
+        "--record-split-mb",
+        "0.07",
+    )
+    assert (automax.folder / "locals" / "scans_1.mcap").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--record-split-mb", "x"], "'x' is no number of megabytes"),
+        (["--record-split-mb", "nan"], "outside 0 to"),
+        (["--record-split-mb", "1e999999999"], "outside 0 to"),
+        (["--record-split-mb", "-1"], "outside 0 to"),
+        (["--record-split-mb", "0.01"], "too small"),
+        (["--record-split-s", "0.5"], "too short"),
+        (["--record-split-s", "soon"], "not a number"),
+        (["--record-compression", "lz5"], "did you mean lz4?"),
+        (["--record-compression", ""], "no compression ''"),
+        (["--record-tasks", "TSAK"], "did you mean TASK?"),
+        (["--record-tasks", " , "], "names no task"),
+    ],
+)
+def test_wrong_recording_options(run, automax, options, told):
+    result = run("--duration", "1", "--record", "bag", *options)
+    assert result.code == 2
+    assert told in result.err
+    assert not (automax.folder / "bag").exists()
+
+
+def test_recording_options_need_a_recording(run):
+    result = run("--duration", "1", "--record-locals")
+    assert result.code == 2
+    assert "add --record DIR" in result.err
 
 
 # The status line
@@ -266,6 +319,6 @@ def test_printed_lines_are_shown(automax):
 def test_no_part_of_the_status_line_is_cut():
     parts = ["  1.0 s", "291 scans/s", "LINE_REF%=1286", "SECT_REF%=1286"]
     whole = "  ".join(parts)
-    assert status_module._fitting(parts, len(whole)) == whole
-    assert status_module._fitting(parts, len(whole) - 1) == "  ".join(parts[:3])
-    assert status_module._fitting(parts, 4) == "  1."
+    assert fitting(parts, len(whole)) == whole
+    assert fitting(parts, len(whole) - 1) == "  ".join(parts[:3])
+    assert fitting(parts, 4) == "  1."

@@ -1,0 +1,55 @@
+"""How the tasks of a recording run, from the rack file and the sources that are stored inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.bags.info import BagInfo
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.rack.loader import load_stored
+from automax_ros.rack.tasks_check import check_source, commons_of
+
+RACK_FILE = "rack.yaml"
+
+
+@dataclass(frozen=True)
+class TaskFacts:
+    """A task as the rack file and its source have it; None where the source is missing or has errors."""
+
+    slot: int
+    processor: str
+    tick_ns: int
+    priority: int
+    target: str | None = None
+    ticks: int | None = None
+
+    @property
+    def period_ns(self) -> int | None:
+        """The scan period."""
+        return None if self.ticks is None else self.ticks * self.tick_ns
+
+
+def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
+    """Return the tasks of the rack by name; none where the recording stores no rack file without errors."""
+    text = info.texts.get(RACK_FILE)
+    config = load_stored(SourceText(RACK_FILE, text), Path(RACK_FILE)).config if text is not None else None
+    if config is None:
+        return {}
+    commons = commons_of(config)
+    facts = {}
+    for processor in config.processors:
+        for task in processor.tasks:
+            source = info.texts.get(f"{task.name}.BLK")
+            name = f"{task.name}.BLK"
+            checked = check_source(SourceText(name, source), task.name, processor.tick_ns, commons) if source else None
+            program = checked.program if checked else None
+            facts[task.name] = TaskFacts(
+                processor.slot,
+                processor.model,
+                processor.tick_ns,
+                task.priority,
+                program.target if program else None,
+                program.ticks if program else None,
+            )
+    return facts

@@ -1,0 +1,409 @@
+"""Records a running rack from outside: its messages, in the order in which they were sent, into a bag that replays.
+
+A recorder that joins late knows nothing of common memory until an image comes. Writes older than the image are dropped,
+newer ones follow it without a gap in their numbers, or else recording rests until the next image. What comes between
+two writes waits for the second: only its number proves that memory was as the bag tells it. A task's scans are recorded
+from one that holds all it latched (``full``), for the scans before it cannot be understood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from automax_ros.bags.cdr import CdrError, decode
+from automax_ros.bags.errors import RecordingError
+from automax_ros.bags.live.heads import WriteHead, image_head, scan_head, write_head
+from automax_ros.bags.live.provenance import provenance
+from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
+from automax_ros.bags.live.tracks import Gap, TaskTrack
+from automax_ros.bags.messages import VariableTable, WriterKind
+from automax_ros.bags.rack_files import RACK_FILE, RackFile
+from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
+
+SETTLE_NS = 1_000_000_000
+"""When for so long no write has come, none is missing."""
+MAX_PENDING = 100_000
+"""So many messages wait for the next write at most."""
+_SECOND = 1_000_000_000
+_RESTARTED = "the rack was started again"
+_MALFORMED_NAMED = 3
+
+
+class LiveRecording:
+    """One recording of a running rack; ``take`` every message in order, ``close`` finishes the bag.
+
+    ``failure`` tells why the disk ended the recording, ``ended`` why the rack did; both None while all is well.
+    ``notes`` are lines for the person, to be taken out by the caller.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        topics: LiveTopics,
+        table: bytes,
+        files: Sequence[RackFile] = (),
+        tasks: Collection[str] | None = None,
+        storage: StorageOptions | None = None,
+        split_ns: int = 0,
+    ) -> None:
+        """Create the bag with the rack's files in it. ``table`` is the VariableTable, ``tasks`` those to record.
+
+        A further file begins with the first image behind each multiple of ``split_ns`` of rack time, 0 for never, or
+        behind the size that ``storage`` tells; the rack is asked for that image.
+
+        Raises:
+            RecordingError: the folder exists already or cannot be written.
+            CdrError: the table is malformed.
+        """
+        self.failure: RecordingError | None = None
+        self.ended: str | None = None
+        self.notes: list[str] = []
+        self.gaps: list[Gap] = []
+        self.scans = self.writes = self.values = self.dropped = self.malformed = 0
+        self.first_stamp: int | None = None
+        self.last_stamp = 0
+        self.replayable_from: int | None = None
+        self._topics, self._table, self._files = topics, table, files
+        self._facts: VariableTable = _decoded(table)
+        self._run_id = self._facts.run_id
+        names = [writer.name for writer in self._facts.writers if writer.kind == WriterKind.TASK]
+        self._tasks = {name: TaskTrack() for name in names if tasks is None or name in tasks}
+        self._wrong_sources: list[str] = []
+        self._recording = False
+        self._sequence = 0
+        self._image: tuple[int, WriteHead, bytes] | None = None
+        self._pending: list[tuple[str, int, bytes]] = []
+        self._proven_ns = 0
+        self._open_gap: int | None = None
+        self._last_values: dict[str, bytes] = {}
+        self._values_now: dict[str, bytes] = {}
+        self._last_sent = 0
+        self.files_begun = 1
+        self._split_ns, self._next_split = split_ns, 0
+        self._takers: dict[str, Callable[[str, int, bytes], None]] = {
+            topics.variables: self._take_table,
+            topics.snapshot: self._take_image,
+            topics.backplane: self._take_write,
+            **dict.fromkeys((topics.scans, topics.states, *topics.values), self._keep),
+        }
+        self._recorders: dict[str, Callable[[str, int, bytes], None]] = {
+            topics.scans: self._record_scan,
+            topics.states: self._record_state,
+            **dict.fromkeys(topics.values, self._record_value),
+        }
+        self._writer = BagWriter(folder, options=storage)
+        for file in files:
+            self._writer.attach(file.name, file.media_type, file.data)
+        self._channels: dict[str, Channel] = {
+            name: self._writer.channel(name, kind.type_name, kind.qos) for name, kind in topics.all.items()
+        }
+
+    @property
+    def wants_image(self) -> bool:
+        """Whether recording rests until the rack sends an image, or the next file does."""
+        return self._split_due if self._recording else self._image is None
+
+    @property
+    def wants_states(self) -> bool:
+        """Whether a task waits for a full scan or a state."""
+        return self._recording and not all(track.alone for track in self._tasks.values())
+
+    @property
+    def rests(self) -> bool:
+        """Whether something is not recorded, or could not be replayed, before the rack sends an image or states."""
+        return not self._recording or not all(track.ready for track in self._tasks.values())
+
+    @property
+    def lacks(self) -> list[str]:
+        """What the bag lacks for a replay without the repository."""
+        names = {file.name for file in self._files}
+        missing = [name for name in (RACK_FILE, *(f"{task}.BLK" for task in self._tasks)) if name not in names]
+        found = [f"the file {name}" for name in missing]
+        found += [f"the source that task {task} runs (another one is stored)" for task in self._wrong_sources]
+        waiting = [task for task, track in self._tasks.items() if not track.ready]
+        if self._topics.left_out:
+            found.append(f"the topics of {self._topics.left_out} common variables beyond the first {MAX_VALUE_TOPICS}")
+        if self.first_stamp is not None:
+            found += [f"a full scan and a state of task {task} to begin with" for task in waiting]
+        return found
+
+    def take(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        """Record a message of one of the topics, sent at a time of the rack's clock."""
+        if self.failure is not None or self.ended is not None:
+            return
+        try:
+            self._takers[topic](topic, sent_ns, payload)
+        except CdrError as error:
+            self._note_malformed(topic, error)
+        except RecordingError as error:
+            self.failure = error
+
+    def seconds(self, stamp: int) -> float:
+        """Return a stamp as seconds from the start of the rack's run."""
+        return (stamp - self._facts.stamp) / _SECOND
+
+    def flush(self, passed_ns: int) -> None:
+        """Hand what is recorded to the operating system if its time is over: so long ago came the last message."""
+        if self.failure is None:
+            try:
+                self._writer.flush(self.last_stamp + passed_ns)
+            except RecordingError as error:
+                self.failure = error
+
+    def sync(self) -> None:
+        """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
+        self._writer.sync()
+
+    def close(self) -> None:
+        """Finish the bag.
+
+        Raises:
+            RecordingError: the disk refuses.
+        """
+        if self.failure is None and self.ended is None:
+            try:
+                self._settle(at_end=True)
+            except RecordingError as error:
+                self.failure = error
+        if self.failure is None:
+            replayable_s = None if self.replayable_from is None else self.seconds(self.replayable_from)
+            gaps = [f"{self.seconds(gap.stamp):.6f} s: {gap}" for gap in self.gaps]
+            data = provenance(self._facts.rack, self._files, self.lacks, replayable_s, gaps, self.ended)
+            self._writer.custom_data.update(data)
+            self._writer.close()
+
+    def _take_table(self, topic: str, sent_ns: int, payload: bytes) -> None:  # noqa: ARG002
+        self._check_run(_decoded(payload).run_id)
+
+    def _take_image(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        head = image_head(payload)
+        if not self._check_run(head.run_id):
+            return
+        if self._image is not None and head.sequence == self._image[1].sequence:
+            self._begin()  # no write came between the two, so none is missing
+        if self._recording and head.sequence <= self._sequence:
+            if head.sequence == self._sequence:
+                self._prove(sent_ns)
+                if self._split_due:
+                    self._split(head.stamp)
+                self._write(topic, sent_ns, head.stamp, payload)
+            return
+        if self._recording:
+            self._rest(head.stamp, head.sequence - self._sequence)
+        self._drop_pending()
+        self._image, self._proven_ns = (sent_ns, head, payload), sent_ns
+
+    def _take_write(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        head = write_head(payload)
+        if not self._check_run(head.run_id):
+            return
+        if not self._recording and self._image is not None:
+            image = self._image[1].sequence
+            if head.sequence == image + 1:
+                self._begin()
+            elif head.sequence > image:
+                self._image = None
+                self._drop_pending()
+        if not self._recording or head.sequence <= self._sequence:
+            return
+        if head.sequence != self._sequence + 1:
+            self._rest(head.stamp, head.sequence - self._sequence - 1)
+            return
+        self._prove(sent_ns)
+        self._sequence = head.sequence
+        self.writes += 1
+        self._write(topic, sent_ns, head.stamp, payload)
+
+    def _record_scan(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        head = scan_head(payload)
+        track = self._tasks.get(head.task)
+        if track is None:
+            return
+        if track.began_anew(head.scan, head.stamp):
+            self._end(_RESTARTED)
+        if head.scan <= track.last:
+            return
+        if track.follows and head.scan != track.last + 1:
+            missing = head.scan - track.last - 1
+            self._note_gap(Gap(head.stamp, f"scans of task {head.task}", missing), "it is recorded again")
+            track.rest()
+        if not track.follows and not head.full:
+            self.dropped += 1
+            return
+        track.take_scan(head.scan, head.stamp)
+        self.scans += 1
+        self._write(topic, sent_ns, head.stamp, payload)
+        self._look_whether_replayable(head.stamp)
+
+    def _record_state(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        state: Any = decode("automax_msgs/msg/TaskState", payload)
+        track = self._tasks.get(state.task)
+        if track is None:
+            return
+        if track.began_anew(state.scan, state.stamp):
+            self._end(_RESTARTED)
+            return
+        if track.state < 0:
+            self._compare_source(state.task, state.source_hash)
+        track.take_state(state.scan)
+        self._write(topic, sent_ns, state.stamp, payload)
+        self._look_whether_replayable(state.stamp)
+
+    def _record_value(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        self.values += 1
+        self._values_now[topic] = payload
+        # A value carries no stamp: it belongs to the instant of the message before, or came so much later.
+        later = max(0, sent_ns - self._last_sent) if self._last_sent else 0
+        self._write(topic, 0, self.last_stamp + (later if later > _SECOND // 1000 else 0), payload)
+
+    def _keep(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        """Let a message wait for the next write, which tells whether one is missing before it."""
+        if self._recording or self._image is not None:
+            self._pending.append((topic, sent_ns, payload))
+            if sent_ns - self._proven_ns > SETTLE_NS or len(self._pending) >= MAX_PENDING:
+                self._settle()
+        elif topic in self._topics.values:
+            self._last_values[topic] = payload
+        else:
+            self.dropped += topic == self._topics.scans
+
+    def _prove(self, sent_ns: int) -> None:
+        """Record what waits: nothing is missing before this time."""
+        self._proven_ns = sent_ns
+        pending, self._pending = self._pending, []
+        for topic, sent, payload in pending:
+            self._record(topic, sent, payload)
+
+    def _settle(self, *, at_end: bool = False) -> None:
+        """Record what waits though no write proves it, up to a scan that wrote: its write has not come."""
+        pending, self._pending = self._pending, []
+        if self._image is not None:
+            self._begin()
+        for topic, sent, payload in pending:
+            if topic == self._topics.scans and self._wrote(payload):
+                if not at_end:
+                    self._rest(scan_head(payload).stamp, 0)
+                return
+            if self._recording:
+                self._record(topic, sent, payload)
+
+    def _record(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        if self.ended is None:
+            try:
+                self._recorders[topic](topic, sent_ns, payload)
+            except CdrError as error:
+                self._note_malformed(topic, error)
+
+    def _wrote(self, payload: bytes) -> bool:
+        """Whether a scan of this run wrote common memory."""
+        try:
+            scan: Any = decode("automax_msgs/msg/Scan", payload)
+        except CdrError:
+            return False
+        track = self._tasks.get(scan.task)
+        if track is not None and track.began_anew(scan.scan, scan.stamp):
+            return False
+        return bool(scan.written.variable or scan.committed.variable)
+
+    def _drop_pending(self) -> None:
+        self.dropped += sum(topic == self._topics.scans for topic, _, _ in self._pending)
+        self._last_values.update(
+            (topic, payload) for topic, _, payload in self._pending if topic in self._topics.values
+        )
+        self._pending.clear()
+
+    def _begin(self) -> None:
+        """Record from the image on."""
+        assert self._image is not None
+        sent_ns, head, payload = self._image
+        self._image = None
+        if self._open_gap is not None:
+            # By now it is known how many writes the bag lacks: those that did not come, and those before the image.
+            number, self._open_gap = self._open_gap, None
+            self.gaps[number] = replace(self.gaps[number], missing=head.sequence - self._sequence)
+        self._recording, self._sequence = True, head.sequence
+        if self.first_stamp is None:
+            self.first_stamp = head.stamp
+            self._plan_split(head.stamp)
+            self._write(self._topics.variables, 0, head.stamp, self._table)
+        self._write(self._topics.snapshot, sent_ns, head.stamp, payload)
+        for topic, value in self._last_values.items():
+            self._record_value(topic, 0, value)
+        self._last_values.clear()
+
+    @property
+    def _split_due(self) -> bool:
+        return self._writer.split_due or bool(self._split_ns and self.last_stamp >= self._next_split)
+
+    def _plan_split(self, stamp: int) -> None:
+        origin, period = self._facts.stamp, self._split_ns or 1
+        self._next_split = origin + ((stamp - origin) // period + 1) * period
+
+    def _split(self, stamp: int) -> None:
+        """Begin a further file, with all that is needed to read it alone but the image, which comes next."""
+        self._plan_split(stamp)
+        self._writer.split()
+        self.files_begun += 1
+        self._write(self._topics.variables, 0, stamp, self._table)
+        for topic, payload in self._values_now.items():
+            self._write(topic, 0, stamp, payload)
+        for track in self._tasks.values():
+            track.begin_file()
+
+    def _rest(self, stamp: int, missing: int) -> None:
+        """Wait for an image: writes did not come."""
+        self._open_gap = len(self.gaps)
+        self._note_gap(Gap(stamp, "writes of common memory", missing), "recording goes on")
+        self._recording, self._image = False, None
+        self._drop_pending()
+        for track in self._tasks.values():
+            track.rest()
+
+    def _note_gap(self, gap: Gap, then: str) -> None:
+        self.gaps.append(gap)
+        self.notes.append(
+            f"gap at {self.seconds(gap.stamp):.3f} s of the run: {gap} did not come; "
+            f"{then} from the rack's next image and states on"
+        )
+
+    def _note_malformed(self, topic: str, error: CdrError) -> None:
+        self.malformed += 1
+        if self.malformed <= _MALFORMED_NAMED:
+            self.notes.append(f"left out a malformed message on {topic}: {error}")
+
+    def _check_run(self, run_id: int) -> bool:
+        """Return whether a message is one of this run of the rack; a message of another run ends the recording."""
+        if run_id != self._run_id:
+            self._end(_RESTARTED)
+        return run_id == self._run_id
+
+    def _end(self, reason: str) -> None:
+        """End the recording with what still waits of this run."""
+        if self.ended is None:
+            self._settle(at_end=True)
+            self.ended = reason
+
+    def _compare_source(self, task: str, source_hash: str) -> None:
+        for file in self._files:
+            if file.name == f"{task}.BLK" and file.sha256 != source_hash and task not in self._wrong_sources:
+                self._wrong_sources.append(task)
+                self.notes.append(f"the file stored as {file.name} is not the source that task {task} runs")
+
+    def _look_whether_replayable(self, stamp: int) -> None:
+        if self.replayable_from is None and all(track.ready for track in self._tasks.values()):
+            self.replayable_from = stamp
+
+    def _write(self, topic: str, sent_ns: int, stamp: int, payload: bytes) -> None:
+        if sent_ns:
+            self._last_sent = sent_ns
+            self.last_stamp = stamp
+        self._writer.write(self._channels[topic], stamp, payload)
+
+
+def _decoded(payload: bytes) -> VariableTable:
+    table = decode("automax_msgs/msg/VariableTable", payload)
+    assert isinstance(table, VariableTable)
+    return table

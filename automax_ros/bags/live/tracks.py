@@ -1,0 +1,59 @@
+"""How far the recording of a running rack has come with each task, and what did not come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Messages that did not come: what they were, how many (0: nobody knows), and the stamp where that was seen."""
+
+    stamp: int
+    what: str
+    missing: int
+
+    def __str__(self) -> str:
+        return f"{self.missing or 'some'} {self.what}"
+
+
+@dataclass
+class TaskTrack:
+    """What is recorded of one task: number and stamp of its last scan, the last scan that a state contains.
+
+    ``follows``: each scan since a full one is there. ``ready``: a state joins them, so they can be executed again.
+    ``alone``: that holds for the present file of a split recording too.
+    """
+
+    last: int = -1
+    stamp: int = -1
+    state: int = -1
+    follows: bool = False
+    ready: bool = False
+    alone: bool = False
+
+    def begin_file(self) -> None:
+        """Wait for a state in a further file; scans go on."""
+        self.state, self.alone = -1, False
+
+    def rest(self) -> None:
+        """Wait for a full scan and a state."""
+        self.state, self.follows, self.ready, self.alone = -1, False, False, False
+
+    def began_anew(self, scan: int, stamp: int) -> bool:
+        """Whether a scan or state of this number and time belongs to a later run of the task."""
+        return scan < self.last and stamp > self.stamp
+
+    def take_scan(self, scan: int, stamp: int) -> None:
+        """Note a scan that is full or follows the last one."""
+        self.follows = True
+        self._join(self.state == scan - 1)
+        self.last, self.stamp = scan, stamp
+
+    def take_state(self, scan: int) -> None:
+        """Note a state behind a scan."""
+        self.state = scan
+        self._join(self.follows and scan == self.last)
+
+    def _join(self, joined: bool) -> None:
+        self.ready, self.alone = self.ready or joined, self.alone or joined

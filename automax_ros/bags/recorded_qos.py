@@ -1,0 +1,62 @@
+"""The quality of service that a recording tells of a topic, in the words of rosbag2 or its older numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from automax_ros.bags.qos import QosProfile
+
+MAX_QOS_BYTES = 1 << 16
+"""Longest text that is read (decision)."""
+MAX_DEPTH = 10_000
+"""Deepest history that is asked for (decision)."""
+STREAM = QosProfile("reliable", "volatile", "keep_last", 1000)
+"""What a topic gets of which nothing is told."""
+_KEEP_ALL_DEPTH = 1000
+_NESTING = 6
+_RELIABILITY = {"1": "reliable", "2": "best_effort"}
+_DURABILITY = {"1": "transient_local", "2": "volatile"}
+_HISTORY = {"1": "keep_last", "2": "keep_all"}
+_Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+
+def recorded_qos(text: str) -> QosProfile:
+    """Return the first profile of ``offered_qos_profiles``; what cannot be read is that of a stream."""
+    profiles = _loaded(text)
+    profile = profiles[0] if isinstance(profiles, list) and profiles else None
+    if not isinstance(profile, dict):
+        return STREAM
+    reliability = _word(profile, "reliability", _RELIABILITY, STREAM.reliability)
+    durability = _word(profile, "durability", _DURABILITY, STREAM.durability)
+    keeps_all = _word(profile, "history", _HISTORY, STREAM.history) == "keep_all"
+    return QosProfile(reliability, durability, "keep_last", _KEEP_ALL_DEPTH if keeps_all else _depth(profile))
+
+
+def _word(profile: dict[Any, Any], key: str, numbers: dict[str, str], otherwise: str) -> str:
+    word = str(profile.get(key, "")).lower()
+    word = numbers.get(word, word)
+    return word if word in numbers.values() else otherwise
+
+
+def _depth(profile: dict[Any, Any]) -> int:
+    text = str(profile.get("depth", ""))
+    depth = int(text) if text.isascii() and text.isdigit() and len(text) < 20 else 0
+    return min(depth, MAX_DEPTH) if depth else STREAM.depth
+
+
+def _loaded(text: str) -> Any:
+    """Load YAML of bounded depth without aliases, None if it is none."""
+    if len(text) > MAX_QOS_BYTES:
+        return None
+    depth = 0
+    try:
+        for event in yaml.parse(text, Loader=_Loader):
+            depth += isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent))
+            depth -= isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent))
+            if depth > _NESTING or isinstance(event, yaml.AliasEvent):
+                return None
+        return yaml.load(text, Loader=_Loader)
+    except (yaml.YAMLError, ValueError):
+        return None

@@ -1,0 +1,1 @@
+"""Repair of recordings whose writer was killed, or that were damaged."""

@@ -1,0 +1,99 @@
+"""What one data file of a recording holds, counted message by message, for its description."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+from mcap.records import Channel, Schema
+
+from automax_ros.bags.cdr import CdrError, decode
+from automax_ros.bags.metadata import FileSummary, TopicSummary
+
+SCAN, WRITE, TABLE = (f"automax_msgs/msg/{name}" for name in ("Scan", "CommonWrite", "VariableTable"))
+_MAX_QOS_TEXT = 1 << 14
+_MAX_QOS = 100
+
+
+@dataclass
+class FileContents:
+    """Counts of one file; times in nanoseconds, ``stamp`` is a message's own, ``log`` that of the log."""
+
+    name: str
+    messages: int = 0
+    scans: int = 0
+    first_log: int = 0
+    last_log: int = 0
+    first_stamp: int = 0
+    last_stamp: int = 0
+    run_start: int | None = None
+    """The stamp inside the first VariableTable: when the run began."""
+    rack: str = ""
+    counts: dict[int, int] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+
+    def type_of(self, channel: int) -> str:
+        """Return the name of a channel's messages, empty if nothing is known of them."""
+        known = self.channels.get(channel)
+        schema = self.schemas.get(known.schema_id) if known else None
+        return schema.name if schema else ""
+
+    def count(self, channel: int, log_time: int, stamp: int, payload: bytes) -> None:
+        """Count a message."""
+        if not self.messages:
+            self.first_log = self.last_log = log_time
+            self.first_stamp = self.last_stamp = stamp
+        self.messages += 1
+        self.first_log, self.last_log = min(self.first_log, log_time), max(self.last_log, log_time)
+        self.last_stamp = max(self.last_stamp, stamp)
+        self.counts[channel] = self.counts.get(channel, 0) + 1
+        kind = self.type_of(channel)
+        if kind == SCAN:
+            self.scans += 1
+        elif kind == TABLE and self.run_start is None:
+            with contextlib.suppress(CdrError):
+                table: Any = decode(TABLE, payload)
+                self.run_start, self.rack = table.stamp, table.rack
+
+    def summary(self) -> FileSummary:
+        """Return the file's line in metadata.yaml."""
+        return FileSummary(self.name, self.first_log, self.last_log - self.first_log, self.messages)
+
+
+def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
+    """Return the topics of a recording's files, each with the messages of all of them."""
+    found: dict[str, TopicSummary] = {}
+    for file in files:
+        for number, channel in file.channels.items():
+            before = found.get(channel.topic)
+            metadata = channel.metadata
+            found[channel.topic] = TopicSummary(
+                channel.topic,
+                file.type_of(number),
+                metadata.get("topic_type_hash", ""),
+                before.qos if before else _qos(metadata.get("offered_qos_profiles", "")),
+                (before.message_count if before else 0) + file.counts.get(number, 0),
+            )
+    return list(found.values())
+
+
+def _qos(text: str) -> list[dict[str, object]]:
+    """Return the profiles that a channel tells in YAML; what is not of their form is left out."""
+    profiles: Any = None
+    if len(text) <= _MAX_QOS_TEXT and "&" not in text and "*" not in text:
+        with contextlib.suppress(yaml.YAMLError, ValueError, OverflowError, RecursionError):
+            profiles = yaml.safe_load(text)
+    if not isinstance(profiles, list):
+        return []
+    return [item for item in profiles[:_MAX_QOS] if isinstance(item, dict) and all(map(_is_policy, item.items()))]
+
+
+def _is_policy(item: tuple[object, object]) -> bool:
+    key, value = item
+    if isinstance(value, dict):
+        return isinstance(key, str) and all(isinstance(part, (str, int)) for pair in value.items() for part in pair)
+    return isinstance(key, str) and isinstance(value, (str, int))

@@ -1,0 +1,56 @@
+"""Where a recording comes from, found again in its files when metadata.yaml is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mcap.records import Attachment, Metadata
+
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.rack_files import RACK_FILE, RackFile, fingerprint
+from automax_ros.bags.reader import load_yaml
+
+_MAX_FILES = 200
+_MAX_BYTES = 16 << 20
+_MAX_TEXT = 4 << 20
+
+
+class Provenance:
+    """Takes what the files of a recording tell of it, and answers with ``custom_data`` for metadata.yaml."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, str] = {}
+        self._files: dict[str, RackFile] = {}
+        self._bytes = 0
+
+    def take(self, record: Attachment | Metadata) -> None:
+        """Look at an attachment or metadata record of a data file."""
+        if isinstance(record, Metadata):
+            text = record.metadata.get("serialized_metadata", "") if record.name == "rosbag2" else ""
+            if text and not self._told and len(text) <= _MAX_TEXT:
+                self._take_text(text)
+        elif record.name not in self._files and (record.name == RACK_FILE or record.name.endswith(".BLK")):
+            self._bytes += len(record.data)
+            if self._bytes <= _MAX_BYTES and len(self._files) < _MAX_FILES:
+                self._files[record.name] = RackFile(record.name, record.data.decode("utf-8", "replace"))
+
+    def take_information(self, information: Mapping[str, Any]) -> None:
+        """Look at a readable metadata.yaml, or its copy in a data file."""
+        custom = information.get("custom_data")
+        if isinstance(custom, dict):
+            self._told = {str(key): str(value) for key, value in custom.items()}
+
+    def custom_data(self, rack: str) -> dict[str, str]:
+        """Return what was told, or what can be found out of the files and the rack's name."""
+        if self._told or not rack:
+            return dict(self._told)
+        return {"rack": rack, "fingerprint": f"{fingerprint(list(self._files.values())):016x}"}
+
+    def _take_text(self, text: str) -> None:
+        try:
+            information = load_yaml("rosbag2", text.encode("utf-8", "replace"))
+        except BagError:
+            return
+        if isinstance(information, dict):
+            self.take_information(information)

@@ -1,0 +1,1 @@
+"""Replay: every recorded scan executed again and compared."""

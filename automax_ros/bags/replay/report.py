@@ -1,0 +1,299 @@
+"""What a replay found, frozen: for the person as text, for programs as JSON."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from automax_ros.core.decimal_text import real_text
+from automax_ros.core.diagnostics import printable
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.types import Value
+
+OPEN_LOOP = (
+    "Open loop: each task scans on the recorded inputs. Behind a first difference the values from other tasks, from "
+    "ROS and from the plant stay those that were recorded."
+)
+_LONGEST_LIST = 40
+"""Most inputs of one scan that the text shows."""
+
+
+class Kind(enum.Enum):
+    """What differs."""
+
+    VARIABLE = "variable"
+    WRITES = "writes"
+    ERRORS = "errors"
+    STATE = "state"
+    STATUS = "status"
+
+
+@dataclass(frozen=True)
+class Point:
+    """One scan in which something differs: its number, its time since the start of the run, both values."""
+
+    scan: int
+    time_s: float
+    recorded: Value
+    replayed: Value
+
+
+@dataclass(frozen=True)
+class Greatest:
+    """The greatest difference (replayed - recorded) of a number, and the scan where it first occurs."""
+
+    scan: int
+    time_s: float
+    difference: float
+
+
+@dataclass(frozen=True)
+class Settled:
+    """From this scan on, up to the end, the difference stays from ``low`` to ``high``; both 0: equal again.
+
+    For booleans and strings both are 1 where the values differ in every scan.
+    """
+
+    scan: int
+    time_s: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Something of one task that differs in at least one scan; ``lines`` are the BASIC lines that can write it.
+
+    ``scans`` is the number of scans behind which it differs (for a state: the recorded states).
+    """
+
+    task: str
+    kind: Kind
+    name: str
+    first: Point
+    scans: int
+    unit: str = ""
+    lines: tuple[int, ...] = ()
+    greatest: Greatest | None = None
+    settled: Settled | None = None
+
+
+@dataclass(frozen=True)
+class NamedValue:
+    """A variable and its value."""
+
+    name: str
+    value: Value
+
+
+@dataclass(frozen=True)
+class FirstScan:
+    """The first of all scans that differ, with what it saw: the latched values and the reads in their order."""
+
+    task: str
+    scan: int
+    time_s: float
+    differences: tuple[Difference, ...]
+    latched: tuple[NamedValue, ...]
+    read: tuple[NamedValue, ...]
+
+
+@dataclass(frozen=True)
+class TaskReport:
+    """One task: where its source came from, how many scans and states were compared, and how many differ.
+
+    ``scans`` counts the part before SCAN_LOOP too, as scan 0. ``notes`` tell what the person should know besides.
+    """
+
+    name: str
+    source: str
+    edited: bool
+    scans: int
+    different: int
+    states: int
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """The whole result. Times count from the start of the run; ``more`` differences are counted, not listed."""
+
+    bag: str
+    rack: str
+    version: str
+    from_s: float
+    to_s: float
+    tolerance: float
+    tasks: tuple[TaskReport, ...]
+    first: FirstScan | None
+    differences: tuple[Difference, ...]
+    more: int = 0
+
+    @property
+    def identical(self) -> bool:
+        """Whether nothing differs."""
+        return not self.differences and not self.more
+
+    @property
+    def scans(self) -> int:
+        """How many scans were compared."""
+        return sum(task.scans for task in self.tasks)
+
+    def as_json(self) -> dict[str, object]:
+        """Return the report for ``--json``: plain dicts and lists; numbers that JSON lacks become texts."""
+        data = {"identical": self.identical, "scans": self.scans, "open_loop": OPEN_LOOP, **dataclasses.asdict(self)}
+        plain = _plain(data)
+        assert isinstance(plain, dict)
+        return plain
+
+    def text(self) -> str:
+        """Return the report as the person reads it."""
+        return "\n".join(_lines(self)) + "\n"
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, enum.Enum):
+        return value.value
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value)
+    return value
+
+
+def value_text(value: Value) -> str:
+    """Return a value for the report: strings in quotes, REALs with no more digits than they have."""
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if isinstance(value, float):
+        return real_text(value)
+    return f'"{printable(value)}"' if isinstance(value, str) else str(value)
+
+
+def difference_text(value: float) -> str:
+    """Return a difference with its sign."""
+    return f"{value:+.10g}"
+
+
+def _lines(report: ReplayReport) -> Iterator[str]:
+    where = f"{report.bag}: rack {report.rack}, {_seconds(report.from_s)} to {_seconds(report.to_s)} s"
+    yield f"{printable(where)}, recorded by version {printable(report.version) or 'unknown'}"
+    yield OPEN_LOOP
+    if report.tolerance:
+        yield f"Numbers that differ by at most {report.tolerance:g} count as equal; states are not compared."
+    yield ""
+    yield from _table([("task", "source", "scans", "result"), *(_task_row(task) for task in report.tasks)])
+    for task in report.tasks:
+        for note in task.notes:
+            yield f"{task.name}: {printable(note)}"
+    yield ""
+    if report.first is None:
+        yield f"{report.scans} scans executed again, no difference."
+        return
+    yield from _first_lines(report.first)
+    yield ""
+    yield from _table([_HEAD, *(_difference_row(item) for item in report.differences)])
+    if report.more:
+        yield f"and {report.more} more (--max-differences shows them)"
+
+
+def _task_row(task: TaskReport) -> tuple[str, ...]:
+    if task.different:
+        result = f"{task.different} scans differ"
+    elif not task.scans:
+        result = "nothing compared"
+    else:
+        states = f", and {task.states} state{'s' if task.states > 1 else ''}" if task.states else ""
+        result = f"identical{states}"
+    return task.name, printable(task.source), str(task.scans), result
+
+
+def _first_lines(first: FirstScan) -> Iterator[str]:
+    yield f"First difference: task {first.task}, scan {first.scan} at {_seconds(first.time_s)} s"
+    for item in first.differences:
+        place = f"  (line {_numbers(item.lines)})" if item.lines else ""
+        values = f"recorded {value_text(item.first.recorded)}, replayed {value_text(item.first.replayed)}"
+        yield f"  {printable(item.name)}: {values}{place}"
+    for title, values_seen in (("latched", first.latched), ("read", first.read)):
+        if values_seen:
+            shown = [f"{item.name}={value_text(item.value)}" for item in values_seen[:_LONGEST_LIST]]
+            rest = len(values_seen) - len(shown)
+            yield from _wrapped(f"  it {title}: ", shown + ([f"and {rest} more"] if rest else []))
+
+
+_HEAD = ("task", "differs", "line", "first scan", "at s", "recorded", "replayed", "greatest", "in scan", "scans", "")
+
+
+def _difference_row(item: Difference) -> tuple[str, ...]:
+    greatest = item.greatest
+    name = f"{item.name} ({item.unit})" if item.unit else item.name
+    return (
+        item.task,
+        printable(name),
+        _numbers(item.lines),
+        str(item.first.scan),
+        _seconds(item.first.time_s),
+        value_text(item.first.recorded),
+        value_text(item.first.replayed),
+        difference_text(greatest.difference) if greatest else "",
+        str(greatest.scan) if greatest else "",
+        str(item.scans),
+        _settled_text(item),
+    )
+
+
+def _settled_text(item: Difference) -> str:
+    settled = item.settled
+    if settled is None:
+        return ""
+    since = f"from scan {settled.scan} ({_seconds(settled.time_s)} s) on"
+    if settled.low == settled.high == 0:
+        return f"equal again {since}"
+    if item.greatest is None:
+        return f"apart {since}"
+    if settled.low == settled.high:
+        return f"settles {difference_text(settled.low)} apart {since}"
+    return f"settles {difference_text(settled.low)} to {difference_text(settled.high)} apart {since}"
+
+
+def _numbers(lines: tuple[int, ...]) -> str:
+    shown = ", ".join(map(str, lines[:3]))
+    return f"{shown} ..." if len(lines) > 3 else shown
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.9f}".rstrip("0").rstrip(".")
+
+
+def errors_text(errors: Sequence[tuple[int, int]]) -> str:
+    """Return the run-time errors of a scan: ``line 150 AMX7003 division by zero``; line 0 where it does not count."""
+    return ", ".join(_error_text(line, code) for line, code in errors) or "none"
+
+
+def _error_text(line: int, code: int) -> str:
+    problem = PROBLEMS.get(f"AMX{code:04d}")
+    title = f" {problem.title}" if problem else ""
+    return f"line {line} AMX{code:04d}{title}" if line else f"AMX{code:04d}{title}"
+
+
+def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def _wrapped(title: str, parts: Sequence[str], width: int = 110) -> Iterator[str]:
+    """Lines of ``title: a, b, c``, broken between parts."""
+    line = title
+    for number, part in enumerate(parts):
+        piece = part if number == len(parts) - 1 else f"{part}, "
+        if len(line) + len(piece) > width and line.strip() and line != title:
+            yield line.rstrip()
+            line = " " * len(title)
+        line += piece
+    yield line.rstrip()

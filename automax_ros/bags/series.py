@@ -1,0 +1,235 @@
+"""The values of watched commons over time: an instant, and what changed in it; for tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.bags.common_log import (
+    NO_COMMON_MEMORY_HINT,
+    Cell,
+    CommonLog,
+    WatchedValues,
+    strings_of,
+    variables_of,
+)
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.locals import WatchedLocals, is_local
+from automax_ros.bags.messages import CommonImage, CommonWrite, Scan, TaskState, Variable, VariableTable
+from automax_ros.bags.reader import BagMessage, BagReader
+from automax_ros.bags.variables import Watched, WatchError, watched_by_default, watched_by_name
+from automax_ros.core.decimal_text import seconds_text
+
+MAX_GRID_ROWS = 20_000_000
+"""Most rows of a table on a grid (decision): a day at 5.5 ms has 15.7 million."""
+_TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "VariableTable"))
+_SCAN = "automax_msgs/msg/Scan"
+_STATE = "automax_msgs/msg/TaskState"
+
+Change = tuple[int, dict[int, Cell]]
+"""Nanoseconds from the start of the run, and the new values by index of column."""
+Progress = Callable[[float], None]
+"""Takes the share that is done, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of a run that is wanted, and its grid; nanoseconds from the start of the run.
+
+    ``end_ns`` None is the end of the recording. ``step_ns`` above 0 wants the values at ``start_ns`` and after each
+    step.
+    """
+
+    start_ns: int = 0
+    end_ns: int | None = None
+    step_ns: int = 0
+
+
+WHOLE_RUN = Window()
+
+
+class Series:
+    """The watched variables of a recording, to be read once.
+
+    Without ``watch`` all simple numeric and boolean variables are watched; array elements are named like ``TABLE%(3)``,
+    locals of tasks like ``SPEED.RATIO%``.
+    ``columns`` are the watched variables, ``rack`` and ``origin_ns`` the rack's name and the stamp at the start of its
+    run; ``end_ns`` is the end of what was read, once it is read. ``take_scan``, if given, is called with each scan of
+    the window.
+
+    Raises:
+        BagError: the recording cannot be read or has no common memory, or a name in ``watch`` is unknown.
+    """
+
+    def __init__(
+        self,
+        bag: Path,
+        watch: Sequence[str] | None = None,
+        window: Window = WHOLE_RUN,
+        progress: Progress | None = None,
+        take_scan: Callable[[int, Scan], None] | None = None,
+    ) -> None:
+        self._bag = bag
+        self._window = window
+        self._reader = BagReader(bag)
+        self._reader.on_progress = progress
+        self._take_scan = take_scan
+        types = _TYPES | {_SCAN} if take_scan else _TYPES
+        if any(map(is_local, watch or ())):
+            types |= {_STATE}
+        self._messages = self._reader.messages(types=types)
+        self._log = CommonLog(bag)
+        table = self._first_table()
+        variables = variables_of(bag, table)
+        self._locals = WatchedLocals(bag)
+        self.columns: tuple[Watched, ...] = tuple(self._watched(variables, watch))
+        self.rack = table.rack
+        self.origin_ns = table.stamp
+        self.end_ns = 0
+        self._values = WatchedValues(self.columns, strings_of(variables))
+
+    def changes(self) -> Iterator[Change]:
+        """Return the instants of the window at which something changed, or those of its grid.
+
+        The first one inside of a window tells what holds there already. No value is told before the recording tells it.
+
+        Raises:
+            BagError: the recording is damaged, or the window holds nothing, or too many rows.
+        """
+        found = False
+        changes = self._in_window(self._all_changes())
+        for change in self._on_grid(changes) if self._window.step_ns else changes:
+            found = True
+            yield change
+        self._locals.require_all()
+        if not found and self.columns:
+            last = f"the recording ends at {seconds_text(self.end_ns)} s"
+            start = seconds_text(self._window.start_ns)
+            raise BagError("AMX6825", self._bag, f"tells nothing from {start} s on, in the range asked for", last)
+
+    def _watched(self, variables: dict[str, Variable], watch: Sequence[str] | None) -> list[Watched]:
+        if watch is None:
+            return watched_by_default(variables)
+        watched: dict[str, Watched] = {}
+        try:
+            for name in watch:
+                if is_local(name):
+                    item = self._locals.add(len(watched), name)
+                else:
+                    (item,) = watched_by_name(variables, [name])
+                watched.setdefault(item.label, item)
+        except WatchError as error:
+            raise BagError("AMX6821", self._bag, str(error), error.hint) from error
+        return list(watched.values())
+
+    def _first_table(self) -> VariableTable:
+        for entry in self._messages:
+            if isinstance(entry.message, VariableTable):
+                self._log.take_table(entry.message)
+                return entry.message
+            if isinstance(entry.message, (CommonImage, CommonWrite)):
+                self._log.is_new(entry.message)
+        raise BagError(
+            "AMX6820",
+            self._bag,
+            "has no common memory: no table of variables (topic .../variables)",
+            NO_COMMON_MEMORY_HINT,
+        )
+
+    def _all_changes(self) -> Iterator[Change]:
+        """Each instant of the recording with a change; the writes of one instant together."""
+        values, instant = self._values, self.origin_ns
+        for entry in self._messages:
+            message = entry.message
+            if isinstance(message, (CommonImage, CommonWrite, TaskState)):
+                if not isinstance(message, TaskState) and not self._log.is_new(message):
+                    continue
+                if message.stamp != instant:
+                    changed = values.changes()
+                    if changed:
+                        yield max(0, instant - self.origin_ns), changed
+                    instant = message.stamp
+                self._take(message)
+            else:
+                self._take_other(entry)
+        changed = values.changes()
+        if changed:
+            yield max(0, instant - self.origin_ns), changed
+        self.end_ns = max(0, instant - self.origin_ns, (self._reader.last_stamp or 0) - self.origin_ns)
+
+    def _take(self, message: CommonImage | CommonWrite | TaskState) -> None:
+        if isinstance(message, TaskState):
+            for column, value in self._locals.values(message):
+                self._values.tell(column, value)
+            return
+        try:
+            self._values.take(message.values)
+        except ValueError as error:
+            text = f"wrong values at {seconds_text(max(0, message.stamp))} s: {error}"
+            raise BagError("AMX6813", self._bag, text) from error
+
+    def _take_other(self, entry: BagMessage) -> None:
+        message = entry.message
+        if isinstance(message, VariableTable):
+            self._log.take_table(message)
+        elif isinstance(message, Scan) and self._take_scan is not None:
+            time = max(0, message.stamp - self.origin_ns)
+            if time >= self._window.start_ns and (self._window.end_ns is None or time <= self._window.end_ns):
+                self._take_scan(time, message)
+
+    def _in_window(self, changes: Iterator[Change]) -> Iterator[Change]:
+        """Leave out what is not wanted; begin with what holds at the start of the window."""
+        start, end = self._window.start_ns, self._window.end_ns
+        if not start and end is None:
+            yield from changes
+            return
+        held: dict[int, Cell] = {}
+        begun = False
+        for time, changed in changes:
+            if end is not None and time > end:
+                self.end_ns = end
+                break
+            if time < start:
+                held.update(changed)
+            elif begun:
+                yield time, changed
+            else:
+                begun = True
+                if time > start and held:
+                    yield start, held
+                    yield time, changed
+                else:
+                    yield time, {**held, **changed}
+        else:
+            if end is not None:
+                self.end_ns = min(self.end_ns, end)
+        if not begun and held and start <= self.end_ns:
+            yield start, held
+
+    def _on_grid(self, changes: Iterator[Change]) -> Iterator[Change]:
+        """The instants of the grid, from the first at which something is known, with what changed since the last."""
+        step = self._window.step_ns
+        due: int | None = None
+        held: dict[int, Cell] = {}
+        rows = 0
+        for time, changed in changes:
+            if due is None:
+                due = self._window.start_ns + -(-(time - self._window.start_ns) // step) * step
+            while due < time:
+                rows = self._counted(rows)
+                yield due, held
+                held = {}
+                due += step
+            held.update(changed)
+        while due is not None and due <= self.end_ns:
+            rows = self._counted(rows)
+            yield due, held
+            held = {}
+            due += step
+
+    def _counted(self, rows: int) -> int:
+        if rows >= MAX_GRID_ROWS:
+            hint = "give a greater --every, or a part of the run by --from and --to"
+            raise BagError("AMX6826", self._bag, f"has more than {MAX_GRID_ROWS} rows on that grid", hint)
+        return rows + 1

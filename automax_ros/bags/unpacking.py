@@ -1,0 +1,91 @@
+"""Decompresses chunks that nobody has to be trusted with: what they claim to hold is checked before it takes memory."""
+
+from __future__ import annotations
+
+import contextlib
+import zlib
+from pathlib import Path
+
+import lz4.frame
+import zstandard
+from mcap.records import Chunk
+
+from automax_ros.bags.errors import BagError
+
+MAX_RECORD_BYTES = 64 << 20
+"""Longest record, longest chunk after decompression, and sum of all schemas and channels that is read (decision)."""
+MAX_RATIO = 1000
+FREE_BYTES = 512 << 20
+"""A whole file may become so many times as large, besides these bytes: recordings come to 10 or 50 (decision)."""
+DAMAGED_HINT = "copy the file again from where it was recorded, or save what is sound by `automax bag repair`"
+
+
+class Unpacker:
+    """Decompresses the chunks of one file of ``stored_bytes`` bytes."""
+
+    def __init__(self, path: Path, stored_bytes: int) -> None:
+        self._path = path
+        self._left = FREE_BYTES + MAX_RATIO * stored_bytes
+
+    def unpacked(self, chunk: Chunk) -> bytes:
+        """Return what a chunk holds.
+
+        Raises:
+            BagError: damaged, beyond the limits, or of a compression that we do not know; the message names no place.
+        """
+        size = chunk.uncompressed_size
+        self._admit(size)
+        try:
+            data = self._whole(chunk.compression, chunk.data, size)
+        except (zstandard.ZstdError, RuntimeError, EOFError) as error:  # lz4 raises RuntimeError
+            raise self._damaged(f"a chunk cannot be decompressed: {error}") from error
+        if len(data) != size:
+            raise self._damaged(f"a chunk has {len(data)} bytes and should have {size}")
+        if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+            raise self._damaged("the checksum of a chunk is wrong")
+        return data
+
+    def beginning(self, compression: str, data: bytes, size: int) -> bytes:
+        """Return as much of a chunk of ``size`` bytes as the beginning of its compressed data gives.
+
+        Raises:
+            BagError: beyond the limits.
+        """
+        self._admit(size)
+        if not compression:
+            return data[:size]
+        found = bytearray()
+        with contextlib.suppress(zstandard.ZstdError, RuntimeError, EOFError):
+            if compression == "lz4":
+                found += lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size)
+            elif compression == "zstd":
+                reader = zstandard.ZstdDecompressor(max_window_size=MAX_RECORD_BYTES).stream_reader(data)
+                while len(found) < size and (part := reader.read(min(1 << 16, size - len(found)))):
+                    found += part
+        return bytes(found)
+
+    def _admit(self, size: int) -> None:
+        if size > MAX_RECORD_BYTES:
+            raise BagError("AMX6814", self._path, f"a chunk of {size} bytes, at most {MAX_RECORD_BYTES} are read")
+        self._left -= size
+        if self._left < 0:
+            raise BagError(
+                "AMX6814", self._path, f"becomes more than {MAX_RATIO} times as large when it is decompressed"
+            )
+
+    def _whole(self, compression: str, data: bytes, size: int) -> bytes:
+        if not compression:
+            return data
+        if compression == "lz4":
+            unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+            return unpacked
+        if compression != "zstd":
+            raise BagError("AMX6811", self._path, f"is compressed with {compression[:40]!r}; zstd and lz4 can be read")
+        # zstandard allocates what the frame states, so that has to be looked at too.
+        stated = zstandard.get_frame_parameters(data).content_size
+        if stated not in (size, zstandard.CONTENTSIZE_UNKNOWN):
+            raise self._damaged(f"a chunk holds {stated} bytes and should hold {size}")
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size) if size else b""
+
+    def _damaged(self, message: str) -> BagError:
+        return BagError("AMX6813", self._path, message, DAMAGED_HINT)

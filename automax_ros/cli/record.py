@@ -1,0 +1,316 @@
+"""Record a rack that runs, from any process of its ROS 2 domain.
+
+RACK is the rack's name or namespace, or its YAML file. The bag is the one that `automax run --record` makes: it begins
+where the rack has sent an image of its common memory, and tasks can be replayed from their first full scan and state
+on; the recorder asks the rack for both. Ctrl-C ends it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import time
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from automax_ros.bags.cdr import CdrError
+from automax_ros.bags.errors import BagError, RecordingError
+from automax_ros.bags.live.recording import LiveRecording
+from automax_ros.bags.messages import VariableTable, WriterKind
+from automax_ros.bags.rack_files import RACK_FILE, RackFile, RackFilesError
+from automax_ros.bags.writer import StorageOptions
+from automax_ros.cli.record_options import split_period, storage_options
+from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
+from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.signals import StopRequest, stop_signals
+from automax_ros.cli.status_line import StatusLine
+from automax_ros.cli.terminal import count_of
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.rack.findings import did_you_mean, quoted
+from automax_ros.rack.ros_names import namespace
+
+if TYPE_CHECKING:
+    from automax_ros.nodes.recorder import LiveRecorder
+
+DEFAULT_WAIT_S = "10"
+_SPACE = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*){0,7}")
+_PATIENCE_S = 3.0
+"""A rack that is gone for so long is reported."""
+_GAPS_SHOWN = 20
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax record``."""
+    parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file")
+    parser.add_argument(
+        "--output", "-o", type=Path, metavar="DIR", help="the new rosbag2 folder (default: rack and time)"
+    )
+    parser.add_argument("--duration", metavar="S", help="seconds after which the recording ends by itself")
+    parser.add_argument("--tasks", metavar="A,B", help="record scans and states of these tasks only (default: all)")
+    parser.add_argument(
+        "--split-mb", metavar="MB", help="begin a new file when one has so many megabytes (1 MB is 10^6 bytes)"
+    )
+    parser.add_argument("--split-s", metavar="S", help="begin a new file each S seconds of rack time")
+    parser.add_argument("--compression", metavar="zstd|lz4|none", help="how the files are compressed (default: zstd)")
+    parser.add_argument(
+        "--wait", metavar="S", default=DEFAULT_WAIT_S, help=f"seconds to look for the rack (default: {DEFAULT_WAIT_S})"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Record until Ctrl-C, the duration has passed or the rack starts anew; 1 where recording broke off."""
+    duration_ns = _seconds("--duration", arguments.duration) if arguments.duration is not None else None
+    wait_ns = _seconds("--wait", arguments.wait)
+    storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
+    how = _Storing(storage, split_period(arguments.split_s, "--"), arguments.tasks)
+    with stop_signals() as stop:
+        domain = prepare_ros()
+        own, own_files = _rack(arguments.rack)
+        folder = arguments.output or Path(f"{own.strip('/').replace('/', '_')}_{datetime.now():%Y-%m-%d_%H-%M-%S}")
+        if folder.exists():
+            print(RecordingError("AMX6800", folder, "exists already, not overwriting"), file=sys.stderr)
+            return 2
+        from automax_ros.nodes.environment import RosUnavailable
+        from automax_ros.nodes.recorder import LiveRecorder
+
+        try:
+            recorder = LiveRecorder(own)
+        except RosUnavailable as error:
+            raise UsageError(str(error)) from error
+        session = _Session(recorder, own, domain, stop)
+        try:
+            return session.record(folder, wait_ns, duration_ns, how, own_files)
+        except BagError as error:
+            print(error, file=sys.stderr)
+            return 2
+        finally:
+            recorder.close()
+
+
+@dataclass(frozen=True)
+class _Storing:
+    """How the recording is stored, and the tasks that the person named."""
+
+    storage: StorageOptions
+    split_ns: int
+    tasks: str | None
+
+
+class _Session:
+    """One recording as the person sees it."""
+
+    def __init__(self, recorder: LiveRecorder, space: str, domain: int, stop: StopRequest) -> None:
+        self._recorder, self._space, self._domain, self._stop = recorder, space, domain, stop
+        self._line = StatusLine()
+        self._shown = (0, 0)
+        self._gone_since = 0.0
+        self._next_presence = 0.0
+
+    def record(
+        self, folder: Path, wait_ns: int, duration_ns: int | None, how: _Storing, own_files: list[RackFile]
+    ) -> int:
+        table = self._found(wait_ns)
+        if table is None:
+            return 0
+        chosen = _chosen(table, how.tasks)
+        files = self._files(own_files)
+        if self._stop.requested:
+            return 0
+        recording = self._recorder.open(folder, files, chosen, how.storage, how.split_ns)
+        self._line.message(
+            f"rack {table.rack}: {count_of(len(table.variables), 'common variable')}, tasks "
+            f"{' '.join(sorted(chosen) if chosen else _tasks(table))}\n"
+            f"recording {self._space} in domain {self._domain} into {folder}; Ctrl-C ends the recording"
+        )
+        sync = DiskSync(recording.sync)
+        try:
+            self._loop(recording, duration_ns)
+        finally:
+            self._recorder.finish()
+            sync.stop()
+        self._notes(recording)
+        return self._summary(recording, folder)
+
+    def _found(self, wait_ns: int) -> VariableTable | None:
+        """Wait for the rack; None if a signal comes first."""
+        try:
+            table = self._recorder.find(wait_ns, lambda: self._stop.requested)
+        except CdrError as error:
+            raise UsageError(f"{self._space}/variables is not a rack's table: {error}") from error
+        if table is not None or self._stop.requested:
+            return table
+        there = self._recorder.racks()
+        hint = did_you_mean(self._space, there) or (
+            f"there are {', '.join(there)}" if there else "start the rack first"
+        )
+        seen = "" if there else "; no rack is there"
+        raise UsageError(
+            f"no rack {self._space} in ROS domain {self._domain} within {wait_ns / NS_PER_S:g} s{seen}",
+            hint if there else f"{hint}, or set its ROS_DOMAIN_ID",
+        )
+
+    def _files(self, own: list[RackFile]) -> list[RackFile]:
+        """Return the files that run, from the rack itself if it offers them, else from the YAML file that was named."""
+        try:
+            offered = self._recorder.files(lambda: self._stop.requested)
+        except RackFilesError as error:
+            self._line.message(f"warning: {self._space}/config is not what a rack sends: {error}")
+            offered = []
+        if not offered:
+            if not self._stop.requested:
+                source = "those beside the YAML file are stored" if own else "name its YAML file to store those"
+                self._line.message(f"warning: the rack does not offer its files on {self._space}/config: {source}")
+            return own
+        texts = {item.name: item.sha256 for item in offered}
+        for item in own:
+            if texts.get(item.name) != item.sha256:
+                self._line.message(f"warning: {item.name} on disk is not what runs; the bag stores what runs")
+        return offered
+
+    def _loop(self, recording: LiveRecording, duration_ns: int | None) -> None:
+        from automax_ros.nodes.recorder import LOOK_S
+
+        began: int | None = None
+        while not self._stop.requested and recording.failure is None and recording.ended is None:
+            self._recorder.step()
+            now = time.monotonic_ns()
+            if began is None and recording.first_stamp is not None:
+                began = now
+                self._line.message(f"recording since {recording.seconds(recording.first_stamp):.3f} s of the run")
+            if began is not None and duration_ns is not None and now - began >= duration_ns:
+                return
+            self._notes(recording)
+            self._show(recording)
+            self._look_for_rack()
+            time.sleep(LOOK_S)
+
+    def _notes(self, recording: LiveRecording) -> None:
+        for note in recording.notes:
+            self._line.message(note)
+        recording.notes.clear()
+
+    def _show(self, recording: LiveRecording) -> None:
+        passed = self._line.due()
+        if not passed:
+            return
+        if recording.first_stamp is None:
+            self._line.show(["waiting for an image of common memory"])
+            return
+        scans, writes = recording.scans - self._shown[0], recording.writes - self._shown[1]
+        self._shown = recording.scans, recording.writes
+        parts = [
+            f"{recording.seconds(recording.last_stamp):8.1f} s",
+            f"{scans * NS_PER_S / passed:.0f} scans/s",
+            f"{writes * NS_PER_S / passed:.0f} writes/s",
+        ]
+        if recording.rests:
+            parts.append("waiting for the rack's image or states")
+        self._line.show([*parts, count_of(len(recording.gaps), "gap")])
+
+    def _look_for_rack(self) -> None:
+        """Tell once when the rack has left the graph, and once when it is back."""
+        now = time.monotonic()
+        if now < self._next_presence:
+            return
+        self._next_presence = now + 1.0
+        gone = self._gone_since
+        if self._recorder.is_there:
+            if gone < 0:
+                self._line.message(f"rack {self._space} is there again")
+            self._gone_since = 0.0
+        elif not gone:
+            self._gone_since = now
+        elif 0 < gone < now - _PATIENCE_S:
+            self._line.message(f"rack {self._space} has gone; Ctrl-C ends the recording")
+            self._gone_since = -1.0
+
+    def _summary(self, recording: LiveRecording, folder: Path) -> int:
+        if recording.ended is not None:
+            self._line.message(f"{recording.ended}: the recording ends here; record again for the new run")
+        if recording.first_stamp is None:
+            self._line.message(f"nothing was recorded into {folder}: no image of common memory came")
+        else:
+            span = f"{recording.seconds(recording.first_stamp):.3f} to {recording.seconds(recording.last_stamp):.3f} s"
+            self._line.message(
+                f"recorded {span} of the run: {count_of(recording.scans, 'scan')}, "
+                f"{count_of(recording.writes, 'write')}, {count_of(recording.values, 'value')} of commons"
+            )
+        if recording.replayable_from is not None:
+            self._line.message(f"  replayable from {recording.seconds(recording.replayable_from):.3f} s on")
+        if recording.dropped:
+            self._line.message(f"  {count_of(recording.dropped, 'scan')} before a full one left out")
+        for gap in recording.gaps[:_GAPS_SHOWN]:
+            self._line.message(f"  gap at {recording.seconds(gap.stamp):.3f} s: {gap}")
+        if len(recording.gaps) > _GAPS_SHOWN:
+            self._line.message(f"  and {len(recording.gaps) - _GAPS_SHOWN} more gaps")
+        lost = sum(self._recorder.lost_values.values())
+        if lost:
+            self._line.message(f"  {count_of(lost, 'value')} of common topics did not come; the write log has them")
+        if recording.malformed:
+            self._line.message(f"  {count_of(recording.malformed, 'malformed message')} left out")
+        for item in recording.lacks if recording.first_stamp is not None else ():
+            self._line.message(f"  the bag lacks {item}")
+        if recording.failure is not None:
+            print(recording.failure, file=sys.stderr)
+            return 1
+        size = sum(item.stat().st_size for item in folder.iterdir())
+        self._line.message(f"recorded {folder}: {size / 1e6:.2f} MB")
+        return 0
+
+
+def _rack(text: str) -> tuple[str, list[RackFile]]:
+    """Return the namespace with its slash, and the files where RACK is a YAML file."""
+    path = Path(text)
+    if path.suffix.lower() in {".yaml", ".yml"} or path.is_file():
+        return _from_file(path)
+    space = text.strip().rstrip("/")
+    if space and "/" not in space:
+        space = namespace(space)
+    if not _SPACE.fullmatch(space):
+        raise UsageError(f"{quoted(text)} is neither a rack's name or namespace nor a YAML file")
+    return f"/{space.lstrip('/')}", []
+
+
+def _from_file(path: Path) -> tuple[str, list[RackFile]]:
+    from automax_ros.rack.loader import load
+    from automax_ros.rack.tasks_check import check_tasks
+
+    result = load(path, allow_outside=True)
+    if result.config is None or has_errors(result.diagnostics):
+        raise UsageError(f"{path} is not a sound rack file", f"automax check {path} tells what is wrong")
+    sources = [RackFile(f"{task.name}.BLK", source.text) for task, source, _ in check_tasks(result.config)]
+    return f"/{result.config.namespace}", [RackFile(RACK_FILE, result.config.text), *sources]
+
+
+def _tasks(table: VariableTable) -> list[str]:
+    return [writer.name for writer in table.writers if writer.kind == WriterKind.TASK]
+
+
+def _chosen(table: VariableTable, text: str | None) -> set[str] | None:
+    """Return the tasks to record, None for all."""
+    if text is None:
+        return None
+    known = _tasks(table)
+    chosen = {name.strip().upper() for name in text.split(",") if name.strip()}
+    for name in sorted(chosen - set(known)):
+        raise UsageError(
+            f"--tasks: no task {quoted(name)}", did_you_mean(name, known) or f"there are {' '.join(known)}"
+        )
+    if not chosen:
+        raise UsageError("--tasks: no task is named", f"there are {' '.join(known)}")
+    return chosen
+
+
+def _seconds(option: str, text: str) -> int:
+    try:
+        found = seconds_ns(text)
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from error
+    if found == 0:
+        raise UsageError(f"{option}: 0 s is no time")
+    return found

@@ -1,0 +1,176 @@
+"""Execute every recorded scan again and tell what differs: with the recorded tasks, or with edited ones (--task).
+
+It is an open loop: each task scans on the recorded inputs, whatever the other tasks do in the replay. Nothing is needed
+but the recording, which holds the rack's file and all sources. Exit code 0: identical; 1: something differs; 2: the
+recording cannot be read, or a new source has errors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
+from automax_ros.bags.replay.picture import can_be_drawn, draw, traces
+from automax_ros.bags.replay.rack import SourceRefused
+from automax_ros.bags.replay.report import ReplayReport
+from automax_ros.cli.output_files import require_different_files
+from automax_ros.cli.progress import share_shown
+from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.ticks import seconds_ns
+from automax_ros.rack.files import FileFault
+from automax_ros.rack.task_source import read_task_source
+
+_TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax replay``."""
+    parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
+    parser.add_argument(
+        "--task",
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        dest="tasks",
+        help="run this source in place of the recorded one; may be given again",
+    )
+    parser.add_argument(
+        "--only", action="append", metavar="TASK,...", help="replay these tasks only (default: all of the recording)"
+    )
+    parser.add_argument(
+        "--tolerance",
+        default="0",
+        metavar="COUNTS",
+        help="numbers that differ by at most this count as equal (default: 0, bit for bit)",
+    )
+    parser.add_argument(
+        "--from", metavar="S", dest="from_s", help="compare from this time on, in s since the run's start"
+    )
+    parser.add_argument("--to", metavar="S", dest="to_s", help="compare up to this time")
+    parser.add_argument("--json", action="store_true", help="print the report for programs to read")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the first difference (needs matplotlib)")
+    parser.add_argument(
+        "--max-differences",
+        type=int,
+        default=DEFAULT_MAX_DIFFERENCES,
+        metavar="N",
+        help=f"most variables to tell in full, by the time they first differ (default: {DEFAULT_MAX_DIFFERENCES})",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replay; 1 if something differs, 2 if the recording or a source cannot be used."""
+    options = _options(arguments)
+    files = _task_files(arguments.tasks)
+    read = {"BAG": arguments.bag, **{f"--task {name}": path for name, path in files.items()}}
+    require_different_files(read, {"--plot": arguments.plot})
+    new = {name: _source(name, path) for name, path in files.items()}
+    _require_replayed(options, new)
+    try:
+        report = _replayed(Replay(arguments.bag, new, options), arguments)
+    except SourceRefused as error:
+        for source, diagnostics in error.findings:
+            print_diagnostics(diagnostics, source, sys.stderr)
+        print(f"automax replay: errors in {error}; nothing is replayed", file=sys.stderr)
+        return 2
+    except BagError as error:
+        print(_with_repair(error, arguments.bag), file=sys.stderr)
+        return 2
+    return 0 if report.identical else 1
+
+
+def _replayed(replay: Replay, arguments: argparse.Namespace) -> ReplayReport:
+    """Replay, print the report, draw the picture."""
+    for source, diagnostics in replay.warnings:
+        print_diagnostics(diagnostics, source, sys.stderr)
+    with share_shown("replay") as show:
+        report = replay.run(show)
+    if arguments.json:
+        print(json.dumps(report.as_json(), indent=2, allow_nan=False))
+    else:
+        sys.stdout.write(report.text())
+    if arguments.plot is not None:
+        if can_be_drawn(report):
+            with share_shown("picture") as show:
+                found = traces(replay, report, show)
+            draw(found, report, arguments.plot)
+        else:
+            print("automax replay: no number differs, so there is nothing to draw", file=sys.stderr)
+    return report
+
+
+def _options(arguments: argparse.Namespace) -> ReplayOptions:
+    from_ns = _time("--from", arguments.from_s) or 0
+    to_ns = _time("--to", arguments.to_s)
+    if to_ns is not None and to_ns < from_ns:
+        raise UsageError("--to lies before --from")
+    if arguments.max_differences < 1:
+        raise UsageError("--max-differences: at least 1")
+    only = None
+    if arguments.only is not None:
+        names = [name.strip().upper() for text in arguments.only for name in text.split(",")]
+        only = tuple(dict.fromkeys(name for name in names if name))
+        if not only:
+            raise UsageError("--only names no task")
+    return ReplayOptions(only, _tolerance(arguments.tolerance), from_ns, to_ns, arguments.max_differences)
+
+
+def _time(option: str, text: str | None) -> int | None:
+    if text is None:
+        return None
+    try:
+        return seconds_ns(text)
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from error
+
+
+def _tolerance(text: str) -> float:
+    try:
+        tolerance = float(text)
+    except ValueError:
+        tolerance = math.nan
+    if not (math.isfinite(tolerance) and tolerance >= 0):
+        raise UsageError(f"--tolerance {text[:40]!r} is not a number of counts, 0 or more")
+    return tolerance
+
+
+def _task_files(texts: list[str]) -> dict[str, Path]:
+    files: dict[str, Path] = {}
+    for text in texts:
+        name, equals, file = text.partition("=")
+        name = name.strip().upper()
+        if not (name and equals and file):
+            raise UsageError(f"--task {text[:80]!r} is not NAME=FILE", "for example --task SPEED=new/SPEED.BLK")
+        if name in files:
+            raise UsageError(f"--task {name} is given twice")
+        files[name] = Path(file)
+    return files
+
+
+def _source(name: str, path: Path) -> SourceText:
+    try:
+        return read_task_source(path)
+    except FileFault as fault:
+        raise UsageError(f"--task {name}: {path} {fault}") from fault
+
+
+def _require_replayed(options: ReplayOptions, new: dict[str, SourceText]) -> None:
+    """Refuse a new source for a task that --only leaves out."""
+    for name in new:
+        if options.only is not None and name not in options.only:
+            raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
+
+
+def _with_repair(error: BagError, bag: Path) -> BagError:
+    """Point to the repair where a recording was not finished."""
+    unfinished = error.code == _TRUNCATED or (error.code == _NO_RECORDING and any(bag.glob("*.mcap")))
+    if not unfinished:
+        return error
+    return BagError(error.code, error.place, error.message, f"`automax bag repair {bag}` saves what is whole of it")

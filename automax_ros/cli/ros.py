@@ -1,0 +1,22 @@
+"""ROS 2 for a subcommand that cannot do without."""
+
+from __future__ import annotations
+
+from automax_ros.cli.usage import UsageError
+
+
+def prepare_ros() -> int:
+    """Make ROS 2 usable, before any input is read, and return the domain.
+
+    Raises:
+        UsageError: it is not there, or the domain is none.
+    """
+    from automax_ros.nodes.environment import RosUnavailable, prepare
+
+    try:
+        prepare()
+        from automax_ros.nodes.lock import domain_id
+
+        return domain_id()
+    except RosUnavailable as error:
+        raise UsageError(str(error)) from error

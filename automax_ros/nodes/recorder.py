@@ -1,0 +1,279 @@
+"""The node ``recorder``: records a rack that runs in another process, over DDS.
+
+Subscribes to the rack's ``variables``, ``config``, ``backplane``, ``backplane/snapshot``, ``scans``, ``states`` and to
+the topics of all common variables; publishes nothing. Messages are taken as bytes, in a look at all topics every 25 ms:
+that costs a fraction of one callback each, and one look tells how far the topics have come. Each message brings the
+time at which it was sent, which is the order of the rack's own log.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from automax_ros.bags.cdr import CdrError, decode
+from automax_ros.bags.live.arrival import ArrivalOrder
+from automax_ros.bags.live.recording import LiveRecording
+from automax_ros.bags.live.topics import LiveTopics, TopicKind
+from automax_ros.bags.messages import VariableTable
+from automax_ros.bags.qos import LATCHED
+from automax_ros.bags.rack_files import RackFile, RackFilesError, files_from_text
+from automax_ros.bags.writer import StorageOptions
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.nodes.topics import message_class
+
+LOOK_S = 0.025
+"""Time between two looks at the topics."""
+HOLD_NS = 250 * NS_PER_MS
+"""How long a message waits for those that were sent before it and came later."""
+READER_DEPTH = 10_000
+"""Messages of one topic that wait in this process when it is held up."""
+FILES_WAIT_NS = 3 * NS_PER_S
+"""How long a rack's files are waited for once its table has come."""
+_KNOCK_NS = NS_PER_S
+_MOST_KNOCKS = 5
+_TABLE_TYPE = "automax_msgs/msg/VariableTable"
+_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
+
+
+class RawSubscription:
+    """Takes the messages of one topic as bytes."""
+
+    def __init__(self, node: Node, topic: str, kind: TopicKind) -> None:
+        self.topic = topic
+        self._node = node
+        self._class = message_class(kind.type_name)
+        latched = kind.qos.durability == "transient_local"
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=READER_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        )
+        self._subscription = node.create_subscription(self._class, topic, _nothing, qos, raw=True)
+
+    def taken(self) -> Iterator[tuple[int, int, bytes]]:
+        """Return the messages that have come: time of sending, the sender's number or 0, bytes."""
+        handle = self._subscription.handle
+        with handle:
+            while True:
+                found = handle.take_message(self._class, True)
+                if found is None:
+                    return
+                payload, information = found
+                number = information.get("publication_sequence_number") or 0
+                yield information["source_timestamp"], number, payload
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._node.destroy_subscription(self._subscription)
+
+
+class RecorderNode(Node):  # type: ignore[misc]
+    """The node in the graph; it has no services, for nothing spins it."""
+
+    def __init__(self, space: str, context: Context) -> None:
+        quiet = [Parameter("start_type_description_service", value=False)]
+        super().__init__(
+            "recorder",
+            namespace=space,
+            context=context,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=quiet,
+        )
+
+    def racks(self) -> list[str]:
+        """Return the namespaces of the racks that are there, such as ``/pm1``."""
+        tables = [name for name, types in self.get_topic_names_and_types() if _TABLE_TYPE in types]
+        spaces = [name.removesuffix("/variables") for name in tables if self.count_publishers(name)]
+        return sorted(space for space in spaces if f"{space}/variables" in tables)
+
+
+class LiveRecorder:
+    """Finds a rack and records it; ``close`` in any case.
+
+    ``recording`` is None until ``open``.
+
+    Raises:
+        RosUnavailable: ROS cannot be initialised.
+    """
+
+    def __init__(self, space: str) -> None:
+        """Join the graph; ``space`` is the rack's namespace with its slash."""
+        self.recording: LiveRecording | None = None
+        self.lost_values: Counter[str] = Counter()
+        self._space = space
+        self._context = Context()
+        try:
+            self._context.init(args=_NO_CONSOLE)
+        except RuntimeError as error:
+            raise RosUnavailable(f"ROS 2 does not start: {error}") from error
+        self._node = RecorderNode(space, self._context)
+        self._topics = LiveTopics(space)
+        self._table = b""
+        self._order: ArrivalOrder[tuple[str, bytes]] = ArrivalOrder(HOLD_NS)
+        self._subscriptions: list[RawSubscription] = []
+        self._numbers: dict[str, int] = {}
+        self._last_due = 0
+        self._knocks: list[RawSubscription] = []
+        self._next_knock = 0
+        self._knock_count = 0
+        self._files_begun = 1
+
+    def racks(self) -> list[str]:
+        """Return the namespaces of the racks that are there."""
+        return self._node.racks()
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the rack's table of variables has a sender."""
+        return bool(self._node.count_publishers(self._topics.variables))
+
+    def find(self, wait_ns: int, stopping: Callable[[], bool]) -> VariableTable | None:
+        """Wait for the rack's table; None if it does not come.
+
+        Raises:
+            CdrError: what comes is no table.
+        """
+        source = RawSubscription(self._node, self._topics.variables, self._topics.all[self._topics.variables])
+        try:
+            self._table = _last(source, wait_ns, stopping)
+        finally:
+            source.close()
+        return _table(self._table) if self._table else None
+
+    def files(self, stopping: Callable[[], bool]) -> list[RackFile]:
+        """Return the files that the rack runs from; none if it does not offer them.
+
+        Raises:
+            RackFilesError: what it sends are none.
+        """
+        source = RawSubscription(self._node, self._topics.config, TopicKind("std_msgs/msg/String", LATCHED))
+        try:
+            payload = _last(source, FILES_WAIT_NS, stopping)
+        finally:
+            source.close()
+        if not payload:
+            return []
+        try:
+            return files_from_text(str(decode("std_msgs/msg/String", payload)[0]))
+        except CdrError as error:
+            raise RackFilesError(str(error)) from error
+
+    def open(
+        self,
+        folder: Path,
+        files: list[RackFile],
+        tasks: Collection[str] | None,
+        storage: StorageOptions,
+        split_ns: int = 0,
+    ) -> LiveRecording:
+        """Create the bag and subscribe; messages come with ``step``. ``split_ns`` is that of ``LiveRecording``.
+
+        Raises:
+            RecordingError: the folder exists already or cannot be written.
+        """
+        self._topics = topics = LiveTopics(self._space, _table(self._table))
+        self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
+        kinds = topics.all
+        # The rack answers each new reader of these: an image first, then states and full scans that follow it.
+        first = [topics.variables, topics.backplane, *topics.values, topics.snapshot, topics.scans, topics.states]
+        self._subscriptions = [RawSubscription(self._node, name, kinds[name]) for name in first]
+        return self.recording
+
+    def step(self) -> None:
+        """Take what has come and record what is due."""
+        assert self.recording is not None
+        now = time.monotonic_ns()
+        self._look()
+        due = self._order.due(now)
+        for sent_ns, (topic, payload) in due:
+            self.recording.take(topic, sent_ns, payload)
+        if due:
+            self._last_due = now
+        elif now - self._last_due > HOLD_NS:
+            self.recording.flush(now - self._last_due)
+        if now >= self._next_knock or self.recording.files_begun > self._files_begun:
+            self._files_begun = self.recording.files_begun
+            self._knock(now)
+
+    def finish(self) -> None:
+        """Take and record what is still there, and finish the bag.
+
+        Raises:
+            RecordingError: the disk refuses.
+        """
+        if self.recording is None:
+            return
+        self._look()
+        for sent_ns, (topic, payload) in self._order.rest():
+            self.recording.take(topic, sent_ns, payload)
+        self.recording.close()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _look(self) -> None:
+        for subscription in self._subscriptions:
+            topic = subscription.topic
+            for sent_ns, number, payload in subscription.taken():
+                if topic in self._topics.values:
+                    self._count_lost(topic, number)
+                self._order.add(sent_ns, (topic, payload))
+
+    def _count_lost(self, topic: str, number: int) -> None:
+        """Count values of a common that did not come: the sender keeps one of them only."""
+        before = self._numbers.get(topic, 0)
+        if before and number > before + 1:
+            self.lost_values[topic] += number - before - 1
+        if number:
+            self._numbers[topic] = number
+
+    def _knock(self, now: int) -> None:
+        """Ask the rack for what recording waits for: it answers a further reader as it answered the first."""
+        assert self.recording is not None
+        for knock in self._knocks:
+            knock.close()
+        self._knocks.clear()
+        self._next_knock = now + _KNOCK_NS
+        wanted = [self._topics.snapshot] if self.recording.wants_image else []
+        wanted += [self._topics.states] if self.recording.wants_states else []
+        if not wanted:
+            self._knock_count = 0
+        elif self._knock_count < _MOST_KNOCKS:
+            self._knock_count += 1
+            kinds = self._topics.all
+            self._knocks = [RawSubscription(self._node, name, kinds[name]) for name in wanted]
+
+
+def _last(source: RawSubscription, wait_ns: int, stopping: Callable[[], bool]) -> bytes:
+    """Wait for messages on a latched topic and return the last one, empty if none comes."""
+    deadline = time.monotonic_ns() + wait_ns
+    while time.monotonic_ns() < deadline and not stopping():
+        found = list(source.taken())
+        if found:
+            return max(found)[2]
+        time.sleep(LOOK_S)
+    return b""
+
+
+def _table(payload: bytes) -> VariableTable:
+    table = decode(_TABLE_TYPE, payload)
+    assert isinstance(table, VariableTable)
+    return table
+
+
+def _nothing(_: Any) -> None:
+    """Stand in for a callback: messages are taken by looking."""

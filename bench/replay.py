@@ -1,0 +1,102 @@
+"""What a replay costs: the example rack, and five speed regulators that scan every 5.5 ms. Prints, fails on none."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from automax_ros.bags.rack_stream import RackStream
+from automax_ros.bags.recorder import Recorder
+from automax_ros.bags.replay.engine import Replay, ReplayOptions
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack, scans_per_second
+
+EXAMPLE = Path(__file__).parent.parent / "config" / "section_drive"
+SECONDS = 60
+REPEATS = 3
+WANTED = 20
+TASKS = 5
+_DECLARED = re.compile(r"^\d+ COMMON (.*)$", re.MULTILINE)
+
+
+def config_of(file: Path) -> RackConfig:
+    result = load(file)
+    if result.config is None:
+        raise SystemExit(f"{file} has errors: {[item.message for item in result.diagnostics]}")
+    return result.config
+
+
+def five_regulators(folder: Path) -> RackConfig:
+    """Five times the example's speed regulator, each with commons of its own, every tick of 5.5 ms."""
+    text = (EXAMPLE / "SPEED.BLK").read_text().replace("SCAN_LOOP(TICKS=2)", "SCAN_LOOP(TICKS=1)")
+    names = [name.strip() for line in _DECLARED.findall(text) for name in line.split(",")]
+    lines = ["rack: BENCH", "slots:", "  0:", "    module: 57C435", "    tick_ms: 5.5", "    tasks:"]
+    lines += [f"      SPEED{number}: {{priority: {4 + number}}}" for number in range(TASKS)]
+    lines.append("common:")
+    for number in range(TASKS):
+        own = text
+        for name in sorted(names, key=len, reverse=True):
+            renamed = f"{name[:-1]}{number}{name[-1]}"
+            own = re.sub(rf"(?<![A-Z_]){re.escape(name)}", renamed, own)
+            lines.append(f"  {renamed}: {{}}")
+        (folder / f"SPEED{number}.BLK").write_text(own)
+    (folder / "rack.yaml").write_text("\n".join(lines) + "\n")
+    return config_of(folder / "rack.yaml")
+
+
+def plant(rack: Rack, step: int) -> None:
+    """Move the inputs of all five regulators, so that every scan has something new to latch."""
+    for number in range(TASKS):
+        rack.write(f"RUN{number}@", True)
+        rack.write(f"SECT_REF{number}%", (step * 7 + number * 300) % 3000)
+        rack.write(f"TACH{number}%", (step * 7 + number * 300 - 40) % 3000)
+
+
+def record(config: RackConfig, bag: Path, moves: Callable[[Rack, int], None] | None) -> float:
+    """Record a run; return the scans a second of rack time."""
+    rack = Rack(config)
+    stream = RackStream(rack, rack.fingerprint)
+    recorder = Recorder(rack, stream, bag)
+    stream.begin()
+    rack.start()
+    steps = SECONDS * 20
+    for step in range(steps):
+        if moves is not None:
+            moves(rack, step)
+        rack.run(SECONDS / steps)
+    stream.end()
+    recorder.close()
+    return scans_per_second(rack)
+
+
+def print_replay(what: str, bag: Path, rate: float, new: Mapping[str, SourceText]) -> None:
+    best = float("inf")
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        report = Replay(bag, new, ReplayOptions()).run()
+        best = min(best, time.perf_counter() - began)
+    result = "identical" if report.identical else f"{sum(task.different for task in report.tasks)} scans differ"
+    print(
+        f"{what:34}{rate:6.0f} scans a second{report.scans / best:10,.0f} replayed a second"
+        f"{SECONDS / best:7.1f} x real time, wanted {WANTED}; {result}"
+    )
+
+
+def print_both(what: str, bag: Path, rate: float, name: str, text: str) -> None:
+    edited = text.replace("CURRENT=26.7", "CURRENT=30.0")
+    print_replay(what, bag, rate, {})
+    print_replay(f"{what}, one gain edited", bag, rate, {name: SourceText(f"{name}.BLK", edited)})
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        rate = record(config_of(EXAMPLE / "rack.yaml"), folder / "example", None)
+        print_both("example rack", folder / "example", rate, "SPEED", (EXAMPLE / "SPEED.BLK").read_text())
+        rate = record(five_regulators(folder), folder / "five", plant)
+        print_both("five regulators, 5.5 ms", folder / "five", rate, "SPEED0", (folder / "SPEED0.BLK").read_text())
