@@ -15,7 +15,7 @@ from automax_ros.bags.cdr import CdrError, decoder
 from automax_ros.bags.common_log import CommonLog, variables_of
 from automax_ros.bags.definitions import message_types
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.live.heads import scan_head
+from automax_ros.bags.heads import scan_head
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.messages import CommonImage, CommonWrite, Scan, ScanError, VariableTable
 from automax_ros.bags.reader import BagReader, size_of

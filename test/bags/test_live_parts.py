@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.bags.cdr import CdrError, encode
+from automax_ros.bags.heads import image_head, scan_head, write_head
 from automax_ros.bags.live.arrival import ArrivalOrder
-from automax_ros.bags.live.heads import image_head, scan_head, write_head
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics, value_type_name
 from automax_ros.bags.messages import CommonImage, CommonWrite, Direction, Scan, Variable, VariableType
 from automax_ros.bags.qos import LATCHED

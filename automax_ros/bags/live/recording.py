@@ -15,7 +15,7 @@ from typing import Any
 
 from automax_ros.bags.cdr import CdrError, decode
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.live.heads import WriteHead, image_head, scan_head, write_head
+from automax_ros.bags.heads import WriteHead, image_head, scan_head, write_head
 from automax_ros.bags.live.provenance import provenance
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
 from automax_ros.bags.live.tracks import Gap, TaskTrack
