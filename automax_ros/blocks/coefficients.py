@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from automax_ros.blocks.declaration import Block, Bound, Coefficients
+from automax_ros.blocks.declaration import Block, Bound, Coefficients, Limit
 from automax_ros.core.numbers import stored_real
 
 TWO_TO_MINUS_18 = 2.0**-18
+LARGEST_HISTORY = 2.0**31
+"""A filter of second order or more whose history leaves 32 bits starts anew from the edge of 16 bits (decision).
+No signal comes near it, but coefficients that change all the time can make such a filter grow without end."""
 
 
 def default_wm(period_s: float) -> float:
@@ -83,12 +86,18 @@ def limited(declared: Coefficients, period_s: float, given: Mapping[str, float])
     for limit in declared.limits:
         if limit.parameter not in given:
             continue
-        low, high = limit.low(period_s, values), limit.high(period_s, values)
+        low, high = bounds_of(limit, period_s, values)
         value = values[limit.parameter]
         if not is_within(value, low, high):
             values[limit.parameter] = high if value > high else low
             moved.append(limit.parameter)
     return values, moved
+
+
+def bounds_of(limit: Limit, period_s: float, values: Mapping[str, float]) -> tuple[float, float]:
+    """Return the limits as numbers; where they cross, at scans of a minute and more, the high one wins (decision)."""
+    high = limit.high(period_s, values)
+    return min(limit.low(period_s, values), high), high
 
 
 def evaluate(block: Block, period_s: float, given: Mapping[str, float]) -> tuple[tuple[float, ...], bool]:

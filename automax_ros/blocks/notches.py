@@ -6,7 +6,15 @@ import math
 from collections.abc import Mapping
 from math import floor
 
-from automax_ros.blocks.coefficients import by_order, constant, mapping_constant, no_defaults, order_default, per_period
+from automax_ros.blocks.coefficients import (
+    LARGEST_HISTORY,
+    by_order,
+    constant,
+    mapping_constant,
+    no_defaults,
+    order_default,
+    per_period,
+)
 from automax_ros.blocks.declaration import (
     NOT_ON_UDC,
     UDC_ONLY,
@@ -20,7 +28,7 @@ from automax_ros.blocks.declaration import (
     Time,
     Times,
 )
-from automax_ros.blocks.transfer import Polynomial, Transfer, mapped
+from automax_ros.blocks.transfer import Polynomial, Transfer, bilinear, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
 
@@ -59,6 +67,10 @@ def notch_step(
     else:
         e = band * (input - x2) + d1 * e1 + d2 * e2
         e2 = e1
+        if e > LARGEST_HISTORY or e < -LARGEST_HISTORY:
+            x1 = input
+            e = (INT16_MAX if e > 0.0 else INT16_MIN) - input + 0.0
+            e2 = e
         e1 = e
         y = input + e
         output = floor(y + 0.5) if y >= 0.0 else -floor(0.5 - y)
@@ -125,11 +137,11 @@ def _squared(polynomial: Polynomial) -> Polynomial:
     )
 
 
-def notchn_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, ...]:
-    """Return the gains of INPUT and its four histories, then of the four histories of the output; 0 beyond ORDER."""
-    transfer = notchn_transfer(period_s, values)
-    missing = (0.0,) * (5 - len(transfer.b))
-    return (*transfer.b, *missing, *(-value for value in transfer.a[1:]), *missing)
+def notchn_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float, float, float]:
+    """Return gain and b1 of gain (x + b1 x1 + x2), a1 and a2 of the histories, of one filter of second order."""
+    wn, q = values["WN"], values["Q_FACTOR"]
+    b, a = bilinear((1.0, 0.0, 1.0), (1.0, 1.0 / q, 1.0), 1.0 / math.tan(wn * period_s / 2.0))
+    return b[0], b[1] / b[0], -a[1], -a[2]
 
 
 def notchn_step(
@@ -137,15 +149,10 @@ def notchn_step(
     order: int,
     initial_value: int,
     reset: bool,
-    b0: float,
+    gain: float,
     b1: float,
-    b2: float,
-    b3: float,
-    b4: float,
     a1: float,
     a2: float,
-    a3: float,
-    a4: float,
     x1: int,
     x2: int,
     x3: int,
@@ -155,9 +162,11 @@ def notchn_step(
     y3: float,
     y4: float,
 ) -> tuple[int, int, int, int, int, float, float, float, float]:
-    """Direct form I of order 2 or 4; the clamp to 16 bits acts on the output alone.
+    """Direct form I; the clamp to 16 bits acts on the output alone.
 
-    While RESET is TRUE all of INPUT's history is INPUT, all of OUTPUT's INITIAL_VALUE: no step follows (decision).
+    Order 4 is D D y = N N x with polynomials N and D of second order. It is taken step by step, P = D y and Q = N x,
+    since the coefficients of D D would miss where its poles lie. While RESET is TRUE all of INPUT's history
+    is INPUT, all of OUTPUT's INITIAL_VALUE: no step follows (decision).
     """
     if reset:
         x1 = input
@@ -169,12 +178,22 @@ def notchn_step(
         y4 = y1
         output = initial_value
     else:
-        y = b0 * input + b1 * x1 + b2 * x2 + a1 * y1 + a2 * y2
+        y = gain * (input + b1 * x1 + x2)
         if order == 4:
-            y = y + b3 * x3 + b4 * x4 + a3 * y3 + a4 * y4
-            y4 = y3
-            y3 = y2
+            y = gain * (y + b1 * (gain * (x1 + b1 * x2 + x3)) + gain * (x2 + b1 * x3 + x4))
+            y = y + a1 * (y1 - a1 * y2 - a2 * y3) + a2 * (y2 - a1 * y3 - a2 * y4)
+        y = y + a1 * y1 + a2 * y2
+        y4 = y3
+        y3 = y2
         y2 = y1
+        if y > LARGEST_HISTORY or y < -LARGEST_HISTORY:
+            x1 = input
+            x2 = input
+            x3 = input
+            y = INT16_MAX + 0.0 if y > 0.0 else INT16_MIN + 0.0
+            y2 = y
+            y3 = y
+            y4 = y
         y1 = y
         output = floor(y + 0.5) if y >= 0.0 else -floor(0.5 - y)
         if output > INT16_MAX:
@@ -208,7 +227,7 @@ NOTCHN = Block(
     ),
     coefficients=Coefficients(
         parameters=("Q_FACTOR", "WN", "ORDER"),
-        names=("b0", "b1", "b2", "b3", "b4", "a1", "a2", "a3", "a4"),
+        names=("gain", "b1", "a1", "a2"),
         limits=(
             _Q_LIMIT,
             Limit(

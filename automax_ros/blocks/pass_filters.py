@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from math import floor
 
-from automax_ros.blocks.coefficients import by_order, mapping_constant, order_default, per_period
+from automax_ros.blocks.coefficients import LARGEST_HISTORY, by_order, mapping_constant, order_default, per_period
 from automax_ros.blocks.declaration import UDC_ONLY, Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
 from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
@@ -95,6 +95,12 @@ def pass_filter_step(
             y = gain * (input + b1 * x1 + b2 * x2 + b3 * x3) + a1 * y1 + a2 * y2 + a3 * y3
             y3 = y2
             y2 = y1
+        if y > LARGEST_HISTORY or y < -LARGEST_HISTORY:
+            x1 = input
+            x2 = input
+            y = INT16_MAX + 0.0 if y > 0.0 else INT16_MIN + 0.0
+            y2 = y
+            y3 = y
         y1 = y
         output = floor(y + 0.5) if y >= 0.0 else -floor(0.5 - y)
         if output > INT16_MAX:

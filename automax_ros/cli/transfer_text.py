@@ -150,7 +150,8 @@ def _order_equation(tuning: Tuning) -> str:
     order = int(tuning.values["ORDER"])
     places = range(1, order + 1)
     if tuning.block.name == "NOTCHN":
-        return "y = b0 x" + "".join(f" + b{n} x{n}" for n in places) + "".join(f" + a{n} y{n}" for n in places)
+        twice = ", twice" if order == 4 else ""
+        return f"y = gain (x + b1 x1 + x2) + a1 y1 + a2 y2{twice}"
     return "y = gain (x" + "".join(f" + b{n} x{n}" for n in places) + ")" + "".join(f" + a{n} y{n}" for n in places)
 
 
