@@ -1,7 +1,9 @@
 """Time of each block in a compiled scan, beside the 7010 Processor's (J-3676-5, Table 4). Prints ratios, fails on none.
 
 Each block is programmed with every parameter: inputs are variables that change from scan to scan where the block allows
-it, all outputs are wired. The cost of the empty scan is taken off.
+it, all outputs are wired. Coefficients of dynamic blocks are literals, which cost nothing in a scan. The cost of the
+empty scan is taken off. A table of its own tells, as information, what a REAL coefficient costs that changes in every
+scan, so that all coefficients of the block are computed anew.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from automax_ros.blocks.scan_loop import END_TIMES
 from automax_ros.core.types import DataType
 
 COPIES = 40
+FEW_COPIES = 2
+"""Of blocks that take so long that fewer are enough."""
 COEFFICIENTS = {
     **dict.fromkeys(("KP", "KI"), "0.5"),
     **dict.fromkeys(("WLG", "WM", "WN"), "20.0"),
@@ -61,14 +65,16 @@ def variable_of(block: Block, item: Input) -> str:
     return "HIGH_W%" if item.name in HIGH else "IN_W%"
 
 
-def call_text(block: Block, number: int) -> tuple[str, list[str]]:
-    """Return one CALL with every parameter, and the variables it needs."""
+def call_text(block: Block, number: int, changing: str = "") -> tuple[str, list[str]]:
+    """Return one CALL with every parameter, and the variables it needs; ``changing`` is the input that COEF goes to."""
     parts, variables = [], []
     for item in block.inputs:
         if item.type is Special.TABLE:
             parts.append(f"{item.name}=TABLE%")
         elif isinstance(item.type, Special):
             parts.append(f"{item.name}={structure_of(block, number)}")
+        elif item.name == changing:
+            parts.append(f"{item.name}=COEF")
         elif item.form is Form.LITERAL or (block.coefficients and item.name in block.coefficients.parameters):
             parts.append(f"{item.name}={literal_of(item)}")
         else:
@@ -86,26 +92,29 @@ def structure_of(block: Block, number: int) -> str:
     return f"QUEUE{number if block.structure is Access.MAKES else ''}{mark}"
 
 
-def block_ns(block: Block, table: int = TABLE) -> float:
-    """Return the time of one call in ns."""
+def block_ns(block: Block, table: int = TABLE, changing: str = "") -> float:
+    """Return the time of one call in ns; ``changing`` is a coefficient that changes in every scan."""
     calls, names = (
         [],
         [*INPUTS, "COLUMN_W%", "SPARE%", "SPARE@", f"TABLE%({table - 1 if block.name == 'SEARCH' else 256})"],
     )
-    for number in range(COPIES):
-        text, outputs = call_text(block, number)
+    copies = FEW_COPIES if changing else COPIES
+    for number in range(copies):
+        text, outputs = call_text(block, number, changing)
         calls.append(text)
         names += outputs
     lines = [f"{100 + n} {'COMMON' if name in INPUTS else 'LOCAL'} {name}" for n, name in enumerate(names)]
+    lines += ["19999 COMMON COEF"] if changing else []
     lines += [f"20000 CALL SCAN_LOOP(TICKS={20 if block.times.model_7010 is None else 2})"]
     if block.structure is Access.USES:
         lines.append(f"20001 {shift_text(block)}")
     target = Processor.UDC if block.times.model_7010 is None else Processor.AUTOMAX
-    empty = _varied_ns("\n".join([*lines, "30000 END"]), target)
+    coefficient = float(COEFFICIENTS[changing]) if changing else None
+    empty = _varied_ns("\n".join([*lines, "30000 END"]), target, coefficient)
     full = _varied_ns(
-        "\n".join([*lines, *(f"{21001 + n} {call}" for n, call in enumerate(calls)), "30000 END"]), target
+        "\n".join([*lines, *(f"{21001 + n} {call}" for n, call in enumerate(calls)), "30000 END"]), target, coefficient
     )
-    return (full - empty) / COPIES
+    return (full - empty) / copies
 
 
 def shift_text(block: Block) -> str:
@@ -116,16 +125,19 @@ def shift_text(block: Block) -> str:
     return f"CALL {shift}(STRUCTURE_NAME=QUEUE{mark}, MAX_COLUMNS=20, SHIFT=-OFF_B@, {pairs})"
 
 
-def _varied_ns(text: str, target: Processor) -> float:
-    """Return the time of one scan of a task whose inputs change from scan to scan."""
+def _varied_ns(text: str, target: Processor, coefficient: float | None = None) -> float:
+    """Return the time of one scan of a task whose inputs change from scan to scan, and COEF where there is one."""
     task, memory = task_of(text, target)
     word, low, high, flag = (memory.view(name) for name in ("IN_W%", "LOW_W%", "HIGH_W%", "IN_B@"))
     memory.write_now(low, -4000, 1)
     memory.write_now(high, 4000, 1)
+    changing = None if coefficient is None else memory.view("COEF")
 
     def vary(number: int) -> None:
         memory.write_now(word, VALUES[number & 7], 1)
         memory.write_now(flag, number & 3 == 1, 1)
+        if changing is not None and coefficient is not None:
+            memory.write_now(changing, coefficient * (1.0 + 0.01 * (number & 7)), 1)
 
     return scan_ns(task, vary)
 
@@ -237,9 +249,33 @@ def main() -> None:
     for number in (0, 10, 100):
         taken, manual = commons_ns(number), commons_manual_us(number)
         print(f"{number:>8}{taken:>10.0f}{manual:>10.1f}{manual * 1000 / taken:>9.0f}")
+    report_changing()
     whole = program_ns()
     each = whole / PROGRAM_BLOCKS
     print(f"\nprogram of {PROGRAM_BLOCKS} blocks: {whole:.0f} ns a scan, {each:.1f} ns a block; wanted: at most 80")
+
+
+def report_changing() -> None:
+    """Print the time of each block with a coefficient that changes in every scan."""
+    print(f"\n{'changing':20}{'ns':>9}{'7010 us':>10}{'ratio':>9}   coefficient, a new value in every scan")
+    for block in timed_blocks():
+        name = changing_of(block)
+        if name:
+            taken, manual = block_ns(block, changing=name), manual_us(block)
+            print(f"{block.name:20}{taken:>9.0f}{manual:>10.2f}{manual * 1000 / taken:>9.0f}   {name}")
+
+
+def changing_of(block: Block) -> str:
+    """Return the first REAL coefficient of a block that may be a variable, "" where there is none."""
+    names = () if block.coefficients is None else block.coefficients.parameters
+    return next(
+        (
+            item.name
+            for item in block.inputs
+            if item.name in names and item.type is DataType.REAL and item.form is not Form.LITERAL
+        ),
+        "",
+    )
 
 
 def timed_blocks() -> list[Block]:

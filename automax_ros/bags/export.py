@@ -9,6 +9,7 @@ from pathlib import Path
 from automax_ros.bags.columns import Column, Table, column, require_another_file, unwritable
 from automax_ros.bags.common_log import Cell
 from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
+from automax_ros.bags.whole_file import written_whole
 from automax_ros.core.decimal_text import seconds_text
 
 TIME = "time_s"
@@ -66,7 +67,7 @@ def export_csv(
 
 
 def write_csv(table: Table, output: Path) -> int:
-    """Write a table to a CSV file; return the number of its rows.
+    """Write a table to a CSV file, which appears when it is whole; return the number of its rows.
 
     Raises:
         BagError: the recording is damaged, or the output cannot be written.
@@ -75,7 +76,7 @@ def write_csv(table: Table, output: Path) -> int:
     cells = [""] * len(formats)
     count = 0
     try:
-        with output.open("w", encoding="utf-8", newline="") as file:
+        with written_whole(output) as place, place.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([TIME, *(item.label for item in table.columns)])
             for time, changed in table.rows():

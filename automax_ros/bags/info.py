@@ -20,6 +20,7 @@ from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.messages import CommonImage, CommonWrite, Scan, ScanError, VariableTable
 from automax_ros.bags.reader import BagReader, size_of
 from automax_ros.bags.series import Progress
+from automax_ros.core.decimal_text import seconds_text
 
 MOST_KEPT = 1000
 """Most attachments, tasks and kinds of errors that are listed (decision): a recording may lie about all of them."""
@@ -135,9 +136,9 @@ class BagInfo:
 def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None) -> BagInfo:
     """Read a recording from its beginning to its end and count what it holds; checksums are verified on the way.
 
-    ``check`` decodes every message of a type that we know too, and looks for gaps in the write log. What is wrong with
-    the recording is told in ``problems``; what can be read before that place is counted. Memory does not grow with the
-    recording.
+    ``check`` decodes every message of a type that we know too, and looks whether the write log has gaps or goes back.
+    What is wrong with the recording is told in ``problems``; what can be read before that place is counted. Memory does
+    not grow with the recording.
 
     Raises:
         BagError: there is no recording of ROS 2 in mcap files at the path.
@@ -260,7 +261,7 @@ _MOST_TEXT = 1 << 18
 
 
 def _check(info: BagInfo, progress: Progress | None) -> None:
-    """Decode every message of a type that we know, and look for gaps in the write log."""
+    """Decode every message of a type that we know; look for gaps in the write log, and for times that go backwards."""
     reader = BagReader(info.path)
     if progress is not None:
         reader.on_progress = lambda share: progress((1 + share) / 2)
@@ -272,8 +273,23 @@ def _check(info: BagInfo, progress: Progress | None) -> None:
 
 
 def _checked(log: CommonLog, reader: BagReader) -> Iterator[None]:
+    # Recordings of others may hold messages of one file in any order; in ours log times increase.
+    ours = "version" in reader.custom_data
+    last_log = -1
+    last_write = (0, -1)
     for entry in reader.messages(types=frozenset(message_types())):
         message = entry.message
+        if ours and entry.log_time <= last_log:
+            text = f"log times go backwards: {entry.log_time} ns on {entry.topic[:247]} behind {last_log} ns"
+            raise BagError("AMX6813", reader.path, text)
+        last_log = entry.log_time
+        if isinstance(message, CommonWrite):
+            run, sequence = last_write
+            if message.run_id == run and message.sequence <= sequence:
+                place = seconds_text(max(0, message.stamp))
+                text = f"the write log goes backwards at {place} s: write {message.sequence} behind write {sequence}"
+                raise BagError("AMX6813", reader.path, text)
+            last_write = message.run_id, message.sequence
         if isinstance(message, VariableTable):
             log.take_table(message)
         elif isinstance(message, (CommonImage, CommonWrite)):

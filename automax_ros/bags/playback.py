@@ -15,7 +15,7 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.messages import VariableTable
 from automax_ros.bags.qos import QosProfile
-from automax_ros.bags.reader import BagReader, size_of
+from automax_ros.bags.reader import BagReader, FileOrder, size_of
 from automax_ros.bags.recorded_qos import recorded_qos
 
 TABLE_TYPE = "automax_msgs/msg/VariableTable"
@@ -173,14 +173,20 @@ class Renaming:
 
 def _records(files: Collection[Path], on_progress: Callable[[int], None] = lambda _: None) -> Iterator[RawMessage]:
     before = 0
+    order = FileOrder()
     for path in files:
         file = McapFile(path)
+        last_log: int | None = None
         for number, record in enumerate(file.records()):
             if not number & _PROGRESS_MASK:
                 on_progress(before + file.position)
             if isinstance(record, RawMessage):
+                if last_log is None:
+                    order.begin(path, record.log_time)
+                last_log = record.log_time
                 yield record
         before += file.position
+        order.end(last_log)
 
 
 def _topic(found: Survey, path: Path, record: RawMessage) -> PlayTopic:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
@@ -14,6 +16,7 @@ from automax_ros.bags.definitions import MAX_SCHEMA_BYTES, DefinitionError, mess
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE
+from automax_ros.core.diagnostics import printable
 
 MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read (decision)."""
@@ -23,7 +26,7 @@ _PROGRESS_MASK = 0x3FF
 """Progress is told once in so many records."""
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 """Leaves every scalar a string: numbers and dates of a hostile file cost nothing."""
-_NO_BAG_HINT = "give the folder of a recording, which holds metadata.yaml, or one .mcap file"
+NO_BAG_HINT = "give the folder of a recording, which holds metadata.yaml, or one .mcap file"
 
 
 class BagMessage(NamedTuple):
@@ -42,8 +45,8 @@ class BagMessage(NamedTuple):
 class BagReader:
     """A recording: a rosbag2 folder or one .mcap file. It may be read any number of times, always as a stream.
 
-    ``custom_data`` is what the recorder wrote into metadata.yaml (empty for a single file). ``on_progress``, if set, is
-    called now and then while messages are read, with the share of all bytes that is read by then (0 to 1).
+    ``on_progress``, if set, is called now and then while messages are read, with the share of all bytes that is read by
+    then (0 to 1).
     ``last_stamp`` is the stamp of the message read last, be it wanted or not; None before the first.
 
     Raises:
@@ -52,19 +55,27 @@ class BagReader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.custom_data: dict[str, str] = {}
+        self._information: dict[str, Any] | None = None
         self.on_progress: Callable[[float], None] | None = None
         self.last_stamp: int | None = None
         if path.is_dir():
-            information = read_information(path)
-            self.files = _data_files(path, information)
-            custom = information.get("custom_data")
-            if isinstance(custom, dict):
-                self.custom_data = {str(key): str(value) for key, value in custom.items()}
+            self._information = read_information(path)
+            self.files = _data_files(path, self._information)
         elif path.is_file():
             self.files = [path]
         else:
-            raise BagError("AMX6810", path, "does not exist", _NO_BAG_HINT)
+            raise no_recording(path)
+
+    @cached_property
+    def custom_data(self) -> dict[str, str]:
+        """What the recorder wrote into metadata.yaml, or for a single file into its copy there; empty without one."""
+        information = self._information
+        if information is None:
+            try:
+                information = next(filter(None, map(told_information, self.metadata_records())), {})
+            except BagError:  # whoever reads the messages is told
+                information = {}
+        return custom_data_of(information)
 
     def messages(
         self, *, topics: Collection[str] | None = None, types: Collection[str] | None = None
@@ -72,13 +83,16 @@ class BagReader:
         """Return the decoded messages in the order of the file, of all topics and types or only of those given.
 
         Raises:
-            BagError: the recording is truncated, damaged or beyond the limits, or holds a wanted message of a type that
-                we do not know or that was recorded with another definition.
+            BagError: the recording is truncated, damaged or beyond the limits, its files do not follow each other in
+                time, or it holds a wanted message of a type that we do not know or that was recorded with another
+                definition.
         """
         total = sum(size_of(file) for file in self.files)
         before = 0
+        order = FileOrder()
         for file in self.files:
             channels: dict[int, _ChannelReader] = {}
+            last_log: int | None = None
             data = McapFile(file)
             for number, record in enumerate(data.records()):
                 if not number & _PROGRESS_MASK and self.on_progress is not None:
@@ -86,6 +100,9 @@ class BagReader:
                 if not isinstance(record, RawMessage):
                     continue
                 self.last_stamp = record.publish_time
+                if last_log is None:
+                    order.begin(file, record.log_time)
+                last_log = record.log_time
                 channel = channels.get(record.channel.id)
                 if channel is None:
                     wanted = _is_wanted(record, topics, types)
@@ -95,6 +112,7 @@ class BagReader:
                         channel.topic, channel.type_name, record.publish_time, record.log_time, channel.decoded(record)
                     )
             before += data.position
+            order.end(last_log)
 
     def attachments(self) -> Iterator[Attachment]:
         """Return the files stored in the recording; messages are not unpacked.
@@ -117,6 +135,35 @@ class BagReader:
             for record in McapFile(file).records(messages=False):
                 if isinstance(record, Metadata):
                     yield record
+
+
+class FileOrder:
+    """Checks that the files of a recording follow each other in time: only then they can be read as one stream."""
+
+    def __init__(self) -> None:
+        self._name = ""
+        self._first = self._last = 0
+
+    def begin(self, file: Path, log_time: int) -> None:
+        """Take the log time of a file's first message.
+
+        Raises:
+            BagError: the file before ends later.
+        """
+        if self._name and log_time < self._last:
+            if log_time < self._first:
+                text = f"is out of order: its messages begin before those of {self._name}, which is listed before it"
+                hint = "`automax bag repair` writes a metadata.yaml that lists the files in the order of their times"
+            else:
+                text = f"overlaps {self._name}, the file before it: its messages begin before that one ends"
+                hint = "read each file by its own name"
+            raise BagError("AMX6813", file, text, hint)
+        self._name, self._first = printable(file.name[:80]), log_time
+
+    def end(self, log_time: int | None) -> None:
+        """Take the log time of the last message of that file; None where it holds none."""
+        if log_time is not None:
+            self._last = log_time
 
 
 class _ChannelReader:
@@ -144,6 +191,16 @@ class _ChannelReader:
                 self._file,
                 f"the message on {self.topic[:247]} at {record.log_time} ns is malformed: {error}",
             ) from error
+
+
+def no_recording(path: Path) -> BagError:
+    """Return the error that tells why nothing can be read at a path that is neither a folder nor a regular file."""
+    what = "does not exist"
+    if path.exists():
+        what = "is no regular file"
+    elif path.is_symlink():
+        what = "is no regular file but a link that leads nowhere"
+    return BagError("AMX6810", path, what, NO_BAG_HINT)
 
 
 def size_of(file: Path) -> int:
@@ -224,6 +281,24 @@ def read_information(folder: Path) -> dict[str, Any]:
     return information
 
 
+def told_information(record: Metadata) -> dict[str, Any] | None:
+    """Return the copy of metadata.yaml that a data file holds of itself; None if the record is another one or bad."""
+    text = record.metadata.get("serialized_metadata", "") if record.name == "rosbag2" else ""
+    if not text or len(text) > MAX_METADATA_BYTES:
+        return None
+    try:
+        information = load_yaml("rosbag2", text.encode("utf-8", "replace"))
+    except BagError:
+        return None
+    return information if isinstance(information, dict) else None
+
+
+def custom_data_of(information: Mapping[str, Any]) -> dict[str, str]:
+    """Return the custom data in what metadata.yaml tells."""
+    custom = information.get("custom_data")
+    return {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}
+
+
 def load_yaml(path: object, text: bytes) -> Any:
     """Load YAML without aliases and of bounded depth, which keeps the loader's effort and stack in bounds.
 
@@ -255,7 +330,13 @@ def _data_files(folder: Path, information: dict[str, Any]) -> list[Path]:
             raise BagError(
                 "AMX6813", folder / METADATA_FILE, f"names a data file outside of its folder: {str(name)[:80]!r}"
             )
-    missing = [name for name in names if not (folder / name).is_file()]
-    if missing:
-        raise BagError("AMX6810", folder, f"lacks the data file {missing[0][:80]!r} that metadata.yaml names")
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        hint = "`automax bag repair` writes metadata.yaml anew"
+        raise BagError("AMX6813", folder / METADATA_FILE, f"lists the data file {twice[:80]!r} twice", hint)
+    missing = next((name for name in names if not (folder / name).is_file()), None)
+    if missing is not None:
+        if (folder / missing).exists():
+            raise no_recording(folder / missing)
+        raise BagError("AMX6810", folder, f"lacks the data file {missing[:80]!r} that metadata.yaml names")
     return [folder / name for name in names]

@@ -83,6 +83,15 @@ class Recorder:
         """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
         self._writer.sync()
 
+    def sync_at_end(self) -> None:
+        """Wait until the disk itself has the closed bag; a disk that refuses is a ``failure`` as before."""
+        self.sync()
+        if self.failure is None:
+            try:
+                self._writer.require_synced()
+            except RecordingError as error:
+                self.failure = error
+
     def close(self) -> None:
         """Finish the bag; a disk that refuses is a ``failure`` as before."""
         if self.failure is None:

@@ -18,6 +18,7 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.locals import WatchedLocals, is_local
 from automax_ros.bags.messages import CommonImage, CommonWrite, Scan, TaskState, Variable, VariableTable
 from automax_ros.bags.reader import BagMessage, BagReader
+from automax_ros.bags.span import span_of
 from automax_ros.bags.variables import Watched, WatchError, watched_by_default, watched_by_name
 from automax_ros.core.decimal_text import seconds_text
 
@@ -88,6 +89,7 @@ class Series:
         self.origin_ns = table.stamp
         self.end_ns = 0
         self._values = WatchedValues(self.columns, strings_of(variables))
+        self._require_few_rows(progress)
 
     def changes(self) -> Iterator[Change]:
         """Return the instants of the window at which something changed, or those of its grid.
@@ -228,8 +230,27 @@ class Series:
             held = {}
             due += step
 
+    def _require_few_rows(self, progress: Progress | None) -> None:
+        """Refuse a grid with too many rows before any of them is made."""
+        start, end, step = self._window.start_ns, self._window.end_ns, self._window.step_ns
+        if not step or (end is not None and (end - start) // step < MAX_GRID_ROWS):
+            return
+        span = span_of(self._bag, progress=(lambda share: progress(share / 2)) if progress is not None else None)
+        if progress is not None:
+            self._reader.on_progress = lambda share: progress((1 + share) / 2)
+        first, last = (max(0, stamp - self.origin_ns) for stamp in (span.first, span.last))
+        if end is not None:
+            last = min(last, end)
+        due = start + max(0, -(-(first - start) // step)) * step
+        rows = (last - due) // step + 1
+        if rows > MAX_GRID_ROWS:
+            raise self._too_many(f"would make a table of {rows} rows on that grid, at most {MAX_GRID_ROWS}")
+
     def _counted(self, rows: int) -> int:
         if rows >= MAX_GRID_ROWS:
-            hint = "give a greater --every, or a part of the run by --from and --to"
-            raise BagError("AMX6826", self._bag, f"has more than {MAX_GRID_ROWS} rows on that grid", hint)
+            raise self._too_many(f"has more than {MAX_GRID_ROWS} rows on that grid")
         return rows + 1
+
+    def _too_many(self, text: str) -> BagError:
+        hint = "give a greater --every, or a part of the run by --from and --to"
+        return BagError("AMX6826", self._bag, text, hint)

@@ -282,7 +282,7 @@ class BagWriter:
     def sync(self) -> None:
         """Wait until what was flushed is on the disk itself; from another thread too, for it may take long.
 
-        When the disk refuses, the next ``write`` tells.
+        When the disk refuses, the next ``write``, ``close`` or ``require_synced`` tells.
         """
         try:
             while self._finished:
@@ -291,11 +291,20 @@ class BagWriter:
         except OSError as error:
             self._sync_error = error
 
+    def require_synced(self) -> None:
+        """Tell whether the disk has refused a ``sync``.
+
+        Raises:
+            RecordingError: it has.
+        """
+        if self._sync_error is not None:
+            raise self._failed(self._sync_error)
+
     def close(self) -> None:
         """Finish the files. After a failed write only what stands on disk is kept.
 
         Raises:
-            RecordingError: the disk refuses.
+            RecordingError: the disk refuses, or has refused a ``sync``; the files are finished nevertheless.
         """
         if not self._open:
             return
@@ -307,6 +316,7 @@ class BagWriter:
             self._finished += [self.folder / METADATA_FILE, self.folder]
         except OSError as error:
             raise self._failed(error) from error
+        self.require_synced()
 
     def _begin_file(self) -> None:
         self._file = _DataFile(self.folder / data_file_name(len(self._files)))
@@ -350,8 +360,7 @@ class BagWriter:
         """End the chunk before a message at another time than the one before, if its time is over or it is full."""
         if not self._open or not 0 <= stamp <= MAX_STAMP:
             raise self._bad_message(channel, stamp, payload)
-        if self._sync_error is not None:
-            raise self._failed(self._sync_error)
+        self.require_synced()
         time = max(stamp, self._last_time + 1)
         if time >= self._chunk_end or len(self._chunk.data) > CHUNK_BYTES:
             self.flush()

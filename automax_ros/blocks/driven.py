@@ -12,10 +12,14 @@ from automax_ros.core.types import DataType, Value
 
 _NS_PER_S = 1e9
 _ANY_CHANGE = INT16_MAX - INT16_MIN
+STANDING = "MAX_CHANGE 0"
+"""What a block is told to have run into that may not move at all."""
+MOST_SCANS_TO_REST = 1 << 16
+"""Scans in which a block comes to rest: MAX_CHANGE = 1 takes as many as there are counts."""
 
 
 class DrivenBlock:
-    """A block that one signal of whole counts drives, from rest.
+    """A block that one signal of whole counts drives, from rest: where it comes to stand while the signal is 0.
 
     The signal is INPUT. Of a PID it is ERROR: INPUT carries it and FEEDBACK is 0; where the D term takes FEEDBACK
     (DERIVATIVE), FEEDBACK carries it and INPUT is 0, which is the same for all three terms.
@@ -54,23 +58,39 @@ class DrivenBlock:
         self._bounds = _bounds(block, values)
         inner = next((n for n, state in enumerate(block.states) if state.name in ("integrator", "y1")), None)
         self._inner = None if self._bounds.inner is None or inner is None else len(outputs) + inner
+        self._start, self._rest = self._at_rest()
         self.begin()
 
     def begin(self) -> None:
         """Put the block to rest and forget what it ran into."""
         self._arguments = list(self._start)
-        self._last = 0
+        self._last = self._rest
         self._touched: set[str] = set()
+
+    def _at_rest(self) -> tuple[list[Value], int]:
+        """Return the arguments with the states, and OUTPUT, at which a signal of 0 leaves the block."""
+        arguments = list(self._start)
+        output = 0
+        for _ in range(MOST_SCANS_TO_REST):
+            result = self._step(*arguments)
+            before = [arguments[argument] for argument, _ in self._states]
+            after = [result[position] for _, position in self._states]
+            for (argument, _), value in zip(self._states, after, strict=True):
+                arguments[argument] = value
+            output = result[self._output]
+            if after == before:
+                break
+        return arguments, output
 
     @property
     def room(self) -> int:
         """How many counts OUTPUT may move to either side of rest."""
-        return max(0, min(self._bounds.high - self._bounds.rest, self._bounds.rest - self._bounds.low))
+        return max(0, min(self._bounds.high - self._rest, self._rest - self._bounds.low))
 
     @property
     def rest(self) -> int:
-        """OUTPUT while the signal is 0: FEED_FORWARD of a PID."""
-        return self._bounds.rest
+        """OUTPUT while the signal is 0: of a PID FEED_FORWARD, within its limits."""
+        return self._rest
 
     @property
     def most_change(self) -> int:
@@ -141,10 +161,9 @@ class _Bounds:
         self.low = int(values.get("limit_minus", INT16_MIN))
         self.high_name = f"LIMIT_PLUS {self.high}" if self.high < INT16_MAX else "16 bits"
         self.low_name = f"LIMIT_MINUS {self.low}" if self.low > -INT16_MAX else "16 bits"
-        self.rest = int(values.get("feed_forward", 0))
         self.inner: tuple[float, float] | None = None
         self.inner_names = ("", "")
-        self.most_change = int(values.get("max_change", _ANY_CHANGE))
+        self.most_change = max(0, int(values.get("max_change", _ANY_CHANGE)))
 
 
 def _bounds(block: Block, values: Mapping[str, Value]) -> _Bounds:

@@ -28,7 +28,8 @@ class StepResponse:
     """The outputs from scan 0, in which the step comes, on: a value each ``period_s``, in counts.
 
     ``rest`` is OUTPUT before the step, ``final`` where the discrete function ends, None for one that goes on (an
-    integrator). ``touched`` tells what the block ran into.
+    integrator). ``touched`` tells what the block ran into, nothing where OUTPUT is the design's within a count: to
+    settle at a limit is not to run into it.
     """
 
     counts: int
@@ -85,14 +86,16 @@ def respond(
     driven.begin()
     outputs = driven.run([counts] * scans)
     gain = _gain_at_0(transfer)
+    design = tuple(driven.rest + counts * value for value in unit)
+    as_designed = all(abs(value - wanted) <= 1.0 for value, wanted in zip(outputs, design, strict=True))
     return StepResponse(
         counts=counts,
         period_s=transfer.period_s,
         output=tuple(outputs),
-        design=tuple(driven.rest + counts * value for value in unit),
+        design=design,
         rest=driven.rest,
         final=None if gain is None else driven.rest + counts * gain,
-        touched=driven.touched,
+        touched=() if as_designed else driven.touched,
     )
 
 

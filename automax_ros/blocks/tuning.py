@@ -6,9 +6,10 @@ import enum
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import product
 
 from automax_ros.blocks.coefficients import TWO_TO_MINUS_18, evaluate, integrator_range, is_within, limited
-from automax_ros.blocks.declaration import Block, Bound, Coefficients
+from automax_ros.blocks.declaration import Block, Bound, Coefficients, Limit
 from automax_ros.blocks.filters import GREATEST_RATIO, LEAST_RATIO
 from automax_ros.blocks.transfer import Transfer, mapped
 
@@ -16,6 +17,7 @@ NEAR = 0.1
 """How near to a limit counts as close: as a share of the limit, at most of the room between the two (decision)."""
 RANGE_EDGES = (0.125, 0.25)
 """The coefficients Kx at which the range of an integrator changes (section 51)."""
+Ends = tuple[float, float]
 
 
 class Verdict(enum.Enum):
@@ -34,7 +36,7 @@ class LimitNow:
     """The limits of one parameter as numbers at a scan period, in its own unit; one that cannot be known is None.
 
     ``value`` is what the CALL gives or the default, before it is limited; ``given`` tells which of the two. A default
-    is not limited.
+    is not limited. Where the limits cross the high one is both.
     """
 
     parameter: str
@@ -45,6 +47,7 @@ class LimitNow:
     value: float | None
     given: bool
     verdict: Verdict
+    crossed: bool = False
 
 
 @dataclass(frozen=True)
@@ -191,15 +194,44 @@ RATE_FACTOR = (math.pi / 20.0) / math.tan(math.pi / 20.0)
 
 
 def verdict_of(value: float, low: float | None, high: float | None) -> Verdict:
-    """Return where a value lies: near is within NEAR of a limit, on the limit's own scale; 0 has no scale."""
-    if low is None or high is None:
-        return Verdict.UNKNOWN
-    if not is_within(value, low, high):
-        return Verdict.ABOVE if value > high else Verdict.BELOW
-    room = NEAR * (high - low)
-    if low != 0.0 and value <= low + min(NEAR * abs(low), room):
+    """Return where a value lies: near is within NEAR of a limit, on the limit's own scale; 0 has no scale.
+
+    A side that is not known (None) is not judged; UNKNOWN is a value that is neither beyond nor near the other.
+    """
+    if not is_within(value, -math.inf if low is None else low, math.inf if high is None else high):
+        return Verdict.ABOVE if high is not None and value > high else Verdict.BELOW
+    room = NEAR * (high - low) if low is not None and high is not None else math.inf
+    if low is not None and low != 0.0 and value <= low + min(NEAR * abs(low), room):
         return Verdict.NEAR_LOW
-    return Verdict.NEAR_HIGH if value >= high - min(NEAR * abs(high), room) else Verdict.WITHIN
+    if high is not None and value >= high - min(NEAR * abs(high), room):
+        return Verdict.NEAR_HIGH
+    return Verdict.UNKNOWN if low is None or high is None else Verdict.WITHIN
+
+
+def loose_bounds(
+    limit: Limit, period_s: float, values: Mapping[str, float], ranges: Mapping[str, tuple[float, float]]
+) -> tuple[float | None, float | None]:
+    """Return what no value of a parameter may pass, whatever those parameters are that only ``ranges`` tells of.
+
+    A bound that reads one of these is taken at both ends of its range, and the loosest counts; every bound goes one way
+    as a parameter rises. One that reads a parameter of which nothing is known is None.
+    """
+    open_ones = [name for name in limit.uses if name not in values and name in ranges]
+    corners = [
+        {**values, **dict(zip(open_ones, ends, strict=True))} for ends in product(*(ranges[name] for name in open_ones))
+    ]
+    lows = [_bound(limit.low, period_s, corner) for corner in corners]
+    highs = [_bound(limit.high, period_s, corner) for corner in corners]
+    low = min((value for value in lows if value is not None), default=None)
+    return low, max((value for value in highs if value is not None), default=None)
+
+
+def range_within(limit: Limit, period_s: float, values: Mapping[str, float], low: float, high: float) -> Ends | None:
+    """Return the values in force of a parameter that moves between ``low`` and ``high``, None where none are known."""
+    least, most = loose_bounds(limit, period_s, values, {})
+    if least is None or most is None:
+        return None
+    return min(max(low, least), most), min(max(high, least), most)
 
 
 def _limits(
@@ -207,19 +239,34 @@ def _limits(
 ) -> tuple[LimitNow, ...]:
     rows = []
     in_force = dict(known)
+    ranges: dict[str, Ends] = {}
     for limit in declared.limits:
         low, high = _bound(limit.low, scan_s, in_force), _bound(limit.high, scan_s, in_force)
+        crossed = low is not None and high is not None and low > high
+        if crossed:
+            low = high
         value = known.get(limit.parameter)
         is_given = limit.parameter in given
         verdict = Verdict.UNKNOWN
-        if value is not None:
+        if value is None:
+            ends = range_within(limit, scan_s, in_force, -math.inf, math.inf)
+            if ends is not None:
+                ranges[limit.parameter] = ends
+        else:
             verdict = verdict_of(value, low, high) if is_given else Verdict.WITHIN
+            if verdict is Verdict.UNKNOWN:
+                beyond = verdict_of(value, *loose_bounds(limit, scan_s, in_force, ranges))
+                verdict = beyond if beyond in (Verdict.BELOW, Verdict.ABOVE) else verdict
         # A limit that reads a parameter sees its limited value.
         if verdict is Verdict.BELOW and low is not None:
             in_force[limit.parameter] = low
         elif verdict is Verdict.ABOVE and high is not None:
             in_force[limit.parameter] = high
-        rows.append(LimitNow(limit.parameter, low, high, limit.low_text, limit.high_text, value, is_given, verdict))
+        rows.append(
+            LimitNow(
+                limit.parameter, low, high, limit.low_text, limit.high_text, value, is_given, verdict, crossed=crossed
+            )
+        )
     return tuple(rows)
 
 

@@ -30,7 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
     parser.add_argument(
-        "--check", action="store_true", help="decode every message too, and look for gaps in the write log"
+        "--check",
+        action="store_true",
+        help="decode every message too, and look whether the write log has gaps or goes back",
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import enum
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from automax_ros.blocks.declaration import Block
@@ -16,14 +16,29 @@ from automax_ros.core.types import DataType, Value
 from automax_ros.language.constant_values import range_text
 from automax_ros.language.program import BoundCall, Program, Symbol
 from automax_ros.language.statement_text import print_expression
-from automax_ros.language.tree import BooleanLiteral, Call, Expression, IntegerLiteral, RealLiteral, Unary
-from automax_ros.language.walk import statements_in_order
+from automax_ros.language.tree import (
+    BooleanLiteral,
+    Call,
+    Expression,
+    For,
+    Gosub,
+    IntegerLiteral,
+    OnJump,
+    RealLiteral,
+    Return,
+    Statement,
+    Unary,
+)
+from automax_ros.language.walk import bodies, statements_in_order
 from automax_ros.rack.findings import did_you_mean, quoted
 from automax_ros.runtime.memory import MemoryValueError, ViewSpec, fitting
 
 SIGNALS = ("INPUT", "FEEDBACK")
 """The inputs that carry the signal through a block."""
-_LABEL = re.compile(r"0*([0-9]{1,6})(?:\.([0-9]{1,3}))?")
+HOLDING = {"RESET": "OUTPUT stays where it is", "MANUAL": "OUTPUT is INITIAL_VALUE + FEED_FORWARD"}
+"""The inputs that, while TRUE, let nothing through, and what OUTPUT does then."""
+_LABEL = re.compile(r"0*([0-9]{1,6})(?:\.0*([1-9][0-9]{0,2}))?")
+_LEADING_ZEROS = re.compile(r"(?<=[(,])0+(?=[0-9])")
 
 
 class Source(enum.Enum):
@@ -38,25 +53,36 @@ class Source(enum.Enum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """An input of a CALL: its value, None where it is a variable of which nothing is known; ``variable`` its text."""
+    """An input of a CALL: its value, None where it is a variable of which nothing is known; ``variable`` its text.
+
+    The value is what the block sees: that of a variable that is ``inverted`` is turned round.
+    """
 
     keyword: str
     value: Value | None
     source: Source
     variable: str = ""
+    inverted: bool = False
+
+    @property
+    def text(self) -> str:
+        """The variable as the CALL has it, with its minus sign."""
+        return f"-{self.variable}" if self.inverted else self.variable
 
 
 @dataclass(frozen=True)
 class DynamicCall:
     """A CALL of a block with coefficients: ``label`` is its line as in state names, ``output`` the variable it writes.
 
-    ``parameters`` are the inputs that are programmed, by keyword.
+    ``parameters`` are the inputs that are programmed, by keyword. ``inside`` tells where it stands if it may not run
+    once in every scan: ``IF``, ``FOR`` or ``subroutine``, the innermost.
     """
 
     label: str
     bound: BoundCall
     output: str
     parameters: Mapping[str, Parameter]
+    inside: str = ""
 
     @property
     def block(self) -> Block:
@@ -106,18 +132,56 @@ def dynamic_calls(
     Raises:
         UsageError: no dynamic block there, or a setting is at fault or for no block.
     """
-    values = dict(_setting(program, text) for text in settings)
+    values = _settings(program, settings)
     bound = _labelled(program)
     if label is not None:
         chosen = _chosen(label, bound, program)
         bound = {chosen: bound[chosen]}
-    calls = [DynamicCall(name, item, _output(item), _parameters(program, item, values)) for name, item in bound.items()]
-    free = {item.variable for call in calls for item in _settable(call, driven=driven) if item.variable}
+    calls = [
+        DynamicCall(name, item, _output(item), _parameters(program, item, values), inside)
+        for name, (item, inside) in bound.items()
+    ]
+    free = _free(calls, driven=driven)
     for name in values:
         if name not in {_plain(item) for item in free}:
+            _refuse(name, calls)
             what = "no dynamic block takes it" if label is None else "the block does not take it"
-            raise UsageError(f"--set {name}: {what}", f"to be set are {', '.join(sorted(free))}" if free else None)
+            raise UsageError(f"--set {name}: {what}", _free_text(free))
     return calls
+
+
+def require_running(call: DynamicCall) -> None:
+    """Refuse a block that holds its output.
+
+    Raises:
+        UsageError: RESET or MANUAL is TRUE.
+    """
+    for name, what in HOLDING.items():
+        given = call.parameters.get(name)
+        if given is not None and given.value is True:
+            raise UsageError(f"{call.title}: {name} is TRUE, {what}")
+
+
+def _refuse(name: str, calls: Sequence[DynamicCall]) -> None:
+    """Refuse to set a variable that a block takes, but not for what is to be set."""
+    for call in calls:
+        for item in call.parameters.values():
+            if not item.variable or _plain(item.variable) != name:
+                continue
+            where = f"{item.keyword} of {call.label} {call.block.name}"
+            if item.keyword in SIGNALS:
+                raise UsageError(f"--set {name}: it carries the signal, {where}", _free_text(_free([call])))
+            if item.keyword in HOLDING:
+                require_running(call)
+            raise UsageError(f"--set {name}: it is {where}, no coefficient", _free_text(_free(calls)))
+
+
+def _free(calls: Sequence[DynamicCall], *, driven: bool = False) -> set[str]:
+    return {item.variable for call in calls for item in _settable(call, driven=driven) if item.variable}
+
+
+def _free_text(free: Collection[str]) -> str | None:
+    return f"to be set are {', '.join(sorted(free))}" if free else None
 
 
 def _settable(call: DynamicCall, *, driven: bool) -> list[Parameter]:
@@ -132,21 +196,52 @@ def value_text(value: Value | None) -> str:
     return real_text(value) if isinstance(value, float) else str(value)
 
 
-def _labelled(program: Program) -> dict[str, BoundCall]:
-    """Return the dynamic blocks by line; a further CALL of one line counts from 2, whatever the first one is."""
-    found: dict[str, BoundCall] = {}
+def _labelled(program: Program) -> dict[str, tuple[BoundCall, str]]:
+    """Return the dynamic blocks by line, with what they stand in.
+
+    A further CALL of one line counts from 2, whatever the first one is.
+    """
+    found: dict[str, tuple[BoundCall, str]] = {}
     counts: dict[int, int] = {}
-    for statement, _ in statements_in_order(program.scan):
-        if not isinstance(statement, Call) or statement.span not in program.calls:
+    for statement, inside in _calls_in_order(program.scan, _subroutines(program), ""):
+        if statement.span not in program.calls:
             continue
         bound = program.calls[statement.span]
         number = counts[bound.line] = counts.get(bound.line, 0) + 1
         if bound.block.coefficients is not None:
-            found[f"{bound.line}" if number == 1 else f"{bound.line}.{number}"] = bound
+            found[f"{bound.line}" if number == 1 else f"{bound.line}.{number}"] = bound, inside
     return found
 
 
-def _chosen(label: str, bound: Mapping[str, BoundCall], program: Program) -> str:
+def _calls_in_order(
+    statements: Iterable[Statement], subroutines: Collection[int], inside: str
+) -> Iterator[tuple[Call, str]]:
+    """Yield every CALL in the order of the text, with what it stands in: a subroutine goes on up to its RETURN."""
+    here = inside
+    for statement in statements:
+        if statement.number in subroutines:
+            here = inside or "subroutine"
+        if isinstance(statement, Call):
+            yield statement, here
+        elif isinstance(statement, Return):
+            here = inside
+        kind = "FOR" if isinstance(statement, For) else "IF"
+        for body in bodies(statement):
+            yield from _calls_in_order(body, subroutines, kind)
+
+
+def _subroutines(program: Program) -> set[int]:
+    """Return the lines at which subroutines begin."""
+    found: set[int] = set()
+    for statement, _ in statements_in_order((*program.startup, *program.scan)):
+        if isinstance(statement, Gosub):
+            found.add(statement.line)
+        elif isinstance(statement, OnJump) and statement.gosub:
+            found.update(statement.lines)
+    return found
+
+
+def _chosen(label: str, bound: Mapping[str, tuple[BoundCall, str]], program: Program) -> str:
     match = _LABEL.fullmatch(label.strip())
     if match is None:
         raise UsageError(f"--block {quoted(label)} is no BASIC line such as 210 or 210.2", _listed(bound))
@@ -159,10 +254,10 @@ def _chosen(label: str, bound: Mapping[str, BoundCall], program: Program) -> str
     raise UsageError(f"--block {name}: {what}", _listed(bound))
 
 
-def _listed(bound: Mapping[str, BoundCall]) -> str:
+def _listed(bound: Mapping[str, tuple[BoundCall, str]]) -> str:
     if not bound:
         return "the task has no dynamic block"
-    return "dynamic blocks are " + ", ".join(f"{name} {item.block.name}" for name, item in bound.items())
+    return "dynamic blocks are " + ", ".join(f"{name} {item.block.name}" for name, (item, _) in bound.items())
 
 
 def _output(bound: BoundCall) -> str:
@@ -190,8 +285,19 @@ def _parameter(program: Program, keyword: str, given: Expression, values: Mappin
     elif symbol is not None and symbol.tuning is not None:
         value, source = symbol.tuning.current, Source.TUNABLE
     else:
-        return Parameter(keyword, None, Source.UNKNOWN, text)
-    return Parameter(keyword, not value if inverted else value, source, text)
+        return Parameter(keyword, None, Source.UNKNOWN, text, inverted)
+    return Parameter(keyword, not value if inverted else value, source, text, inverted)
+
+
+def _settings(program: Program, texts: Sequence[str]) -> dict[str, Value]:
+    """Return values by variable, as ``_plain`` has it."""
+    values: dict[str, Value] = {}
+    for text in texts:
+        name, value = _setting(program, text)
+        if name in values:
+            raise UsageError(f"--set {name} is given twice", "give each variable one value")
+        values[name] = value
+    return values
 
 
 def _setting(program: Program, text: str) -> tuple[str, Value]:
@@ -200,6 +306,9 @@ def _setting(program: Program, text: str) -> tuple[str, Value]:
         raise UsageError(f"--set {quoted(text)} is not NAME=VALUE")
     label = _plain(name)
     symbol = program.symbols.get(label.partition("(")[0])
+    if symbol is not None and symbol.dimensions and "(" not in label:
+        element = f"{symbol.name}({','.join(str(size - 1) for size in symbol.dimensions)})"
+        raise UsageError(f"--set {label}: it is an array", f"write an element, as in --set '{element}=VALUE'")
     if symbol is None or bool(symbol.dimensions) != ("(" in label):
         raise UsageError(f"--set: the task has no variable {quoted(name)}", did_you_mean(label, program.symbols))
     return label, _value(label, symbol, value.strip())
@@ -231,5 +340,5 @@ def _wanted(symbol: Symbol) -> str | None:
 
 
 def _plain(text: str) -> str:
-    """Return a variable's text without blanks, in capitals and round brackets."""
-    return "".join(text.split()).upper().replace("[", "(").replace("]", ")")
+    """Return a variable's text without blanks, in capitals and round brackets, subscripts without leading zeros."""
+    return _LEADING_ZEROS.sub("", "".join(text.split()).upper().replace("[", "(").replace("]", ")"))

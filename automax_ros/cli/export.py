@@ -16,6 +16,7 @@ from automax_ros.bags.export import CommonTable, write_csv
 from automax_ros.bags.scan_table import ScanTable
 from automax_ros.bags.series import Progress
 from automax_ros.cli.progress import share_shown
+from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.terminal import count_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
@@ -46,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
         require_another_file(arguments.bag, arguments.output)
         if not as_numpy and arguments.output.suffix.lower() in _OTHER_FORMATS:
             raise UsageError(f"{arguments.output}: this format cannot be written", "name it OUT.csv or OUT.npz")
-        with share_shown("export") as progress:
+        with ended_by_signals(), share_shown("export") as progress:
             rows = _written(arguments, as_numpy, progress)
     except BagError as error:
         print(error, file=sys.stderr)
@@ -68,6 +69,8 @@ def _written(arguments: argparse.Namespace, as_numpy: bool, progress: Progress) 
 def _table(arguments: argparse.Namespace, progress: Progress) -> Table:
     window = window_of(arguments)
     watch = watch_list(arguments.watch)
+    if watch == []:
+        raise UsageError("--watch names no variable", "`automax bag info BAG` lists them")
     if arguments.scans is None:
         return CommonTable(arguments.bag, watch, window, progress)
     if watch is not None or window.step_ns:

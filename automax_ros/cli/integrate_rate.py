@@ -16,10 +16,12 @@ from automax_ros.blocks.tuning import (
 )
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
+from automax_ros.core.ticks import MAX_TICK_NS, MAX_TICKS, MIN_TICK_NS, NS_PER_S
 
 _DIGITS = 7
 """Digits of the constant to write: a REAL has no more."""
 _SLOWEST, _FASTEST = 1e-9, 1e9
+_SHORTEST_S, _LONGEST_S = MIN_TICK_NS / NS_PER_S, MAX_TICKS * MAX_TICK_NS / NS_PER_S
 
 
 @dataclass(frozen=True)
@@ -33,16 +35,15 @@ class Rate:
 
     @classmethod
     def of(cls, y: float, x: float, period_s: float | None) -> Rate:
-        """Return the rate with its KI, checked against the limits where the scan time is known.
+        """Return the rate with its KI, checked against the limits at the scan time, without one against those of all.
 
         Raises:
-            UsageError: no number, INPUT 0 or beyond 16 bits, KI not above 0, or beyond its limits at this scan time.
+            UsageError: no number, Y or INPUT 0, INPUT beyond 16 bits, KI not above 0, or beyond its limits.
         """
         _require(y, x)
         ki = rate_gain(y, x)
         rate = cls(y, x, ki, period_s)
-        if period_s is not None:
-            rate._require_possible(period_s)
+        rate._require_possible(period_s)
         return rate
 
     @property
@@ -85,10 +86,11 @@ class Rate:
             "" if found.near_edge is None else f"  ! Kx is within 10 % of {found.near_edge:g}, where the range changes"
         )
         time_s = found.counts / abs(self.y)
+        end = found.counts if self.y > 0.0 else -found.counts
         lines += [
             f"  limits        {low:.6g} to {high:.6g} at T = {self.period_s * 1e3:g} ms{near.get(self._verdict(), '')}",
             f"  Kx            KI / C = Y T / (2 X) = {found.kx:.6g}, range +-{found.counts} (section 51){edge}",
-            f"  a scan        {self.y * self.period_s:.6g} counts; from 0 to {found.counts} takes {time_s:.4g} s",
+            f"  a scan        {self.y * self.period_s:.6g} counts; from 0 to {end} takes {time_s:.4g} s",
         ]
         return "\n".join(lines) + "\n"
 
@@ -116,9 +118,14 @@ class Rate:
         limits = (None, None) if self.period_s is None else rate_limits(self.period_s)
         return verdict_of(stored_real(self.constant)[0], *limits)
 
-    def _require_possible(self, period_s: float) -> None:
-        low, high = rate_limits(period_s)
-        verdict = self._verdict()
+    def _require_possible(self, period_s: float | None) -> None:
+        """Refuse a KI beyond its limits; those of the longest and of the shortest scan where none is known."""
+        when = "at any scan time"
+        low, high = rate_limits(_LONGEST_S)[0], rate_limits(_SHORTEST_S)[1]
+        if period_s is not None:
+            when = f"at T = {period_s * 1e3:g} ms"
+            low, high = rate_limits(period_s)
+        verdict = verdict_of(stored_real(self.constant)[0], low, high)
         if verdict not in (Verdict.ABOVE, Verdict.BELOW):
             return
         side = f"above its high limit {high:.6g} (0.9 pi / T)"
@@ -126,8 +133,10 @@ class Rate:
             side = f"below its low limit {low:.6g} (C x 2**-18)"
         slow, fast = sorted(limit * self.x / RATE_FACTOR for limit in (low, high))
         raise UsageError(
-            f"--ki: KI = {self.ki:.7g} is {side} at T = {period_s * 1e3:g} ms",
-            f"with INPUT = {self.x:g} it can be {slow:.6g} to {fast:.6g} counts/s; take another INPUT or scan time",
+            f"--ki: KI = {self.ki:.7g} is {side} {when}",
+            f"with INPUT = {self.x:g} it can be {slow:.6g} to {fast:.6g} counts/s; take another INPUT or scan time"
+            if period_s is not None
+            else f"with INPUT = {self.x:g} it can be {slow:.6g} to {fast:.6g} counts/s",
         )
 
 
@@ -138,8 +147,10 @@ def _require(y: float, x: float) -> None:
         raise UsageError("--ki: X is 0, and an integrator of 0 does not move", "X is the constant INPUT in counts")
     if not INT16_MIN <= x <= INT16_MAX or x != int(x):
         raise UsageError(f"--ki: X = {x:g} is no INPUT: that is a whole number from {INT16_MIN} to {INT16_MAX}")
-    if y and not _SLOWEST <= abs(y) <= _FASTEST:
+    if y == 0.0:
+        raise UsageError("--ki: Y is 0, and OUTPUT would not move", "Y is the change of OUTPUT in counts a second")
+    if not _SLOWEST <= abs(y) <= _FASTEST:
         raise UsageError(f"--ki: Y = {y:g} counts/s is {'more' if abs(y) > 1.0 else 'less'} than any scan time allows")
     if y / x <= 0.0:
-        what = "OUTPUT would not move" if y == 0.0 else "OUTPUT moves in the direction of INPUT"
+        what = "OUTPUT moves in the direction of INPUT"
         raise UsageError(f"--ki: KI = {rate_gain(y, x):.7g}, but KI must be above 0: {what}", "turn the sign of INPUT")

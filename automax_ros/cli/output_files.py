@@ -29,6 +29,23 @@ def opened_for_writing(path: Path | None) -> Iterator[TextIO]:
         yield stream
 
 
+PICTURE_FORMATS = (".png", ".svg", ".pdf")
+
+
+def require_picture_file(path: Path) -> None:
+    """Refuse a picture that could not be written, before the work for it begins.
+
+    Raises:
+        UsageError: its name has no suffix of a format, or there is no such folder.
+    """
+    if path.suffix.lower() not in PICTURE_FORMATS:
+        raise UsageError(f"{path} names no format of pictures", f"end it with {', '.join(PICTURE_FORMATS)}")
+    if not path.parent.is_dir():
+        raise UsageError(f"{path} cannot be written: there is no folder {path.parent}")
+    if path.is_dir():
+        raise UsageError(f"{path} cannot be written: it is a folder")
+
+
 def require_different_files(read: Mapping[str, Path], written: Mapping[str, Path | None]) -> None:
     """Refuse to write over what is read, or twice to one file; the keys are the arguments' names.
 

@@ -63,6 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Play the recording; 0 at its end or after Ctrl-C."""
     rate = _rate(arguments.rate)
     begin, end = _seconds("--from", arguments.begin), _seconds("--to", arguments.end)
+    if end is not None and end < (begin or 0):
+        raise UsageError("--to lies before --from")
     target = _namespace(arguments.namespace)
     with stop_signals() as stop:
         domain = prepare_ros()

@@ -12,14 +12,15 @@ from pathlib import Path
 from automax_ros.bags.columns import require_another_file
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.traces import traces
+from automax_ros.cli.output_files import require_picture_file
 from automax_ros.cli.plot_figure import Layout, figure_of, save
 from automax_ros.cli.progress import share_shown
+from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import watch_list
 from automax_ros.cli.window import add_window_arguments, window_of
 from automax_ros.core.decimal_text import seconds_text
 
-FORMATS = (".png", ".svg", ".pdf")
 _SIZES_PX = range(200, 10_001)
 _DEFAULT_WIDTH_PX = 1400
 
@@ -46,8 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Draw the picture."""
     output: Path = arguments.output
-    if output.suffix.lower() not in FORMATS:
-        raise UsageError(f"{output} names no format of pictures", f"end it with {', '.join(FORMATS)}")
+    require_picture_file(output)
     window = window_of(arguments)
     names = watch_list(arguments.variables)
     if not names:
@@ -55,13 +55,13 @@ def run(arguments: argparse.Namespace) -> int:
     width, height = arguments.size
     try:
         require_another_file(arguments.bag, output)
-        with share_shown("plot") as progress:
+        with ended_by_signals(), share_shown("plot") as progress:
             shown = traces(arguments.bag, names, window, progress)
-        title = f"{shown.rack[:80]}: {arguments.bag.resolve().name[:80]}"
-        if window.start_ns or window.end_ns is not None:
-            end = seconds_text(round(shown.end_s * 10**9))
-            title += f", {seconds_text(window.start_ns)} to {end} s"
-        save(figure_of(shown, Layout(title, width, height, arguments.separate)), output)
+            title = f"{shown.rack[:80]}: {arguments.bag.resolve().name[:80]}"
+            if window.start_ns or window.end_ns is not None:
+                end = seconds_text(round(shown.end_s * 10**9))
+                title += f", {seconds_text(window.start_ns)} to {end} s"
+            save(figure_of(shown, Layout(title, width, height, arguments.separate)), output)
     except BagError as error:
         print(error, file=sys.stderr)
         return 2

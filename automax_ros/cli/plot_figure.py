@@ -10,6 +10,7 @@ from typing import Any
 
 from automax_ros.bags.messages import VariableType
 from automax_ros.bags.traces import ErrorMark, Line, Traces, thinned
+from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import printable
 
@@ -84,9 +85,9 @@ def save(figure: Any, path: Path) -> None:
 
     date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(path.suffix.lower().lstrip("."), {})
     try:
-        with mpl.rc_context({"svg.hashsalt": "automax"}), warnings.catch_warnings():
+        with mpl.rc_context({"svg.hashsalt": "automax"}), warnings.catch_warnings(), written_whole(path) as place:
             warnings.simplefilter("ignore")  # characters that the font lacks, lanes too low for their labels
-            figure.savefig(path, dpi=DPI, metadata=date)
+            figure.savefig(place, dpi=DPI, metadata=date)
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 

@@ -131,8 +131,11 @@ class _Session:
         try:
             self._loop(recording, duration_ns)
         finally:
-            self._recorder.finish()
-            sync.stop()
+            try:
+                self._recorder.finish()
+            finally:
+                sync.stop()
+        recording.sync_at_end()
         self._notes(recording)
         return self._summary(recording, folder)
 

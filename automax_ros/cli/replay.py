@@ -18,8 +18,9 @@ from automax_ros.bags.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, Repl
 from automax_ros.bags.replay.picture import can_be_drawn, draw, traces
 from automax_ros.bags.replay.rack import SourceRefused
 from automax_ros.bags.replay.report import ReplayReport
-from automax_ros.cli.output_files import require_different_files
+from automax_ros.cli.output_files import require_different_files, require_picture_file
 from automax_ros.cli.progress import share_shown
+from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import SourceText
@@ -71,6 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
     files = _task_files(arguments.tasks)
     read = {"BAG": arguments.bag, **{f"--task {name}": path for name, path in files.items()}}
     require_different_files(read, {"--plot": arguments.plot})
+    if arguments.plot is not None:
+        require_picture_file(arguments.plot)
     new = {name: _source(name, path) for name, path in files.items()}
     _require_replayed(options, new)
     try:
@@ -100,7 +103,8 @@ def _replayed(replay: Replay, arguments: argparse.Namespace) -> ReplayReport:
         if can_be_drawn(report):
             with share_shown("picture") as show:
                 found = traces(replay, report, show)
-            draw(found, report, arguments.plot)
+            with ended_by_signals():
+                draw(found, report, arguments.plot)
         else:
             print("automax replay: no number differs, so there is nothing to draw", file=sys.stderr)
     return report

@@ -17,7 +17,15 @@ from pathlib import Path
 from automax_ros.blocks.declaration import Block
 from automax_ros.blocks.step_response import MOST_SCANS, default_scans
 from automax_ros.blocks.tuning import Tuning
-from automax_ros.cli.dynamic_calls import SIGNALS, DynamicCall, Source, add_call_arguments, dynamic_calls, value_text
+from automax_ros.cli.dynamic_calls import (
+    SIGNALS,
+    DynamicCall,
+    Source,
+    add_call_arguments,
+    dynamic_calls,
+    require_running,
+    value_text,
+)
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.response_data import BlockResponse, Range, measured_response
 from automax_ros.cli.task_files import add_target_arguments
@@ -28,7 +36,6 @@ from automax_ros.core.types import DataType, Value
 from automax_ros.language.program import Program
 
 _PICTURES = (".png", ".svg", ".pdf")
-_HOLDING = ("RESET", "MANUAL")
 _POINTS, _POINTS_DRAWN, _MOST_POINTS = 12, 30, 500
 _LOWEST_SHARE, _HIGHEST_SHARE = 1.0 / 30.0, 0.95
 """The frequencies without --from and --to: from a share of the lowest corner to a share of Nyquist."""
@@ -98,10 +105,7 @@ def _show(arguments: argparse.Namespace, response: BlockResponse) -> None:
 
 def _measured(arguments: argparse.Namespace, program: Program, call: DynamicCall, tuning: Tuning) -> BlockResponse:
     parameters, assumed = _driving(call)
-    for name in _HOLDING:
-        if parameters.get(name) is True:
-            what = "OUTPUT stays where it is" if name == "RESET" else "OUTPUT is INITIAL_VALUE + FEED_FORWARD"
-            raise UsageError(f"{call.title}: {name} is TRUE, {what}")
+    require_running(call)
     return measured_response(
         path=arguments.file,
         call=call,
@@ -126,7 +130,7 @@ def _driving(call: DynamicCall) -> tuple[dict[str, Value], list[str]]:
         value = given.value
         if given.source is Source.UNKNOWN:
             value = _default(call.block, name)
-            assumed.append(f"{name} = {value_text(value)} ({given.variable})")
+            assumed.append(f"{name} = {value_text(value)} ({given.text})")
         if value is not None:
             parameters[name] = value
     return parameters, assumed

@@ -7,7 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import TextIO
 
-from automax_ros.blocks.frequency import decibels
+from automax_ros.blocks.driven import STANDING
+from automax_ros.blocks.frequency import Measured, decibels
 from automax_ros.blocks.step_response import SETTLED
 from automax_ros.cli.response_data import BlockResponse, Point
 from automax_ros.cli.transfer_text import fixed, laplace_text, number
@@ -121,11 +122,17 @@ def _legend(response: BlockResponse) -> str:
         lines.append("~ few counts come out: rounding to whole counts leaves 0.5 dB or more uncertain")
     touched = sorted({what for item in found for what in item.touched})
     if touched:
-        lines.append(f"~ limit: the block runs into {' and '.join(touched)}; a smaller --amplitude may avoid it")
+        advice = "; a smaller --amplitude may avoid it" if _may_be_smaller(found) else ""
+        lines.append(f"~ limit: the block runs into {' and '.join(touched)}{advice}")
     missed = sum(point.measured is None for point in response.points)
     if missed:
         lines.append(f"- not measured ({missed}): so slow that it would take millions of scans")
     return "".join(f"{line}\n" for line in lines)
+
+
+def _may_be_smaller(found: Sequence[Measured]) -> bool:
+    """Return whether a smaller sine could keep off what the block ran into: nothing gets by a MAX_CHANGE of 0."""
+    return any(item.amplitude > 1 and item.touched and STANDING not in item.touched for item in found)
 
 
 def _level(gain: complex) -> str:
@@ -177,7 +184,7 @@ def record(response: BlockResponse) -> dict[str, object]:
             "overshoot": step.overshoot,
             "settling_s": step.settling_s,
             "settling_band_counts": step.band,
-            "rate_counts_per_s": step.rate,
+            "rate_counts_per_s": step.rate if step.final is None else None,
             "touched": list(step.touched),
             "samples": [_without(item, "response") for item in _step_records(response)],
         },

@@ -85,7 +85,7 @@ def _run_locked(
                 sync.stop()
             if recorder is not None:
                 recorder.close()
-                recorder.sync()
+                recorder.sync_at_end()
     recording.tell()
     display.finish(record, complete=not recording.failed)
     return report_end(rack, failed=recording.failed)

@@ -1,12 +1,16 @@
-"""Ctrl-C, SIGTERM and SIGHUP as a flag that a loop looks at: a run ends cleanly, however often they come."""
+"""Ctrl-C, SIGTERM and SIGHUP as a flag that a loop looks at, or as an exception: a command ends cleanly with both."""
 
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
+
+_SIGNALLED = 128
+"""Exit code of a command that a signal has ended: so much more than the signal's number, as the shell has it."""
 
 
 @dataclass
@@ -33,3 +37,25 @@ def stop_signals() -> Iterator[StopRequest]:
     finally:
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if stop.requested else handler)
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end the block by SystemExit, as Ctrl-C does by KeyboardInterrupt: it tidies up behind it.
+
+    A signal that is ignored stays so; outside of the main thread, which alone takes signals, nothing is changed.
+    """
+
+    def end(number: int, _: FrameType | None) -> None:
+        raise SystemExit(_SIGNALLED + number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) is signal.SIG_DFL:
+                before[number] = signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

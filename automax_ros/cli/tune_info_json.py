@@ -40,6 +40,7 @@ def block_record(call: DynamicCall, tuning: Tuning) -> dict[str, object]:
         "block": call.block.name,
         "section": call.block.section,
         "output": call.output,
+        "inside": call.inside or None,
         "period_s": tuning.period_s,
         "parameters": _parameters(call, tuning),
         "missing": list(tuning.missing),

@@ -57,7 +57,7 @@ def frequency_text(rad_s: float) -> str:
 
 def _block(call: DynamicCall, tuning: Tuning, program: Program) -> str:
     lines = [f"{call.title}   (section {call.block.section})"]
-    rows = [*_values(call, tuning), *_functions(tuning, call), *_corners(tuning), *_range(tuning)]
+    rows = [*_inside(call), *_values(call, tuning), *_functions(tuning, call), *_corners(tuning), *_range(tuning)]
     rows += [*_limits(call, tuning), *_ratio(tuning), *_loop_time(call, tuning, program)]
     last = ""
     for label, text in rows:
@@ -67,6 +67,13 @@ def _block(call: DynamicCall, tuning: Tuning, program: Program) -> str:
 
 
 Rows = Iterator[tuple[str, str]]
+
+
+def _inside(call: DynamicCall) -> Rows:
+    if call.inside:
+        every = "every LOOP_TIME" if call.block.name == "PID" else "in every scan"
+        article = "an" if call.inside == "IF" else "a"
+        yield "inside", f"! {article} {call.inside}: all holds only where the CALL runs once {every}"
 
 
 def _values(call: DynamicCall, tuning: Tuning) -> Rows:
@@ -175,6 +182,8 @@ def _limit_cells(limit: LimitNow, given: Parameter | None, order: float | None) 
     hint = "" if limit.given else "default"
     if given is not None:
         hint = _HINTS.get(limit.verdict, "")
+    if limit.crossed:
+        hint = "! hardly any value is possible: TICKS is too large"
     return (
         limit.parameter,
         value,

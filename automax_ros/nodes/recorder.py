@@ -208,11 +208,7 @@ class LiveRecorder:
             self._knock(now)
 
     def finish(self) -> None:
-        """Take and record what is still there, and finish the bag.
-
-        Raises:
-            RecordingError: the disk refuses.
-        """
+        """Take and record what is still there, and finish the bag; a disk that refuses is the recording's failure."""
         if self.recording is None:
             return
         self._look()

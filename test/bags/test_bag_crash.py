@@ -14,7 +14,10 @@ from pathlib import Path
 
 import pytest
 
+from automax_ros.bags.cdr import decode
 from automax_ros.bags.errors import BagError
+from automax_ros.bags.live.recording import LiveRecording
+from automax_ros.bags.live.topics import LiveTopics
 from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
@@ -199,3 +202,42 @@ def test_a_disk_that_fails_to_sync_ends_the_recording(tmp_path: Path, monkeypatc
     assert rack.statistics["SPEED"].scans == 91
     recorder.close()
     recorder.sync()
+
+
+@pytest.mark.parametrize("refusing", ["before close", "after close"])
+@pytest.mark.parametrize("live", [False, True])
+def test_a_disk_that_refuses_the_last_sync_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refusing: str, live: bool
+) -> None:
+    """No write comes any more that would notice it; the bag is finished all the same."""
+    rack = build(tmp_path)
+    stream = RackStream(rack, 1)
+    recorder: Recorder | LiveRecording = Recorder(rack, stream, tmp_path / "bag")
+    table: list[bytes] = []
+    stream.add_sink(lambda topic, _, payload: table.append(payload) if topic.name.endswith("/variables") else None)
+    stream.begin()
+    rack.start()
+    rack.run(0.5)
+    stream.end()
+    if live:
+        recorder.close()
+        topics = LiveTopics("/line1", decode("automax_msgs/msg/VariableTable", table[0]))
+        recorder = LiveRecording(tmp_path / "live", topics, table[0])
+
+    def refuse(_: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    if refusing == "before close":
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "fsync", refuse)
+            recorder.sync()
+        recorder.close()
+        assert recorder.failure is not None
+    else:
+        recorder.close()
+        assert recorder.failure is None
+        monkeypatch.setattr(os, "fsync", refuse)
+    recorder.sync_at_end()
+    assert recorder.failure is not None
+    assert "Input/output error" in str(recorder.failure)
+    assert repair(tmp_path / ("live" if live else "bag")).sound

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer as McapWriter
 
+from automax_ros.bags.cdr import encode
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.info import TaskInfo, bag_info
 from automax_ros.bags.info_tasks import task_facts
@@ -167,6 +168,43 @@ def test_a_gap_in_the_write_log_is_found_by_check(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", [*log, ("/a/backplane", write_of(4, 2 * MS, {(0, 0): 1}))])
     assert bag_info(bag).problems == []
     assert [problem.code for problem in bag_info(bag, check=True).problems] == ["AMX6823"]
+
+
+@pytest.mark.parametrize("sequences", [(1, 2, 1), (1, 2, 2), (3, 2)])
+def test_a_write_log_that_goes_backwards_is_found_by_check(tmp_path: Path, sequences: tuple[int, ...]) -> None:
+    writes = [("/a/backplane", write_of(number, i * MS, {(0, 0): 1})) for i, number in enumerate(sequences)]
+    bag = record(tmp_path / "bag", [("/a/variables", TABLE), *writes])
+    assert bag_info(bag).problems == []
+    (problem,) = bag_info(bag, check=True).problems
+    assert problem.code == "AMX6813"
+    assert f"write {sequences[-1]} behind write {sequences[-2]}" in problem.message
+
+
+def test_the_same_file_under_two_names_is_found_by_check(tmp_path: Path) -> None:
+    bag = sample_recording(tmp_path / "bag", seconds=1)
+    shutil.copy(bag / "scans_0.mcap", bag / "scans_1.mcap")
+    text = (bag / "metadata.yaml").read_text()
+    (bag / "metadata.yaml").write_text(text.replace("- scans_0.mcap\n", "- scans_0.mcap\n  - scans_1.mcap\n", 1))
+    assert bag_info(bag).problems == []
+    assert [problem.code for problem in bag_info(bag, check=True).problems] == ["AMX6813"]
+
+
+@pytest.mark.parametrize(("version", "sound"), [("0.1.0", False), (None, True)])
+def test_log_times_that_go_backwards_are_found_by_check(tmp_path: Path, version: str | None, sound: bool) -> None:
+    """In recordings of ours, that is: others may store one file's messages in any order."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("std_msgs/msg/Int16", "ros2msg", b"int16 data\n")
+        channel = writer.register_channel("/a", "cdr", schema)
+        for time in (1, 3, 2):
+            writer.add_message(channel, time, encode(Int16(5)), time)
+        if version:
+            writer.add_metadata("rosbag2", {"serialized_metadata": f"custom_data: {{version: {version}}}"})
+        writer.finish()
+    assert bag_info(path).problems == []
+    assert [problem.code for problem in bag_info(path, check=True).problems] == ([] if sound else ["AMX6813"])
 
 
 def test_a_recording_of_something_else(tmp_path: Path) -> None:

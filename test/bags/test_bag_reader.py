@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import random
 import struct
 import tracemalloc
@@ -23,8 +24,11 @@ from automax_ros.bags import mcap_file
 from automax_ros.bags.cdr import encode
 from automax_ros.bags.definitions import schema_text
 from automax_ros.bags.errors import BagError
+from automax_ros.bags.info import bag_info
 from automax_ros.bags.messages import CommonWrite, Int16, VariableTable
+from automax_ros.bags.playback import survey
 from automax_ros.bags.reader import MAX_METADATA_BYTES, BagReader
+from automax_ros.bags.repair.repairing import repair
 from automax_ros.core.problems import PROBLEMS
 
 from .recordings import TABLE, sample_recording
@@ -94,17 +98,18 @@ def test_what_stands_beside_the_messages(recording: Path) -> None:
 
 
 def foreign(path: Path, *, profile: str = "ros2", encoding: str = "cdr", **options: Any) -> Path:
-    """A recording by the mcap library, with three messages on /a."""
+    """A recording by the mcap library, with messages on /a, three if no ``times`` are given."""
     schema_name = options.pop("schema_name", INT16)
     schema_encoding = options.pop("schema_encoding", "ros2msg")
     text = options.pop("text", schema_text(INT16))
     payload = options.pop("payload", encode(Int16(5)))
+    times = options.pop("times", (3, 1, 2))
     with path.open("wb") as file:
         writer = McapWriter(file, **options)
         writer.start(profile=profile)
         schema = writer.register_schema(schema_name, schema_encoding, text.encode())
         channel = writer.register_channel("/a", encoding, schema)
-        for time in (3, 1, 2):
+        for time in times:
             writer.add_message(channel, time, payload, time)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
@@ -208,11 +213,105 @@ def test_a_number_of_a_million_digits_costs_nothing(tmp_path: Path) -> None:
     assert BagReader(tmp_path).files == [tmp_path / "scans_0.mcap"]
 
 
-def test_several_files_follow_each_other(tmp_path: Path, recording: Path) -> None:
-    for index in range(2):
-        (tmp_path / f"part_{index}.mcap").write_bytes(data_of(recording))
-    (tmp_path / "metadata.yaml").write_text(METADATA.replace("scans_0.mcap", "part_0.mcap, part_1.mcap"))
-    assert len(list(BagReader(tmp_path).messages())) == 2 * (2 + 3 * 218)
+def several(folder: Path, *times: tuple[int, ...]) -> Path:
+    """A recording of others with a file for each group of log times."""
+    for number, group in enumerate(times):
+        foreign(folder / f"part_{number}.mcap", times=group)
+    names = ", ".join(f"part_{number}.mcap" for number in range(len(times)))
+    (folder / "metadata.yaml").write_text(METADATA.replace("scans_0.mcap", names))
+    return folder
+
+
+@pytest.mark.parametrize("times", [((3, 1, 2), (5, 4)), ((1,), (), (1, 2)), ((), (0,), (), (7,), (7,))])
+def test_several_files_follow_each_other(tmp_path: Path, times: tuple[tuple[int, ...], ...]) -> None:
+    """Only files against each other have to be in order: others may write one file's messages in any."""
+    bag = several(tmp_path, *times)
+    assert [item.log_time for item in BagReader(bag).messages()] == [time for group in times for time in group]
+    assert survey(bag).last == max(time for group in times for time in group)
+
+
+@pytest.mark.parametrize(
+    ("times", "text", "hint"),
+    [
+        (((5, 6), (1, 2)), "is out of order: its messages begin before those of part_0.mcap", "`automax bag repair`"),
+        (((5, 6), (), (1, 2)), "is out of order", "`automax bag repair`"),
+        (((1,), (5, 8), (7, 9)), "overlaps part_1.mcap", "read each file by its own name"),
+    ],
+)
+def test_files_out_of_order_are_not_one_stream(
+    tmp_path: Path, times: tuple[tuple[int, ...], ...], text: str, hint: str
+) -> None:
+    bag = several(tmp_path, *times)
+    error = refused("AMX6813", lambda: list(BagReader(bag).messages()))
+    assert text in error.message
+    assert hint in error.hint
+    refused("AMX6813", lambda: survey(bag))
+    assert bag_info(bag).problems == [], "what they hold can be told all the same"
+
+
+def test_repair_lists_the_files_in_the_order_of_their_times(tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    bag = several(tmp_path / "bag", (5, 6), (), (1, 2))
+    report = repair(bag)
+    assert report.problems == ["metadata.yaml does not list the data files in the order of their times"]
+    assert report.output is not None
+    assert [item.log_time for item in BagReader(report.output).messages()] == [1, 2, 5, 6]
+    assert repair(report.output).sound
+
+
+def test_a_file_that_is_listed_twice(tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    bag = several(tmp_path / "bag", (1, 2), (3, 4))
+    text = (bag / "metadata.yaml").read_text()
+    (bag / "metadata.yaml").write_text(text.replace("part_1.mcap", "part_1.mcap, part_0.mcap"))
+    error = refused("AMX6813", lambda: BagReader(bag))
+    assert error.message == "lists the data file 'part_0.mcap' twice"
+    assert [problem.code for problem in bag_info(bag).problems] == ["AMX6813"]
+    report = repair(bag)
+    assert report.output is not None
+    assert [item.log_time for item in BagReader(report.output).messages()] == [1, 2, 3, 4]
+
+
+def test_a_single_file_tells_where_it_comes_from(tmp_path: Path, recording: Path) -> None:
+    assert BagReader(recording / "scans_0.mcap").custom_data == BagReader(recording).custom_data != {}
+    assert BagReader(foreign(tmp_path / "a.mcap")).custom_data == {}
+    (tmp_path / "cut.mcap").write_bytes(data_of(recording)[:3000])
+    assert BagReader(tmp_path / "cut.mcap").custom_data == {}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "5",
+        "custom_data: 5",
+        "custom_data: {a: &x 1, b: *x}",
+        "custom_data: " + "[" * 100,
+        "{{{",
+        "custom_data: {a: b}\n#" + " " * MAX_METADATA_BYTES,
+    ],
+)
+def test_what_a_single_file_tells_of_itself_is_not_trusted(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="ros2")
+        writer.add_metadata("other", {"serialized_metadata": "custom_data: {version: wrong}"})
+        writer.add_metadata("rosbag2", {"serialized_metadata": text})
+        writer.finish()  # type: ignore[no-untyped-call]
+    assert BagReader(path).custom_data == {}
+
+
+def test_special_files_are_no_recordings(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("nowhere")
+    for path in (Path("/dev/zero"), tmp_path / "pipe"):
+        assert refused("AMX6810", lambda path=path: BagReader(path)).message == "is no regular file"
+        assert refused("AMX6810", lambda path=path: repair(path)).message == "is no regular file"
+    assert "a link that leads nowhere" in refused("AMX6810", lambda: BagReader(tmp_path / "link")).message
+    assert refused("AMX6810", lambda: BagReader(tmp_path / "none")).message == "does not exist"
+    (tmp_path / "metadata.yaml").write_text(METADATA.replace("scans_0.mcap", "pipe"))
+    assert refused("AMX6810", lambda: BagReader(tmp_path)).message == "is no regular file"
 
 
 def test_every_message_before_the_cut_is_handed_out(tmp_path: Path) -> None:

@@ -261,6 +261,23 @@ def test_a_single_file(bag: Path, tmp_path: Path) -> None:
     assert repair(bag / "scans_0.mcap").sound
 
 
+def test_the_recording_s_own_folder_is_not_written_into(split: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    copy = tmp_path / "bag"
+    shutil.copytree(split, copy)
+    for bag in (copy, copy / "scans_1.mcap"):
+        for output in (copy / "new", copy / "some" / "new", tmp_path / "none" / ".." / "bag" / "new"):
+            with pytest.raises(RecordingError, match=r"AMX6824[\s\S]*lies inside .* the recording itself"):
+                repair(bag, output)
+    before = sorted(path.name for path in copy.iterdir())
+    damaged = copy / "scans_1.mcap"
+    damaged.write_bytes(damaged.read_bytes()[:-20])
+    assert repair(damaged).output == tmp_path / "bag_scans_1_repaired"
+    shutil.rmtree(tmp_path / "bag_scans_1_repaired")
+    monkeypatch.chdir(copy)
+    assert repair(Path("scans_1.mcap")).output == tmp_path / "bag_scans_1_repaired"
+    assert sorted(path.name for path in copy.iterdir()) == before
+
+
 def test_foreign_recordings_are_repaired_too(tmp_path: Path) -> None:
     """Of others' topics every message that is whole is kept: they have no instants."""
     with BagWriter(tmp_path / "foreign", options=StorageOptions(compression="none")) as writer:

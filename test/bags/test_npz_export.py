@@ -224,8 +224,16 @@ def test_a_window_behind_the_end_is_refused(tmp_path: Path) -> None:
 def test_a_grid_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(series, "MAX_GRID_ROWS", 100)
     write_csv(CommonTable(GOLDEN, ["RUN@"], Window(step_ns=10**9)), tmp_path / "out.csv")
-    with pytest.raises(BagError, match="AMX6826"):
-        write_csv(CommonTable(GOLDEN, ["RUN@"], Window(step_ns=10 * MS)), tmp_path / "out.csv")
+    with pytest.raises(
+        BagError, match="AMX6826: would make a table of 1001 rows on that grid, at most 100".replace(": ", r"\]: ")
+    ):
+        CommonTable(GOLDEN, ["RUN@"], Window(step_ns=10 * MS))
+    table = CommonTable(GOLDEN, ["RUN@"], Window(10**9, 10**9 + 99 * 10 * MS, 10 * MS))
+    assert write_csv(table, tmp_path / "out.csv") == 100
+    with pytest.raises(BagError, match="101 rows"):
+        CommonTable(GOLDEN, ["RUN@"], Window(10**9, 2 * 10**9, 10 * MS))
+    with pytest.raises(BagError, match="101 rows"):
+        CommonTable(GOLDEN, ["RUN@"], Window(9 * 10**9, 10**18, 10 * MS))
 
 
 def test_scans_are_those_that_another_reader_decodes(tmp_path: Path) -> None:

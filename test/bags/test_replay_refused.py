@@ -72,7 +72,7 @@ def test_task_that_is_not_in_the_recording(bag):
 
 
 def test_range_without_scans(bag):
-    assert refusal(bag, from_ns=3 * NS_PER_S).code == "AMX6832"
+    assert refusal(bag, from_ns=3 * NS_PER_S).code == "AMX6825"
 
 
 def test_source_with_errors_is_refused_with_its_diagnostics(bag):

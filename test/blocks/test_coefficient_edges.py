@@ -276,3 +276,90 @@ def test_the_loop_time_of_pid():
         (found,) = edge.problems(bad, 4, 5_500_000)
         assert found.code in ("AMX4080", "AMX4084")
         assert 0.01 in stated(found.message)
+
+
+def prop_int(parameters, declare="R"):
+    """The findings of a PROP_INT at 22 ms; R is a variable, or a tunable."""
+    return problems(
+        f"10 LOCAL A%, B%, Q(2)\n15 LOCAL {declare}\n20 CALL SCAN_LOOP(TICKS=4)\n"
+        f"30 CALL PROP_INT(INPUT=A%, {parameters}, OUTPUT=B%)\n40 END\n"
+    )
+
+
+LOWEST_WLD = TINY * mapping_constant(0.022)
+"""That of KP = 1; a larger KP lowers it."""
+
+
+@pytest.mark.parametrize("kp", ["R", "Q(1)"])
+def test_a_constant_beside_a_variable_is_checked_as_loosely_as_the_variable_allows(kp):
+    """KP goes to 128 at most, which makes WLD's low limit the least; the high one does not depend on it."""
+    low, high = LOWEST_WLD / 128.0, 0.9 * PI / 0.022
+    for good in (low * (1 + STEP), 1.0, high * (1 - STEP)):
+        assert prop_int(f"KP={kp}, WLD={good:.7E}") == []
+    for bad, side, bound in ((low * (1 - STEP), "low", low), (-5.0, "low", low), (1000000.0, "high", high)):
+        (found,) = prop_int(f"KP={kp}, WLD={bad:.7E}")
+        assert found.code == "AMX4084"
+        assert f"{side} limit" in found.message
+        assert "KP 0.001 to 128" in found.message
+        assert any(number == pytest.approx(bound, rel=1e-6) for number in stated(found.message))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "kp"),
+    [(0.5, 4.0, 4.0), (0.5, 1000.0, 128.0), (200.0, 300.0, 128.0), (-8.0, -2.0, 0.001)],
+)
+def test_a_tunable_moves_between_its_low_and_high(low, high, kp):
+    """As far as KP's own limits let it: 0.001 to 128."""
+    declare = f"R [CURRENT={high}, HIGH={high}, LOW={low}, STEP=0.1]"
+    bound = LOWEST_WLD / kp
+    assert prop_int(f"KP=R, WLD={bound * (1 + STEP):.7E}", declare) == []
+    (found,) = prop_int(f"KP=R, WLD={bound * (1 - STEP):.7E}", declare)
+    assert found.code == "AMX4084"
+
+
+def test_a_bad_constant_causes_no_second_error():
+    """What WLD's low limit is beside a KP that cannot be nobody knows; the high one holds all the same."""
+    (found,) = prop_int("KP=500.0, WLD=-5.0")
+    assert "KP = 500" in found.message
+    assert [item.message[:3] for item in prop_int("KP=500.0, WLD=1000000.0")] == ["KP ", "WLD"]
+
+
+CROSSED = [
+    pytest.param("INTEGRATE(INPUT=A%, KI=0.005, WM=0.02, OUTPUT=B%)", 30_000, "WM", 0.9 * PI / 300, 0.01, id="WM"),
+    pytest.param("NOTCH(INPUT=A%, Q_FACTOR=2.0, WN=0.02, OUTPUT=B%)", 7_000, "WN", PI / 5 / 70, 0.01, id="WN"),
+]
+
+
+@pytest.mark.parametrize(("call", "ticks", "name", "high", "low"), CROSSED)
+def test_limits_that_cross_at_long_scans_blame_ticks(call, ticks, name, high, low):
+    def found(text):
+        text = f"10 LOCAL A%, B%\n20 CALL SCAN_LOOP(TICKS={ticks})\n30 CALL {text}\n40 END\n"
+        return problems(text, tick_ns=10_000_000)
+
+    for bad in ("0.02", "0.005"):
+        (item,) = found(call.replace(f"{name}=0.02", f"{name}={bad}"))
+        assert item.code == "AMX4084"
+        assert any(number == pytest.approx(high, rel=1e-6) for number in stated(item.message))
+        assert low in stated(item.message)
+        assert item.hint == f"at this scan period hardly any {name} is possible: TICKS is too large"
+    assert found(call.replace(f"{name}=0.02", f"{name}={high:.9f}")) == []
+
+
+@pytest.mark.parametrize(
+    ("loop_time", "ticks", "tick_ns", "written", "every"),
+    [
+        (0.01, 1, 7_500_000, "0.015", "every 2nd scan"),
+        (0.013, 1, 3_000_000, "0.012", "every 4th scan"),
+        (0.01027, 1, 500_000, "0.0105", "every 21st scan"),
+        (0.01, 1, 3_700_000, "0.0111", "every 3rd scan"),
+        (0.025, 4, 5_500_000, "0.022", "every scan"),
+        (0.0107, 1, 1_000_000, "0.011", "every 11th scan"),
+    ],
+)
+def test_a_loop_time_that_is_suggested_is_possible(loop_time, ticks, tick_ns, written, every):
+    """The nearest number of scans that is 0.01 s at least."""
+    edge = Edge("PID", "LOOP_TIME", None, None, "KP=1.0, KI=1.0")
+    (found,) = problems(edge.text(f"{loop_time}", ticks, tick_ns), tick_ns=tick_ns)
+    assert found.code == "AMX4099"
+    assert found.hint == f"write {written} if the block runs in {every}"
+    assert problems(edge.text(written, ticks, tick_ns), tick_ns=tick_ns) == []

@@ -98,17 +98,23 @@ def test_ten_million_scans_without_drift():
 
 
 STEADY = """\
-10 LOCAL IN%, OFF%, SLOW%, WHOLE%, RAMPED%, LOOP%, PLANT%
+10 LOCAL IN%, PULSE%, SLOW%, WHOLE%, RAMPED%, LOOP%, PLANT%, FIRST@, RISING@
 20 CALL SCAN_LOOP(TICKS=2)
 30 IN% = 1234
 40 CALL LAG(INPUT=IN%, WLG=1.5, OUTPUT=SLOW%)
-50 CALL INTEGRATE(INPUT=OFF%, KI=0.7, INITIAL_VALUE=77, OUTPUT=WHOLE%)
+42 FIRST@ = SLOW% < 600
+44 RISING@ = SLOW% > 700 AND SLOW% < 900
+46 CALL SWITCH(INPUT1=111, INPUT2=0, SELECT=RISING@, OUTPUT=PULSE%)
+50 CALL INTEGRATE(INPUT=PULSE%, KI=0.7, INITIAL_VALUE=77, RESET=FIRST@, OUTPUT=WHOLE%)
 60 CALL RAMP(INPUT=IN%, ACCEL_RATE=50, OUTPUT=RAMPED%)
 70 CALL PID(KP=2.0, KI=9.0, LOOP_TIME=0.011, INPUT=IN%, FEEDBACK=PLANT%, OUTPUT=LOOP%)
 80 CALL LAG(INPUT=LOOP%, WLG=2.0, OUTPUT=PLANT%)
-90 OFF% = 0
 999 END
 """
+
+
+WHOLE = 77 + 24
+"""0.7 / 0.9918 x 111 / s (42.3) while SLOW% goes from 700 to 900, which takes ln(534 / 334) / 1.5 s."""
 
 
 def stays_steady(scans):
@@ -118,7 +124,9 @@ def stays_steady(scans):
     for scan in range(1, 3000):
         task.scan(scan * task.period_ns)
     steady = [task.value(name) for name in names]
-    assert steady[:4] == [1234, 0, 1234, 1234]
+    # The integrator holds what the pulse left on top of INITIAL_VALUE, with a fraction of a count.
+    assert steady[:4] == [1234, WHOLE, 1234, 1234]
+    assert not task.value("RISING@")
     seen = set()
     for scan in range(3000, scans):
         task.scan(scan * task.period_ns)

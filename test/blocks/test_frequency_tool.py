@@ -280,6 +280,44 @@ def test_feed_forward_is_rest_and_takes_its_part_of_the_room():
     assert step.settling_s == 0.0
 
 
+@pytest.mark.parametrize("most", [50, 1])
+def test_pid_is_at_rest_before_anything_is_measured(most):
+    """MAX_CHANGE leads OUTPUT to FEED_FORWARD; neither step nor sine sees that."""
+    parameters = {"KP": 0.5, "KI": 0.0, "LOOP_TIME": 0.022, "FEED_FORWARD": 5000, "MAX_CHANGE": most}
+    transfer = transfer_of("PID", 22 * MS, parameters)
+    step = respond(CATALOGUE["PID"], 22 * MS, parameters, transfer, 20 * most, 30)
+    assert step.rest == 5000
+    assert step.output == tuple(5000 + min(most * n, 10 * most) for n in range(1, 31))
+    (found,) = Sweep(CATALOGUE["PID"], 22 * MS, parameters, transfer, most).measure([10.0])
+    assert abs(found.gain - 0.5) <= found.uncertainty
+    assert found.touched == (() if most > 1 else ("MAX_CHANGE 1",))
+
+
+@pytest.mark.parametrize(
+    ("limits", "rest", "first"), [({"LIMIT_PLUS": 3000}, 3000, 3000), ({"LIMIT_MINUS": 6000}, 11000, 11002)]
+)
+def test_rest_of_pid_is_where_its_limits_leave_it(limits, rest, first):
+    """The low limit holds the integrator too, to which FEED_FORWARD is added: 6000 + 5000."""
+    parameters = {"KP": 2.0, "KI": 0.0, "LOOP_TIME": 0.022, "FEED_FORWARD": 5000, **limits}
+    transfer = transfer_of("PID", 22 * MS, parameters)
+    step = respond(CATALOGUE["PID"], 22 * MS, parameters, transfer, 1, 10)
+    assert (step.rest, step.output[0]) == (rest, first)
+    assert step.touched == (("LIMIT_PLUS 3000",) if rest == 3000 else ())
+
+
+def test_integrator_begins_where_its_limits_leave_it():
+    step = respond(
+        CATALOGUE["INTEGRATE"],
+        22 * MS,
+        {"KI": 1.0, "LIMIT_MINUS": 100},
+        transfer_of("INTEGRATE", 22 * MS, {"KI": 1.0}),
+        500,
+        20,
+    )
+    assert step.rest == 100
+    assert 100 < step.output[0] < 120
+
+
 def test_what_takes_too_long_is_not_measured(monkeypatch):
     transfer = transfer_of("LAG", 22 * MS, {"WLG": 10.0})
     monkeypatch.setattr(frequency, "MOST_SCANS_IN_ALL", 5000)

@@ -217,6 +217,19 @@ def test_from_manual_to_automatic_without_a_bump_when_the_error_is_0(isa):
         assert block.scan(input=900, feedback=900, manual=False, initial_value=0)["output"] == 4321
 
 
+def test_with_derivative_of_feedback_automatic_begins_with_a_kick():
+    """MANUAL resets the internal variables to zero, so FEEDBACK comes all at once: -900 x 0.1 / 0.01, in one scan."""
+    block = pid(derivative=True, kp=3.0, ki=2.0, kd=0.1)
+    for _ in range(20):
+        block.scan(input=900, feedback=880)
+    for _ in range(3):
+        shown = block.scan(input=900, feedback=900, manual=True, initial_value=4321)
+        assert shown["output"] == 4321
+    kicked = block.scan(input=900, feedback=900)
+    assert (kicked["error"], kicked["output"]) == (0, 4321 - 9000)
+    assert [block.scan(input=900, feedback=900)["output"] for _ in range(5)] == [4321] * 5
+
+
 def test_after_manual_the_histories_start_at_zero():
     block = pid(kp=1.0, ki=2.0, kd=0.1)
     for _ in range(5):

@@ -51,12 +51,14 @@ def test_neither_integrator_nor_output_winds_up():
     assert block.outputs == {"output": 1000, "saturated_plus": True, "saturated_minus": False}
     assert block.state["integrator"] == 1000.0
     kx = 2.0 * 5.0 / C
-    integrator = 1000 + kx * (600 - 100) if kx * (600 - 100) < 0 else 1000
-    assert block.scan(input=-100) == {
-        "output": round(integrator - 200),
+    integrator = 1000 + kx * (600 - 700)
+    assert round(integrator) == 997
+    assert block.scan(input=-700) == {
+        "output": round(integrator - 1400),
         "saturated_plus": False,
         "saturated_minus": False,
     }
+    assert block.state["integrator"] == pytest.approx(integrator)
 
 
 def test_a_saturated_output_lets_go_in_one_scan_when_the_error_turns():

@@ -83,7 +83,44 @@ def test_near_between_close_limits_is_a_tenth_of_the_room_and_zero_has_no_scale(
         Verdict.NEAR_HIGH,
     ]
     assert verdict_of(0.0, 0.0, 1e18) is Verdict.WITHIN
-    assert verdict_of(1.0, None, 2.0) is Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "verdict"),
+    [
+        (1.0, None, 2.0, Verdict.UNKNOWN),
+        (1.9, None, 2.0, Verdict.NEAR_HIGH),
+        (2.1, None, 2.0, Verdict.ABOVE),
+        (5.0, 2.0, None, Verdict.UNKNOWN),
+        (2.1, 2.0, None, Verdict.NEAR_LOW),
+        (1.9, 2.0, None, Verdict.BELOW),
+        (1.9, None, None, Verdict.UNKNOWN),
+    ],
+)
+def test_each_side_that_is_known_is_judged(value, low, high, verdict):
+    assert verdict_of(value, low, high) is verdict
+
+
+@pytest.mark.parametrize(
+    ("wld", "verdict"),
+    [
+        (1e6, Verdict.ABOVE),
+        (125.0, Verdict.NEAR_HIGH),
+        (-5.0, Verdict.BELOW),
+        (1e-6, Verdict.BELOW),
+        (1e-5, Verdict.UNKNOWN),
+    ],
+)
+def test_value_beside_one_that_is_not_known_is_judged_as_far_as_that_goes(wld, verdict):
+    """KP reaches 128 at most: WLD's low limit is 2.7E-6 at least, whatever KP is."""
+    found = tuning(CATALOGUE["PROP_INT"], 0.022, {"KP": None, "WLD": wld})
+    assert {item.parameter: item.verdict for item in found.limits}["WLD"] is verdict
+
+
+def test_limits_that_cross_leave_the_high_one():
+    found = limits_of("INTEGRATE", 300.0, KI=0.005, WM=0.02)["WM"]
+    assert (found.low, found.high, found.crossed) == (found.high, pytest.approx(0.9 * math.pi / 300), True)
+    assert not limits_of("INTEGRATE", 200.0, KI=0.005, WM=0.01)["WM"].crossed
 
 
 def test_a_real_nearest_to_a_limit_is_the_limit():

@@ -74,6 +74,8 @@ def test_scans_of_a_task(automax, bag):
         (["--scans", "SPED"], "did you mean SPEED?"),
         (["--scans", "SPEED", "--watch", "REF%"], "without --watch and --every"),
         (["--scans", "SPEED", "--every", "1"], "without --watch and --every"),
+        (["--watch", ",,,"], "--watch names no variable"),
+        (["--every", "1e-9"], "would make a table of"),
         (["--every", "0"], "--every has to be above 0"),
         (["--every", "1e-12"], "no whole number of nanoseconds"),
         (["--every", "-1"], "is not a number of seconds from 0 on"),

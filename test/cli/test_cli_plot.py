@@ -170,6 +170,22 @@ def test_what_cannot_be_drawn_is_2(automax, bag, arguments, text):
     assert not (automax.folder / "OUT.png").exists()
 
 
+def test_a_picture_that_breaks_off_leaves_the_one_before(automax, bag, monkeypatch):
+    figure = pytest.importorskip("matplotlib.figure")
+
+    def broken(self, place, **_):
+        with open(place, "w") as file:
+            file.write("half")
+        raise OSError(28, "No space left on device")
+
+    automax.write("OUT.png", "the one before")
+    monkeypatch.setattr(figure.Figure, "savefig", broken)
+    result = automax("plot", bag, "REF%", "-o", "OUT.png")
+    assert (result.code, "OUT.png cannot be written: No space left" in result.err) == (2, True)
+    assert sorted(path.name for path in automax.folder.iterdir()) == ["OUT.png", "bag"]
+    assert (automax.folder / "OUT.png").read_text() == "the one before"
+
+
 def test_a_truncated_recording_is_2(automax, bag):
     with (automax.folder / bag / "scans_0.mcap").open("r+b") as file:
         file.truncate(3000)

@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 from bags.replays import SPEED, WORK, edited, recorded
+from bags.test_bag_split import recorded as recorded_files
+
+from automax_ros.bags.recorder import RecordingOptions
+from automax_ros.core.ticks import NS_PER_S
 
 STRONGER = edited(SPEED, ("INPUT2=100", "INPUT2=104"))
 
@@ -115,12 +119,46 @@ def test_picture_without_a_difference_is_not_drawn(automax, bag):
 
 def test_picture_that_cannot_be_drawn(automax, bag, monkeypatch):
     task = f"SPEED={automax.write('SPEED.BLK', STRONGER)}"
-    result = automax("replay", bag, "--task", task, "--plot", "none/first.png")
-    assert result.code == 2
-    assert "error[AMX6834]" in result.err
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     result = automax("replay", bag, "--task", task, "--plot", "first.png")
     assert (result.code, "pip install matplotlib" in result.err) == (2, True)
+
+
+def test_picture_of_a_folder_with_an_odd_name(source, automax, recwarn):
+    """It is not taken for a formula, and nobody hears what the font of matplotlib lacks."""
+    pytest.importorskip("matplotlib")
+    (automax.folder / r"$\frac$ 軋機").symlink_to(source)
+    task = f"SPEED={automax.write('SPEED.BLK', STRONGER)}"
+    result = automax("replay", r"$\frac$ 軋機", "--task", task, "--plot", "first.png")
+    assert (result.code, result.err, recwarn.list) == (1, "", [])
+    assert (automax.folder / "first.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_picture_that_breaks_off_leaves_nothing(automax, bag, monkeypatch):
+    figure = pytest.importorskip("matplotlib.figure")
+
+    def broken(self, place, **_):
+        Path(place).write_text("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(figure.Figure, "savefig", broken)
+    task = f"SPEED={automax.write('SPEED.BLK', STRONGER)}"
+    before = set(automax.folder.iterdir())
+    result = automax("replay", bag, "--task", task, "--plot", "first.png")
+    assert result.code == 2
+    assert "first.png: error[AMX6834]: cannot be written: No space left on device" in result.err
+    assert set(automax.folder.iterdir()) == before
+
+
+def test_range_outside_of_one_file_of_a_recording(automax):
+    folder = automax.folder / "small"
+    folder.mkdir()
+    recorded_files(folder, RecordingOptions(split_ns=2 * NS_PER_S), seconds=5.0)
+    result = automax("replay", "small/bag/scans_1.mcap", "--to", "1")
+    assert (result.code, result.out) == (2, "")
+    assert "error[AMX6825]" in result.err
+    assert "it lasts from 2 to 4 s of the run" in result.err
+    assert "version unknown" not in automax("replay", "small/bag/scans_1.mcap").out
 
 
 def test_without_a_picture_matplotlib_is_not_imported(automax, bag, monkeypatch):
@@ -181,7 +219,12 @@ def test_unfinished_recording_points_to_the_repair(automax, source):
         (["out", "--from", "-1"], "--from: -1 s is negative"),
         (["out", "--to", "x"], "--to: "),
         (["out", "--from", "2", "--to", "1"], "--to lies before --from"),
-        (["out", "--from", "1e9"], "error[AMX6832]"),
+        (["out", "--from", "1e9"], "it lasts from 0 to 2 s of the run"),
+        (["out", "--from", "1.0001", "--to", "1.0002"], "error[AMX6825]: holds no scan of SPEED, WORK in the range"),
+        (["out", "--from", "1.0001", "--to", "1.0002", "--only", "SPEED"], "error[AMX6825]: holds no scan of SPEED in"),
+        (["out", "--plot", "first.jpg"], "first.jpg names no format of pictures"),
+        (["out", "--plot", "first"], "end it with .png, .svg, .pdf"),
+        (["out", "--plot", "none/first.png"], "there is no folder none"),
         (["out", "--max-differences", "0"], "at least 1"),
         (["out", "--task", "SPEED=A.BLK", "--plot", "A.BLK"], "are the same file"),
     ],

@@ -108,6 +108,52 @@ def test_integrator_stays_off_its_range_unless_it_is_told_to_go_there(automax):
     assert "~ limit: the block runs into the integrator's range +-8191 (section 51); a smaller" in forced.out
 
 
+def test_a_step_that_only_settles_at_16_bits_runs_into_nothing(automax):
+    line = task("CALL {}(INPUT=A%, {}, OUTPUT=B%)")
+    for block, parameter in (("LAG", "WLG=40.0"), ("DIFF_LAG", "WLG=40.0")):
+        for step in ("32767", "-32767"):
+            text = line.format(block, parameter)
+            assert measured(automax, text, "--step", step, "--points", "2")["step"]["touched"] == []
+    beyond = measured(automax, line.format("PROP_INT", "KP=2.0, WLD=1.0"), "--step", "32767", "--points", "2")
+    assert "16 bits" in beyond["step"]["touched"]
+    limited = line.format("LAG", "WLG=40.0, RESET=HELD@")
+    assert measured(automax, limited, "--step", "-32767", "--points", "2")["step"]["final"] == -32767
+
+
+@pytest.mark.parametrize(
+    ("options", "line", "advised"),
+    [
+        (("--amplitude", "3000"), "KP=2.0, MAX_CHANGE=100", True),
+        (("--amplitude", "1"), "KP=9.0, MAX_CHANGE=1", False),
+        (("--amplitude", "3000"), "KP=2.0, MAX_CHANGE=TOP%", False),
+    ],
+)
+def test_smaller_sines_are_advised_only_where_they_help(automax, options, line, advised):
+    text = task(f"CALL PID(INPUT=A%, FEEDBACK=B%, KI=0.0, LOOP_TIME=0.022, {line}, OUTPUT=A%)")
+    more = ("--set", "TOP%=0") if "TOP%" in line else ()
+    result = automax("response", automax.write("T.BLK", text), "--block", "40", "--points", "3", *options, *more)
+    assert result.code == 0
+    (told,) = [row for row in result.out.splitlines() if row.startswith("~ limit: the block runs into MAX_CHANGE")]
+    assert told.endswith("; a smaller --amplitude may avoid it") is advised
+
+
+def test_rate_is_of_what_goes_on_only(automax):
+    assert lag(automax, "--points", "2")["step"]["rate_counts_per_s"] is None
+    text = task("CALL INTEGRATE(INPUT=A%, KI=2.0, OUTPUT=B%)")
+    found = measured(automax, text, "--points", "2", "--step", "100")
+    assert found["step"]["rate_counts_per_s"] == pytest.approx(200.0 / 0.99176, rel=0.02)
+
+
+def test_feed_forward_and_change_are_at_rest_before_the_step(automax):
+    line = (
+        "CALL PID(INPUT=A%, FEEDBACK=B%, KP=1.0, KI=0.0, LOOP_TIME=0.022, FEED_FORWARD=5000, MAX_CHANGE=50, OUTPUT=A%)"
+    )
+    found = measured(automax, task(line), "--step", "40")
+    assert [item["measured"] for item in found["step"]["samples"]] == [5040] * len(found["step"]["samples"])
+    assert all(item["measured"] == pytest.approx(0.0, abs=0.2) for item in found["bode"] if item["reliable"])
+    assert any(item["reliable"] for item in found["bode"])
+
+
 def test_few_counts_are_marked(automax):
     text = task("CALL LAG(INPUT=A%, WLG=0.02, OUTPUT=B%)")
     found = measured(automax, text, "--amplitude", "100")
@@ -124,7 +170,7 @@ def test_unknown_limits_and_switches_are_as_if_not_programmed(automax):
     found = measured(automax, text)
     (remark,) = found["remarks"]
     assert remark == (
-        "values not known, taken as if not programmed: LIMIT_PLUS = 32767 (TOP%), RESET = FALSE (HELD@); "
+        "values not known, taken as if not programmed: LIMIT_PLUS = 32767 (TOP%), RESET = FALSE (-HELD@); "
         "--set gives others"
     )
     limited = measured(automax, text, "--set", "TOP%=100", "--set", "HELD@=TRUE", "--step", "4095")
@@ -250,7 +296,9 @@ def test_extreme_values_end_without_a_fault(automax, line):
         (("--block", "140", "--set", "GAIM=1"), "--set: the task has no variable 'GAIM'\n  hint: did you mean GAIN?"),
         (("--block", "140", "--set", "KP1=0.1"), "--set KP1: '0.1' is beyond its tuning limits, 0.5 to 10.0"),
         (("--block", "140", "--set", "GAIN=nan"), "--set GAIN: 'nan' is no value of type REAL"),
-        (("--block", "140", "--set", "A%=1"), "--set A%: the block does not take it\n  hint: to be set are GAIN, KP1"),
+        (("--block", "140", "--set", "A%=1"), "--set A%: it carries the signal, INPUT of 140 PROP_INT\n"),
+        (("--block", "140", "--set", "GAIN=1", "--set", "GAIN=1"), "--set GAIN is given twice"),
+        (("--block", "140.0"), "--block '140.0' is no BASIC line such as 210 or 210.2"),
         (("--block", "100", "--amplitude", "0"), "--amplitude 0: it must be 1 to 32767 counts"),
         (("--block", "100", "--amplitude", "32768"), "--amplitude 32768: it must be 1 to 32767 counts"),
         (("--block", "100", "--step", "0"), "--step 0: it must be 1 to 32767 counts"),

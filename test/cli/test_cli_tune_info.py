@@ -62,7 +62,7 @@ def test_json_schema(automax):
     assert [item["line"] for item in found["blocks"]] == ["100", "110", "120", "130", "140", "150", "160", "170.2"]
     for item in found["blocks"]:
         assert list(item) == [
-            "line", "block", "section", "output", "period_s", "parameters", "missing", "laplace", "discrete",
+            "line", "block", "section", "output", "inside", "period_s", "parameters", "missing", "laplace", "discrete",
             "coefficients", "mapping_c", "corners", "integrator", "limits", "ratio",
         ]  # fmt: skip
         for corner in item["corners"]:
@@ -194,7 +194,11 @@ def test_one_block(automax):
         (("--set", "GAIN"), "--set 'GAIN' is not NAME=VALUE"),
         (("--set", "GAIM=1"), "--set: the task has no variable 'GAIM'\n  hint: did you mean GAIN?"),
         (("--set", "GAIN(1)=1"), "--set: the task has no variable 'GAIN(1)'"),
-        (("--set", "A%=1"), "--set A%: no dynamic block takes it\n  hint: to be set are GAIN, KP1"),
+        (("--set", "A%=1"), "--set A%: it carries the signal, INPUT of 100 LAG\n"),
+        (("--set", "G%=1"), "--set G%: it carries the signal, FEEDBACK of 160 PID\n"),
+        (("--set", "R@=1"), "--set R@: no dynamic block takes it\n  hint: to be set are GAIN, KP1"),
+        (("--set", "GAIN=1", "--set", "gain=2"), "--set GAIN is given twice\n"),
+        (("--block", "210.0"), "--block '210.0' is no BASIC line such as 210 or 210.2\n  hint: dynamic blocks are"),
         (("--set", "GAIN=nan"), "--set GAIN: 'nan' is no value of type REAL"),
         (("--set", "GAIN=1e30"), "--set GAIN: '1e30' does not fit type REAL"),
         (("--set", "GAIN="), "--set GAIN: '' is no value of type REAL"),
@@ -210,6 +214,92 @@ def test_wrong_usage(automax, options, told):
     result = automax("tune-info", automax.write("MIX.BLK", MIX), *options)
     assert (result.code, result.out) == (2, "")
     assert result.err.startswith(f"automax tune-info: error: {told}")
+
+
+HOLDING = (
+    "10 LOCAL A%, B%, G(3), M(2,4), RS@, TOP%\n20 CALL SCAN_LOOP(TICKS=4)\n"
+    "30 CALL INTEGRATE(INPUT=A%, KI=G(2), RESET=-RS@, LIMIT_PLUS=TOP%, OUTPUT=B%)\n"
+    "40 CALL LAG(INPUT=A%, WLG=M(1,3), OUTPUT=B%)\n50 END\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("G=5.0", "--set G: it is an array\n  hint: write an element, as in --set 'G(3)=VALUE'\n"),
+        ("M=5.0", "--set M: it is an array\n  hint: write an element, as in --set 'M(2,4)=VALUE'\n"),
+        ("G(3)=5.0", "--set G(3): no dynamic block takes it\n  hint: to be set are G(2), M(1, 3)\n"),
+        ("RS@=FALSE", "30 INTEGRATE -> B%: RESET is TRUE, OUTPUT stays where it is\n"),
+        ("RS@=TRUE", "--set RS@: it is RESET of 30 INTEGRATE, no coefficient\n  hint: to be set are G(2), M(1, 3)\n"),
+        ("TOP%=5", "--set TOP%: it is LIMIT_PLUS of 30 INTEGRATE, no coefficient\n"),
+    ],
+)
+def test_what_cannot_be_set(automax, setting, told):
+    result = automax("tune-info", automax.write("T.BLK", HOLDING), "--set", setting)
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith(f"automax tune-info: error: {told}")
+
+
+@pytest.mark.parametrize("name", ["G(2)", "G(02)", "g[ 002 ]"])
+def test_element_of_an_array_is_set_by_its_subscript(automax, name):
+    assert records(automax, HOLDING, "--set", f"{name}=5.0")["blocks"][0]["parameters"]["KI"]["in_force"] == 5.0
+
+
+def test_elements_of_two_subscripts(automax):
+    found = records(automax, HOLDING, "--set", "M(01, 3)=5.0")["blocks"][1]
+    assert found["parameters"]["WLG"]["in_force"] == 5.0
+
+
+def test_second_call_of_a_line_by_a_number_with_zeros(automax):
+    result = automax("tune-info", automax.write("MIX.BLK", MIX), "--block", "170.02")
+    assert "170.2 LAG -> Q%" in result.out
+
+
+def test_limits_that_cross_blame_ticks(automax):
+    text = task("40 CALL NOTCH(INPUT=A%, Q_FACTOR=2.0, WN=GAIN, OUTPUT=B%)\n", ticks=12000)
+    result = automax("tune-info", automax.write("T.BLK", text), "--set", "GAIN=0.02")
+    (row,) = [line for line in result.out.splitlines() if "WN" in line and ".." in line]
+    assert row.endswith("! hardly any value is possible: TICKS is too large")
+    assert f"{math.pi / 5 / 66:.6g} .. {math.pi / 5 / 66:.6g}" in row
+
+
+def test_call_that_may_not_run_once_a_scan_is_noted(automax):
+    text = """\
+10 LOCAL A%, B%, N%, X@
+20 CALL SCAN_LOOP(TICKS=4)
+30 CALL LAG(INPUT=A%, WLG=5.0, OUTPUT=B%)
+40 IF X@ THEN
+50 CALL LAG(INPUT=A%, WLG=5.0, OUTPUT=B%)
+60 CALL PID(INPUT=A%, FEEDBACK=B%, KP=1.0, KI=1.0, LOOP_TIME=0.11, OUTPUT=A%)
+70 END_IF
+80 FOR N% = 1 TO 3
+90 CALL LAG(INPUT=A%, WLG=5.0, OUTPUT=B%)
+100 NEXT N%
+110 IF X@ THEN GOSUB 200
+120 ON N% GOSUB 230
+130 CALL LAG(INPUT=A%, WLG=5.0, OUTPUT=B%)
+140 GOTO 300
+200 A% = 5
+210 CALL LAG(INPUT=A%, WLG=5.0, OUTPUT=B%)
+220 RETURN
+230 CALL LAG(INPUT=A%, WLG=5.0, OUTPUT=B%)
+240 RETURN
+300 CALL LAG(INPUT=A%, WLG=5.0, OUTPUT=B%)
+310 END
+"""
+    found = {item["line"]: item["inside"] for item in records(automax, text)["blocks"]}
+    assert found == {
+        "30": None, "50": "IF", "60": "IF", "90": "FOR", "130": None, "210": "subroutine", "230": "subroutine",
+        "300": None,
+    }  # fmt: skip
+    notes = [line.strip() for line in automax("tune-info", "T.BLK").out.splitlines() if "inside" in line]
+    assert notes == [
+        "inside      ! an IF: all holds only where the CALL runs once in every scan",
+        "inside      ! an IF: all holds only where the CALL runs once every LOOP_TIME",
+        "inside      ! a FOR: all holds only where the CALL runs once in every scan",
+        "inside      ! a subroutine: all holds only where the CALL runs once in every scan",
+        "inside      ! a subroutine: all holds only where the CALL runs once in every scan",
+    ]
 
 
 def test_file_is_needed(automax):
@@ -259,6 +349,16 @@ def test_the_constant_runs_as_asked(automax):
     assert outputs[-1] - outputs[0] == 1200
 
 
+def test_fastest_ki_of_all_is_given(automax):
+    """0.9 pi / 0.5 ms = 5654.87."""
+    assert automax("tune-info", "--ki", "5701", "1").code == 0
+
+
+def test_ki_downwards_ends_at_the_low_end(automax):
+    result = automax("tune-info", "--ki", "-1200", "-2000", "--ticks", "4")
+    assert "a scan        -26.4 counts; from 0 to -8191 takes 6.826 s\n" in result.out
+
+
 @pytest.mark.parametrize(
     ("y", "x", "shown"), [("0.0000001", "1", "9.917618E-08"), ("1000", "1", "991.7618"), ("1.008306663", "1", "1.0")]
 )
@@ -279,7 +379,16 @@ def test_ki_that_comes_close(automax):
         (("nan", "10"), "--ki nan 10: Y and X must be numbers"),
         (("10", "inf"), "--ki 10 inf: Y and X must be numbers"),
         (("1200", "-10"), "--ki: KI = -119.0114, but KI must be above 0: OUTPUT moves in the direction of INPUT"),
-        (("0", "10"), "--ki: KI = 0, but KI must be above 0: OUTPUT would not move"),
+        (("0", "10"), "--ki: Y is 0, and OUTPUT would not move\n"),
+        (
+            ("100000", "1"),
+            (
+                "--ki: KI = 99176.18 is above its high limit 5654.87 (0.9 pi / T) at any scan time\n"
+                "  hint: with INPUT = 1 it can be"
+            ),
+        ),
+        (("5702", "1"), "--ki: KI = 5655.026 is above its high limit 5654.87 (0.9 pi / T) at any scan time\n"),
+        (("0.0000001", "32767"), "--ki: KI = 3.026709e-12 is below its low limit 2.3092e-08 (C x 2**-18) at any"),
         (("1200", "40000"), "--ki: X = 40000 is no INPUT: that is a whole number from -32768 to 32767"),
         (("1200", "0.5"), "--ki: X = 0.5 is no INPUT"),
         (("1e12", "10"), "--ki: Y = 1e+12 counts/s is more than any scan time allows"),

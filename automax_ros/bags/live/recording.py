@@ -157,12 +157,17 @@ class LiveRecording:
         """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
         self._writer.sync()
 
-    def close(self) -> None:
-        """Finish the bag.
+    def sync_at_end(self) -> None:
+        """Wait until the disk itself has the closed bag; a disk that refuses is a ``failure``."""
+        self.sync()
+        if self.failure is None:
+            try:
+                self._writer.require_synced()
+            except RecordingError as error:
+                self.failure = error
 
-        Raises:
-            RecordingError: the disk refuses.
-        """
+    def close(self) -> None:
+        """Finish the bag; a disk that refuses is a ``failure``."""
         if self.failure is None and self.ended is None:
             try:
                 self._settle(at_end=True)
@@ -173,7 +178,10 @@ class LiveRecording:
             gaps = [f"{self.seconds(gap.stamp):.6f} s: {gap}" for gap in self.gaps]
             data = provenance(self._facts.rack, self._files, self.lacks, replayable_s, gaps, self.ended)
             self._writer.custom_data.update(data)
-            self._writer.close()
+            try:
+                self._writer.close()
+            except RecordingError as error:
+                self.failure = error
 
     def _take_table(self, topic: str, sent_ns: int, payload: bytes) -> None:  # noqa: ARG002
         self._check_run(_decoded(payload).run_id)

@@ -7,13 +7,11 @@ from typing import Any
 
 from mcap.records import Attachment, Metadata
 
-from automax_ros.bags.errors import BagError
 from automax_ros.bags.rack_files import RACK_FILE, RackFile, fingerprint
-from automax_ros.bags.reader import load_yaml
+from automax_ros.bags.reader import custom_data_of, told_information
 
 _MAX_FILES = 200
 _MAX_BYTES = 16 << 20
-_MAX_TEXT = 4 << 20
 
 
 class Provenance:
@@ -27,9 +25,9 @@ class Provenance:
     def take(self, record: Attachment | Metadata) -> None:
         """Look at an attachment or metadata record of a data file."""
         if isinstance(record, Metadata):
-            text = record.metadata.get("serialized_metadata", "") if record.name == "rosbag2" else ""
-            if text and not self._told and len(text) <= _MAX_TEXT:
-                self._take_text(text)
+            information = None if self._told else told_information(record)
+            if information is not None:
+                self.take_information(information)
         elif record.name not in self._files and (record.name == RACK_FILE or record.name.endswith(".BLK")):
             self._bytes += len(record.data)
             if self._bytes <= _MAX_BYTES and len(self._files) < _MAX_FILES:
@@ -37,20 +35,10 @@ class Provenance:
 
     def take_information(self, information: Mapping[str, Any]) -> None:
         """Look at a readable metadata.yaml, or its copy in a data file."""
-        custom = information.get("custom_data")
-        if isinstance(custom, dict):
-            self._told = {str(key): str(value) for key, value in custom.items()}
+        self._told = custom_data_of(information) or self._told
 
     def custom_data(self, rack: str) -> dict[str, str]:
         """Return what was told, or what can be found out of the files and the rack's name."""
         if self._told or not rack:
             return dict(self._told)
         return {"rack": rack, "fingerprint": f"{fingerprint(list(self._files.values())):016x}"}
-
-    def _take_text(self, text: str) -> None:
-        try:
-            information = load_yaml("rosbag2", text.encode("utf-8", "replace"))
-        except BagError:
-            return
-        if isinstance(information, dict):
-            self.take_information(information)

@@ -17,7 +17,7 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError, RecordingError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, yaml_text
-from automax_ros.bags.reader import BagReader, read_information
+from automax_ros.bags.reader import NO_BAG_HINT, BagReader, no_recording, read_information
 from automax_ros.bags.repair.contents import FileContents, topics_of
 from automax_ros.bags.repair.provenance import Provenance
 from automax_ros.bags.repair.rewriting import Definitions, Rewriting
@@ -84,13 +84,16 @@ class RepairReport:
 def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float], None] | None = None) -> RepairReport:
     """Check a recording, a folder or one .mcap file, and write a repaired one unless it is sound.
 
-    ``output`` is the folder to write, ``<BAG>_repaired`` by default; with one, a sound recording is copied.
+    ``output`` is the folder to write, ``<BAG>_repaired`` by default; with one, a sound recording is copied. The default
+    for one file of a recording's folder lies beside that folder.
 
     Raises:
         BagError: there is no recording, or nothing in it can be used.
-        RecordingError: the output exists already or cannot be written.
+        RecordingError: the output exists already, lies inside the recording's folder, or cannot be written.
     """
     tell = on_progress or _tell_nobody
+    target = output if output is not None else _default_output(bag)
+    _require_outside(bag, target)
     report = RepairReport(bag)
     paths = _data_files(bag, report)
     provenance = Provenance()
@@ -100,7 +103,6 @@ def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float],
     _check_metadata(bag, report, provenance)
     if report.sound and output is None:
         return report
-    target = output if output is not None else _default_output(bag)
     was_sound = report.sound
     _write(target, paths, report, provenance, tell)
     if not was_sound:
@@ -114,8 +116,33 @@ def _tell_nobody(share: float) -> None:
 
 
 def _default_output(bag: Path) -> Path:
-    named = bag if bag.name not in {"", ".."} else bag.resolve()
-    return named.with_name(f"{named.name if bag.is_dir() else named.stem}_repaired")
+    if bag.is_dir():
+        return _beside(bag, "")
+    if _is_in_recording(bag):
+        return _beside(bag.parent, f"_{bag.stem}")
+    return bag.with_name(f"{bag.stem}_repaired")
+
+
+def _beside(folder: Path, what: str) -> Path:
+    named = folder if folder.name not in {"", ".."} else folder.resolve()
+    return named.with_name(f"{named.name}{what}_repaired")
+
+
+def _is_in_recording(file: Path) -> bool:
+    """Whether a data file lies in the folder of a recording."""
+    return (file.parent / METADATA_FILE).exists()
+
+
+def _require_outside(bag: Path, target: Path) -> None:
+    """Refuse to write into the folder of the recording."""
+    folder = bag if bag.is_dir() else bag.parent if _is_in_recording(bag) else None
+    if folder is not None and folder.resolve() in target.resolve().parents:
+        raise RecordingError(
+            "AMX6824",
+            target,
+            f"lies inside {folder}, the recording itself, which is never changed",
+            "name a folder beside it with --output",
+        )
 
 
 def _data_files(bag: Path, report: RepairReport) -> list[Path]:
@@ -123,10 +150,10 @@ def _data_files(bag: Path, report: RepairReport) -> list[Path]:
     if bag.is_file():
         return [bag]
     if not bag.is_dir():
-        raise BagError("AMX6810", bag, "does not exist", "give the folder of a recording, or one .mcap file")
+        raise no_recording(bag)
     found = sorted((path for path in bag.iterdir() if path.suffix == ".mcap" and path.is_file()), key=_place)
     if not found:
-        raise BagError("AMX6810", bag, "holds no .mcap file", "give the folder of a recording, or one .mcap file")
+        raise BagError("AMX6810", bag, "holds no .mcap file", NO_BAG_HINT)
     if len(found) > MAX_FILES:
         raise BagError("AMX6814", bag, f"holds {len(found)} data files, at most {MAX_FILES} are read")
     try:
@@ -193,8 +220,11 @@ def _check_metadata(bag: Path, report: RepairReport, provenance: Provenance) -> 
         return
     provenance.take_information(information)
     listed = information.get("relative_file_paths")
-    if listed != [file.name for file in report.files]:
+    assert isinstance(listed, list)  # the reader has looked at it
+    if sorted(listed) != sorted(file.name for file in report.files):
         report.problems.append(f"{METADATA_FILE} names other data files than there are")
+    elif listed != [file.name for file in _in_time(report.files)] and all(file.sound for file in report.files):
+        report.problems.append(f"{METADATA_FILE} does not list the data files in the order of their times")
     elif all(file.sound for file in report.files):
         count = sum(file.contents.messages for file in report.files)
         if information.get("message_count") != str(count):
@@ -203,9 +233,17 @@ def _check_metadata(bag: Path, report: RepairReport, provenance: Provenance) -> 
             )
 
 
+def _in_time(files: list[FileReport]) -> list[FileReport]:
+    """Return the files in the order of their first log times; one without messages stays behind the one before it."""
+    times: list[int] = []
+    for file in files:
+        times.append(file.contents.first_log if file.contents.messages else times[-1] if times else 0)
+    return [file for _, file in sorted(zip(times, files, strict=True), key=lambda item: item[0])]
+
+
 def _check_gaps(report: RepairReport) -> None:
     """Tell of times between two files from which there is nothing."""
-    filled = [file.contents for file in report.files if file.contents.messages]
+    filled = [file.contents for file in _in_time(report.files) if file.contents.messages]
     for before, after in pairwise(filled):
         gap = after.first_log - before.last_log
         if gap > _GAP_NS:
@@ -231,7 +269,7 @@ def _write(
             else:
                 _save(path, target / path.name, file, provenance)
             tell(0.5 + (number + 1) / len(paths) / 2)
-        kept = [file for file in report.files if file.usable]
+        kept = _in_time([file for file in report.files if file.usable])
         if not kept:
             raise _nothing(report)
         if report.sound and report.bag.is_dir():

@@ -61,8 +61,8 @@ class _Run:
     def __init__(self, scan: int, time_s: float, difference: float, floor: float) -> None:
         self._floor = floor
         self._scan, self._time_s = scan, time_s
-        self._low = self._high = difference
-        self._scans = 1
+        self._low = self._high = self._begin = self._latest = difference
+        self._scans = self._same = 1
         self._zero_scan, self._zero_time_s, self._zeros = scan, time_s, 0
 
     def add(self, scan: int, time_s: float, difference: float) -> None:
@@ -77,16 +77,20 @@ class _Run:
         low, high = min(self._low, difference), max(self._high, difference)
         if was_equal or high - low > max(self._floor, BAND_SHARE * max(abs(low), abs(high))):
             self._scan, self._time_s, self._scans = scan, time_s, 1
-            self._low = self._high = difference
+            self._low = self._high = self._begin = difference
         else:
             self._low, self._high = low, high
             self._scans += 1
+        self._same = self._same + 1 if difference == self._latest else 1
+        self._latest = difference
 
     def settled(self) -> Settled | None:
         """Return the stretch, None where it is too short to be called settled."""
         if self._zeros >= SETTLED_SCANS:
             return Settled(self._zero_scan, self._zero_time_s, 0, 0)
-        if self._scans < SETTLED_SCANS:
+        moves = self._high - self._low > self._floor and self._same < SETTLED_SCANS
+        drifts = moves and {self._begin, self._latest} == {self._low, self._high}
+        if self._scans < SETTLED_SCANS or drifts:
             return None
         return Settled(self._scan, self._time_s, self._low, self._high)
 

@@ -21,6 +21,7 @@ from automax_ros.bags.replay.inputs import RecordedCommons
 from automax_ros.bags.replay.rack import ReplaySource, StoredRack, stored_rack
 from automax_ros.bags.replay.report import ReplayReport
 from automax_ros.bags.replay.task import TaskReplay
+from automax_ros.bags.span import require_scans
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 
 DEFAULT_MAX_DIFFERENCES = 50
@@ -100,15 +101,21 @@ class Replay:
             BagError: the recording cannot be read to its end, or does not hold what the replay needs.
         """
         reader = BagReader(self._bag)
-        starts: Mapping[str, int] = {}
-        if self.options.from_ns:
-            starts = _last_states(reader, self.options.from_ns)
-        reader.on_progress = on_progress
         options = self.options if to_ns is None else replace(self.options, to_ns=to_ns)
+        starts: Mapping[str, int] = {}
+        if options.from_ns:
+            starts = _last_states(reader, options.from_ns)
+        reader.on_progress = on_progress
         run = _Run(self._bag, self.rack, self.sources, options, starts, watcher)
-        for entry in reader.messages(types=_TYPES):
-            if not run.take(entry):
-                break
+        run.take_all(reader)
+        doubtful = run.ends_in_doubt()
+        if doubtful:
+            sources = self.rack.replay_sources([task.name for task in doubtful], {})
+            recorded = _Run(self._bag, self.rack, sources, options, starts, None)
+            reader.on_progress = None
+            recorded.take_all(reader)
+            for task in doubtful:
+                task.compare_end(recorded.stopped_in(task.name))
         return run.report(reader)
 
 
@@ -137,6 +144,20 @@ class _Run:
         self._end: int | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
+
+    def take_all(self, reader: BagReader) -> None:
+        """Take the messages of a recording, up to the end of the range."""
+        for entry in reader.messages(types=_TYPES):
+            if not self.take(entry):
+                return
+
+    def ends_in_doubt(self) -> list[TaskReplay]:
+        """Return the edited tasks that may end where the recorded ones do not, or the other way round."""
+        return [task for task in self._tasks.values() if task.end_in_doubt]
+
+    def stopped_in(self, name: str) -> int | None:
+        """Return the last recorded scan of a task, if it stopped in it by itself."""
+        return self._tasks[name].stopped_in
 
     def take(self, entry: BagMessage) -> bool:
         """Take one message; return whether there may be more of interest."""
@@ -189,11 +210,23 @@ class _Run:
             differences=self._tallies.differences(),
             more=self._tallies.more,
         )
+        if not report.scans and report.identical and (self._options.from_ns or self._options.to_ns is not None):
+            require_scans(self._bag, tuple(self._tasks), self._options.from_ns, self._options.to_ns)
+        self._require_compared(report)
         if not report.scans and report.identical:
             notes = "; ".join(f"{task.name}: {note}" for task in tasks for note in task.notes)
             what = f"no scan of {', '.join(task.name for task in tasks)[:80]} can be executed again"
             raise BagError("AMX6832", self._bag, f"{what}{f' ({notes})' if notes else ''}", "see `automax bag info`")
         return report
+
+    def _require_compared(self, report: ReplayReport) -> None:
+        """Refuse to call a task that was asked for the same when none of its scans was executed."""
+        asked = {*(self._options.only or ()), *(source.name for source in self._sources if source.edited)}
+        for task in report.tasks:
+            if task.name in asked and not task.scans and not task.different:
+                notes = f" ({'; '.join(task.notes)})" if task.notes else ""
+                what = f"no scan of task {task.name} was executed again{notes}"
+                raise BagError("AMX6832", self._bag, what, "see `automax bag info`, or choose another range")
 
     def _take_table(self, table: VariableTable) -> None:
         if self._table is not None:
@@ -247,7 +280,7 @@ class _Run:
 
 
 def _last_states(reader: BagReader, from_ns: int) -> dict[str, int]:
-    """Return the log time of each task's last state that is not later than ``from_ns`` since the start of the run."""
+    """Return the log time of each task's last state that is earlier than ``from_ns`` since the start of the run."""
     found: dict[str, int] = {}
     latest: int | None = None
     for entry in reader.messages(types=_STATES):
@@ -255,7 +288,7 @@ def _last_states(reader: BagReader, from_ns: int) -> dict[str, int]:
         if isinstance(message, VariableTable):
             latest = message.stamp + from_ns if latest is None else latest
         elif isinstance(message, TaskState) and latest is not None:
-            if message.stamp > latest:
+            if message.stamp >= latest:  # a state of that very instant may contain the scan of the instant
                 break
             found[message.task] = entry.log_time
     return found

@@ -146,15 +146,17 @@ class RecordedCommons:
 class ScanMemory(CommonMemory):
     """Common memory as one task's recorded scans saw it; what the task does to it is kept apart.
 
-    As long as a scan reads and writes just what the recorded one did, its reads are the recorded ones. Otherwise it
-    reads what it wrote itself, in this scan or an earlier one, as long as nobody else has written there since; and the
-    memory of the recording else.
+    A scan reads what it wrote itself, in this scan or an earlier one as long as nobody else has written there since. As
+    long as it reads and writes in the recorded order, its other reads are the recorded ones; but where the recorded
+    scan wrote the variable itself, an edited one, which may not have done so, reads the memory of the recording.
 
     ``apart`` are the values that the task's own writes left different from the recorded ones.
     """
 
-    def __init__(self, commons: RecordedCommons) -> None:
+    def __init__(self, commons: RecordedCommons, *, edited: bool = False) -> None:
+        """Take the memory of the recording; ``edited``: another source runs than the recorded one."""
         super().__init__([])
+        self._edited = edited
         self.apart: dict[Key, Value] = {}
         self._commons = commons
         self._index = {variable.name: view for view, variable in enumerate(commons.variables)}
@@ -166,6 +168,7 @@ class ScanMemory(CommonMemory):
         self._reads: list[Entry] = []
         self._read_count = 0
         self._writes: list[Entry] = []
+        self._rewritten: frozenset[Key] = frozenset()
         self._write_count = 0
         self._committed: list[Entry] = []
         self._own: dict[Key, Value] = {}
@@ -208,6 +211,7 @@ class ScanMemory(CommonMemory):
         self._reads = commons.entries(scan.read, scan.stamp)
         self._writes = commons.entries(scan.written, scan.stamp)
         self._committed = commons.entries(scan.committed, scan.stamp)
+        self._rewritten = frozenset(entry[:2] for entry in self._writes) if self._edited else frozenset()
         self._read_count = self._write_count = 0
         self._in_step = True
         self._own.clear()
@@ -229,17 +233,17 @@ class ScanMemory(CommonMemory):
     def read_now(self, view: int, element: int = 0) -> Value:
         """Return what the scan sees now."""
         key = (view, element)
+        number = self._read_count
         if self._in_step:
-            number = self._read_count
-            if number < len(self._reads) and self._reads[number][:2] == key:
-                self._read_count = number + 1
-                if key not in self.apart:
-                    return self._reads[number][2]
-            else:
-                self._in_step = False
+            self._read_count = number + 1
+            self._in_step = number < len(self._reads) and self._reads[number][:2] == key
         if key in self._own:
             return self._own[key]
-        return self.apart[key] if key in self.apart else self._commons.value(key)
+        if key in self.apart:
+            return self.apart[key]
+        if self._in_step and key not in self._rewritten:
+            return self._reads[number][2]
+        return self._commons.value(key)
 
     def write_now(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,8 @@ from automax_ros.bags.replay.inputs import Key, UnknownValue
 from automax_ros.bags.replay.report import Difference, Kind, ReplayReport
 from automax_ros.bags.replay.task import TaskReplay
 from automax_ros.bags.variables import flat_index
+from automax_ros.bags.whole_file import written_whole
+from automax_ros.core.diagnostics import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import CommonVariable
@@ -97,14 +100,23 @@ def draw(found: Sequence[Trace], report: ReplayReport, path: Path) -> None:
     lanes[0][0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=2, frameon=False)
     first = found[0].difference
     figure.suptitle(
-        f"{Path(report.bag).name}: first difference of {first.task}, scan {first.first.scan} "
+        f"{_plain(Path(report.bag).name)}: first difference of {first.task}, scan {first.first.scan} "
         f"at {first.first.time_s:.6g} s (open loop)",
         fontsize=10,
     )
     try:
-        figure.savefig(path, dpi=150)
-    except (OSError, ValueError) as error:  # ValueError: a suffix that names no format of pictures
-        raise BagError("AMX6834", path, f"cannot be written: {error}") from error
+        with warnings.catch_warnings(), written_whole(path) as place:
+            warnings.simplefilter("ignore")  # characters that the font lacks
+            figure.savefig(place, dpi=150)
+    except OSError as error:
+        raise BagError("AMX6834", path, f"cannot be written: {error.strerror or error}") from error
+    except ValueError as error:
+        raise BagError("AMX6834", path, "names no format of pictures", "end it with .png, .svg or .pdf") from error
+
+
+def _plain(text: str) -> str:
+    """A text that is drawn as it stands: no formulas, nothing unprintable."""
+    return printable(text).replace("$", r"\$")
 
 
 def _drawable(report: ReplayReport) -> list[Difference]:
@@ -141,7 +153,7 @@ def _draw_lane(axis: Any, trace: Trace) -> None:
         numbers = [float(value) for value in values]
         axis.step(trace.time_s, numbers, color=colour, linewidth=width, label=label, where="post")
     axis.axvline(difference.first.time_s, color="grey", linewidth=0.8, linestyle="--")
-    unit = f", {variable.unit}" if variable.unit else ""
+    unit = f", {_plain(variable.unit)}" if variable.unit else ""
     axis.set_title(f"{difference.task}: {difference.name}, from scan {difference.first.scan}", fontsize=9, loc="left")
     if variable.type is DataType.BOOLEAN:
         axis.set_yticks((0, 1), ("FALSE", "TRUE"))

@@ -193,7 +193,9 @@ def _lines(report: ReplayReport) -> Iterator[str]:
             yield f"{task.name}: {printable(note)}"
     yield ""
     if report.first is None:
-        yield f"{report.scans} scans executed again, no difference."
+        left = [task.name for task in report.tasks if not task.scans]
+        but = f" Not compared: {', '.join(left)}." if left else ""
+        yield f"{report.scans} scans executed again, no difference.{but}"
         return
     yield from _first_lines(report.first)
     yield ""
@@ -204,7 +206,7 @@ def _lines(report: ReplayReport) -> Iterator[str]:
 
 def _task_row(task: TaskReport) -> tuple[str, ...]:
     if task.different:
-        result = f"{task.different} scans differ"
+        result = f"{task.different} scans differ" if task.different > 1 else "1 scan differs"
     elif not task.scans:
         result = "nothing compared"
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from pathlib import Path
 from typing import cast
@@ -27,6 +28,8 @@ _MOST_NOTES = 20
 """Notes that a report has about one task."""
 _MOST_NAMES = 8
 _STOPPED_KEY = "status"
+_QUIET_SCANS = 2
+"""A task that has not scanned for more periods than this does not run any more."""
 
 
 class TaskReplay:
@@ -47,7 +50,7 @@ class TaskReplay:
         starts_at: int | None = None,
     ) -> None:
         self.name = source.name
-        self.memory = ScanMemory(commons)
+        self.memory = ScanMemory(commons, edited=source.edited)
         self._bag, self._source, self._commons, self._tallies = bag, source, commons, tallies
         self._tolerance = tolerance
         self._starts_at = starts_at
@@ -58,7 +61,11 @@ class TaskReplay:
         recorded = Task(source.recorded, ScanMemory(commons)) if source.recorded else None
         self._recorded_layout = recorded.layout if recorded else None
         self._written_at = source.written_at
+        program = (source.recorded or source.compiled).program
+        self._period_ns: float = math.inf if program.event is not None else program.period_ns
         self._last: int | None = None
+        self._last_stamp = 0
+        self._recorded_ended = False
         self._synchronous = False
         self._stopped_in: int | None = None
         self._record: ScanRecord | None = None
@@ -80,6 +87,38 @@ class TaskReplay:
         return TaskReport(
             self.name, source, self._source.edited, self._compared, self._different, self._states, tuple(notes)
         )
+
+    @property
+    def edited(self) -> bool:
+        """Whether another source runs than the recorded one."""
+        return self._source.edited
+
+    @property
+    def stopped_in(self) -> int | None:
+        """The last recorded scan, if the task stopped in it by itself."""
+        return self._stopped_in
+
+    @property
+    def end_in_doubt(self) -> bool:
+        """Whether only one of the recorded task and an edited one seems to have ended behind the last scan.
+
+        The recording does not tell why a task scans no more; its own source, executed again, does.
+        """
+        if not self._source.edited or self._source.recorded is None or not self._synchronous:
+            return False
+        return self._stopped_in is not None or (self._recorded_ended and self._task.status is Status.RUNNING)
+
+    def compare_end(self, recorded_in: int | None) -> None:
+        """Compare the task's end with the recorded source's: the scan in which that stops by itself, None if never."""
+        own_in = self._stopped_in
+        if own_in == recorded_in or self._last is None:
+            return
+        recorded = "runs" if recorded_in is None else "ended by itself"
+        replayed = "runs" if own_in is None else self._end_text()
+        found = [Found(Kind.STATUS, _STOPPED_KEY, recorded, replayed)]
+        scan = (own_in if recorded_in is None else recorded_in) or self._last
+        self._different += self._tallies.scan(self.name, scan, self._last_stamp, found, self._label, self._seen)
+        self._stopped_in = None
 
     def time_s(self, stamp: int) -> float:
         """Return the time of a stamp since the start of the run."""
@@ -132,6 +171,8 @@ class TaskReplay:
         last = self._last
         if last is not None and state.scan < last:
             return
+        if state.scan == last and state.stamp - self._last_stamp > _QUIET_SCANS * self._period_ns:
+            self._recorded_ended = True
         if self._synchronous and last is not None and state.scan > last:
             self._note(f"scans {last + 1} to {state.scan} are missing before {self._when(state.stamp)} s")
             self._synchronous = False
@@ -160,7 +201,8 @@ class TaskReplay:
             self._synchronous = False
             self.memory.forget_latch()
             self.memory.apart.clear()
-        self._last = scan.scan
+        self._last, self._last_stamp = scan.scan, scan.stamp
+        self._recorded_ended = False
         self.memory.follow(scan)
 
     def _execute(self, scan: Scan) -> ScanRecord | None:
@@ -231,13 +273,16 @@ class TaskReplay:
         """The recorded task goes on where the replayed one has stopped."""
         if self._stopped_in is None:
             return
-        log = self._task.errors
-        fault = log.last.describe() if self._task.status is Status.FAULTED and log.last else None
-        reason = f"faulted: {fault}" if fault else "ended by STOP"
+        reason = self._end_text()
         self._note(f"stopped in scan {self._stopped_in}, {reason}; the scans behind it are not compared")
         self._stopped_in = None
         found = [Found(Kind.STATUS, _STOPPED_KEY, "runs", reason)]
         self._different += self._tallies.scan(self.name, scan.scan, scan.stamp, found, self._label, self._seen)
+
+    def _end_text(self) -> str:
+        log = self._task.errors
+        fault = log.last.describe() if self._task.status is Status.FAULTED and log.last else None
+        return f"faulted: {fault}" if fault else "ended by STOP"
 
     def _adopt(self, state: TaskState) -> None:
         """Go on from a recorded state."""

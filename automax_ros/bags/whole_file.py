@@ -1,0 +1,69 @@
+"""Files that are there whole or not at all: written under another name beside their place, renamed at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_MOST_TRIES = 100
+_LONGEST_SUFFIX = 16
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """Give the path to write to, in the same folder and with the same suffix; ``path`` is replaced when the block ends.
+
+    If the block ends with an exception the new file is removed, and ``path`` stays as it was. What is no regular file,
+    such as a pipe or /dev/stdout, is given itself.
+
+    Raises:
+        OSError: the folder or the file there cannot be written.
+    """
+    if _is_direct(path):
+        yield path
+        return
+    target = Path(os.path.realpath(path))  # a link stays a link
+    mode = _mode_of(target)
+    beside = _new_file_beside(target, path.suffix)
+    try:
+        if mode is not None:
+            beside.chmod(mode)
+        yield beside
+        os.replace(beside, target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+        raise
+
+
+def _is_direct(path: Path) -> bool:
+    """Whether a path has to be written itself; /dev/stdout has to be even where it is redirected to a file."""
+    folder = os.path.realpath(path.parent)
+    return folder == "/dev" or folder.startswith("/proc/") or (path.exists() and not path.is_file())
+
+
+def _mode_of(target: Path) -> int | None:
+    """Return the permissions of the file that is replaced; one that must not be written is refused."""
+    try:
+        mode = stat.S_IMODE(target.stat().st_mode)
+    except FileNotFoundError:
+        return None
+    if not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
+    return mode
+
+
+def _new_file_beside(target: Path, suffix: str) -> Path:
+    if len(suffix) > _LONGEST_SUFFIX:
+        suffix = ""
+    for number in range(_MOST_TRIES):
+        beside = target.with_name(f".automax-{os.getpid()}-{number}{suffix}")
+        with contextlib.suppress(FileExistsError):
+            os.close(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+            return beside
+    raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target))
