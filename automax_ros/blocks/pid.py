@@ -220,7 +220,7 @@ PID = Block(
     notes=(
         "LOOP_TIME is TICKS x tick rate where the block runs in every scan.",
         "INTEGRATOR keeps fractions of a count, so that small errors add up.",
-        "MANUAL clears the histories: automatic begins at INITIAL_VALUE plus the terms of ERROR, smoothly where that is 0.",
+        "MANUAL clears the histories: automatic begins at INITIAL_VALUE plus the terms of ERROR, smoothly at 0.",
         "With DERIVATIVE = TRUE the D term then begins as if FEEDBACK had been 0 before.",
         "A limit wins over MAX_CHANGE, LIMIT_PLUS over LIMIT_MINUS; SATURATED compares OUTPUT as shown.",
     ),
