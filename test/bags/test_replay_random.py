@@ -81,7 +81,7 @@ def test_a_remark_changes_nothing(text, history):
 @pytest.mark.soak
 @pytest.mark.timeout(1200)
 @given(tasks(4), HISTORY)
-@repeatable(800)
+@repeatable(500)
 def test_random_tasks_replay_identically_long(text, history):
     replays_identically(text, history)
 
@@ -89,6 +89,6 @@ def test_random_tasks_replay_identically_long(text, history):
 @pytest.mark.soak
 @pytest.mark.timeout(1200)
 @given(tasks(4), HISTORY)
-@repeatable(800)
+@repeatable(250)
 def test_a_remark_changes_nothing_long(text, history):
     remark_changes_nothing(text, history)
