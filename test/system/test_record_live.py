@@ -173,7 +173,7 @@ def running(module_domain_id) -> Iterator[Automax]:
 
 
 def test_racks_that_are_there_are_named(running, tmp_path):
-    ended = automax("record", "TIPES", "--output", tmp_path / "bag", "--wait", "3")
+    ended = automax("record", "TIPES", "--output", tmp_path / "bag", "--wait", "15")
     assert ended.code == 2
     assert "no rack /tipes in ROS domain" in ended.err
     assert "did you mean /types?" in ended.err
