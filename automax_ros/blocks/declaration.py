@@ -90,11 +90,6 @@ class Special(enum.Enum):
     WORDS = "INTEGER data structure"
 
     @property
-    def is_structure(self) -> bool:
-        """The name of a data structure (sections 23, 24, 30, 31, 39 and 40)."""
-        return self in (Special.BITS, Special.WORDS)
-
-    @property
     def element(self) -> DataType | None:
         """The type that the name's type character tells, None for an event."""
         return {Special.TABLE: DataType.INTEGER, Special.WORDS: DataType.INTEGER, Special.BITS: DataType.BOOLEAN}.get(
