@@ -8,13 +8,13 @@ from collections.abc import Callable
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Processor
+from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.core.types import DataType
-from automax_ros.language.checker import check
-from automax_ros.language.tree import Scope
-from automax_ros.runtime.compiler import compile_program
-from automax_ros.runtime.memory import CommonMemory, ViewSpec
-from automax_ros.runtime.task import Task
+from automax_ros.language.checks.checker import check
+from automax_ros.language.syntax.tree import Scope
+from automax_ros.running.memory import CommonMemory, ViewSpec
+from automax_ros.running.task import Task
 
 REPEATS = 60
 """Short runs of which the fastest counts, so that other work on the machine disturbs little."""

@@ -8,9 +8,14 @@ import timeit
 from collections.abc import Callable
 from pathlib import Path
 
-from automax_ros.bags.cdr import Message, decoder, encoder
 from automax_ros.bags.export import export_csv
-from automax_ros.bags.messages import (
+from automax_ros.bags.reader import BagReader
+from automax_ros.bags.recorder import Recorder, RecordingOptions
+from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.wire.cdr import Message, decoder, encoder
+from automax_ros.wire.messages import (
     NAMES,
     Bool,
     CommonWrite,
@@ -22,13 +27,8 @@ from automax_ros.bags.messages import (
     VariableTable,
     VariableType,
 )
-from automax_ros.bags.qos import LATCHED, SCAN
-from automax_ros.bags.rack_stream import RackStream
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
-from automax_ros.rack.loader import load
-from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.wire.qos import LATCHED, SCAN
+from automax_ros.wire.stream import RackStream
 
 RACK = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
 SECONDS = 60

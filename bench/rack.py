@@ -6,11 +6,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.recorder import Recorder
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.wire.stream import RackStream
 
 CONFIG = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
 SECONDS = 60

@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.recorder import Recorder
-from automax_ros.bags.replay.engine import Replay, ReplayOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.replay.engine import Replay, ReplayOptions
+from automax_ros.wire.stream import RackStream
 
 EXAMPLE = Path(__file__).parent.parent / "config" / "section_drive"
 SECONDS = 60

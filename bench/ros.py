@@ -54,7 +54,7 @@ def loop_jitter(period_ns: int) -> tuple[list[float], int]:
     from rclpy.node import Node
 
     from automax_ros.nodes.executor import make_executor
-    from automax_ros.runtime.scheduler import EventClass, EventKey, Scheduler
+    from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 
     context = Context()
     context.init(args=["--ros-args", "--disable-stdout-logs"])

@@ -23,7 +23,10 @@ PACKAGE = ROOT / "automax_ros"
 MESSAGES = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"))
 
 # Ground floor first: a room may import itself and those before it.
-ROOMS = ["core", "blocks", "logix", "language", "runtime", "drive", "rack", "bags", "nodes", "cli"]
+ROOMS = [
+    "core", "blocks", "logix", "language", "compile", "running", "tuning", "drive", "rack", "wire", "bags", "replay",
+    "nodes", "cli",
+]  # fmt: skip
 ROOMS_WITH_ROS = {"nodes", "cli"}
 ROS_PACKAGES = {
     "ament_index_python", "automax_msgs", "builtin_interfaces", "diagnostic_msgs", "rcl_interfaces", "rclpy",

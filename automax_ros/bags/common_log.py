@@ -6,9 +6,9 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.messages import CommonImage, CommonWrite, Values, Variable, VariableTable, VariableType
 from automax_ros.bags.variables import Watched, checked_table
 from automax_ros.core.decimal_text import seconds_text
+from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable, VariableType
 
 Cell = float | str
 """A value: booleans are 0 and 1."""

@@ -11,16 +11,16 @@ from pathlib import Path
 
 from mcap.records import Attachment
 
-from automax_ros.bags.cdr import CdrError, decoder
 from automax_ros.bags.common_log import CommonLog, variables_of
-from automax_ros.bags.definitions import message_types
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.heads import scan_head
 from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.messages import CommonImage, CommonWrite, Scan, ScanError, VariableTable
 from automax_ros.bags.reader import BagReader, size_of
 from automax_ros.bags.series import Progress
 from automax_ros.core.decimal_text import seconds_text
+from automax_ros.wire.cdr import CdrError, decoder
+from automax_ros.wire.definitions import message_types
+from automax_ros.wire.heads import scan_head
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, ScanError, VariableTable
 
 MOST_KEPT = 1000
 """Most attachments, tasks and kinds of errors that are listed (decision): a recording may lie about all of them."""

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.messages import TaskState, VariableType
 from automax_ros.bags.variables import Watched
+from automax_ros.wire.messages import TaskState, VariableType
 
 NOT_COMMON = -1
 """``Watched.variable`` of a column that is no common variable."""

@@ -9,14 +9,14 @@ from pathlib import Path
 
 from mcap.records import Channel, Schema
 
-from automax_ros.bags.cdr import CdrError, decode, encode
-from automax_ros.bags.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.messages import VariableTable
-from automax_ros.bags.qos import QosProfile
 from automax_ros.bags.reader import BagReader, FileOrder, size_of
 from automax_ros.bags.recorded_qos import recorded_qos
+from automax_ros.wire.cdr import CdrError, decode, encode
+from automax_ros.wire.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
+from automax_ros.wire.messages import VariableTable
+from automax_ros.wire.qos import QosProfile
 
 TABLE_TYPE = "automax_msgs/msg/VariableTable"
 MAX_LATCHED_BYTES = 256 << 20

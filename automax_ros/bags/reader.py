@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import yaml
 from mcap.records import Attachment, Channel, Metadata, Schema
 
-from automax_ros.bags.cdr import CdrError, Message, decoder
-from automax_ros.bags.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE
 from automax_ros.core.diagnostics import printable
+from automax_ros.wire.cdr import CdrError, Message, decoder
+from automax_ros.wire.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
 
 MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read (decision)."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from automax_ros.bags.qos import QosProfile
+from automax_ros.wire.qos import QosProfile
 
 MAX_QOS_BYTES = 1 << 16
 """Longest text that is read (decision)."""

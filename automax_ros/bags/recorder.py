@@ -7,10 +7,10 @@ from pathlib import Path
 
 import automax_ros
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.rack_stream import RackStream, Topic
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
 from automax_ros.rack.rack import Rack
-from automax_ros.runtime.scheduler import EventClass, EventKey
+from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.wire.stream import RackStream, Topic
 
 _FIRST = EventKey(EventClass.OUTSIDE, -1, "")
 """Before everything else of an instant: the rack stands as the instant before has left it."""

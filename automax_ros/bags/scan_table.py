@@ -9,10 +9,10 @@ from pathlib import Path
 from automax_ros.bags.columns import Column, column, count_column
 from automax_ros.bags.common_log import NO_COMMON_MEMORY_HINT, Cell, entries, strings_of, variables_of
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.messages import Scan, Values, Variable, VariableTable, VariableType
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.series import WHOLE_RUN, Progress, Window
 from automax_ros.core.decimal_text import seconds_text
+from automax_ros.wire.messages import Scan, Values, Variable, VariableTable, VariableType
 
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("Scan", "VariableTable"))
 _OWN = (

@@ -16,11 +16,11 @@ from automax_ros.bags.common_log import (
 )
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.locals import WatchedLocals, is_local
-from automax_ros.bags.messages import CommonImage, CommonWrite, Scan, TaskState, Variable, VariableTable
 from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.span import span_of
 from automax_ros.bags.variables import Watched, WatchError, watched_by_default, watched_by_name
 from automax_ros.core.decimal_text import seconds_text
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, Variable, VariableTable
 
 MAX_GRID_ROWS = 20_000_000
 """Most rows of a table on a grid (decision): a day at 5.5 ms has 15.7 million."""

@@ -6,13 +6,13 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.bags.cdr import CdrError, decode
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.heads import scan_head
 from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.messages import VariableTable
 from automax_ros.bags.reader import BagReader, size_of
 from automax_ros.core.decimal_text import seconds_text
+from automax_ros.wire.cdr import CdrError, decode
+from automax_ros.wire.heads import scan_head
+from automax_ros.wire.messages import VariableTable
 
 _TABLE, _SCAN = "automax_msgs/msg/VariableTable", "automax_msgs/msg/Scan"
 _PROGRESS_MASK = 0x3FF

@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.messages import Scan, VariableType
 from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
 from automax_ros.bags.variables import Watched
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.wire.messages import Scan, VariableType
 
 MAX_POINTS = 1 << 16
 """As many points of a line are kept as they are; a longer one is thinned to four points a column."""

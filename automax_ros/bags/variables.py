@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from automax_ros.bags.messages import Variable, VariableTable, VariableType
+from automax_ros.wire.messages import Variable, VariableTable, VariableType
 
 _NAME = re.compile(r"[A-Z_][A-Z0-9_]{0,63}[%!@$]?")
 _WATCH = re.compile(r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>\d{1,9}(?:,\d{1,9}){0,3})[)\]])?")

@@ -21,12 +21,12 @@ from mcap.records import Attachment, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
 
 import automax_ros
-from automax_ros.bags.definitions import message_types, schema_text
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.mcap_output import ChunkBuilder, McapOutput
 from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary, data_file_name, yaml_text
-from automax_ros.bags.qos import QosProfile
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.wire.definitions import message_types, schema_text
+from automax_ros.wire.qos import QosProfile
 
 CHUNK_BYTES = 1 << 20
 """A chunk ends before the next instant when it holds more bytes than this, uncompressed."""

@@ -16,10 +16,10 @@ from typing import Any
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.info import BagInfo, bag_info
 from automax_ros.bags.info_tasks import TaskFacts, task_facts
-from automax_ros.bags.messages import VariableType, WriterKind
 from automax_ros.cli.bag_info_text import lines_of
 from automax_ros.cli.progress import share_shown
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.wire.messages import VariableType, WriterKind
 
 _WALL_CLOCK_NS = 10**9 * NS_PER_S
 """Stamps of a run from here on are times of day (September 2001); simulated runs begin at 0."""

@@ -13,10 +13,10 @@ from automax_ros.cli.csv_table import cell_value
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.decimal_text import real_text
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.constant_values import range_text
+from automax_ros.language.checks.constant_values import range_text
 from automax_ros.language.program import BoundCall, Program, Symbol
-from automax_ros.language.statement_text import print_expression
-from automax_ros.language.tree import (
+from automax_ros.language.syntax.statement_text import print_expression
+from automax_ros.language.syntax.tree import (
     BooleanLiteral,
     Call,
     Expression,
@@ -29,9 +29,9 @@ from automax_ros.language.tree import (
     Statement,
     Unary,
 )
-from automax_ros.language.walk import bodies, statements_in_order
+from automax_ros.language.syntax.walk import bodies, statements_in_order
 from automax_ros.rack.findings import did_you_mean, quoted
-from automax_ros.runtime.memory import MemoryValueError, ViewSpec, fitting
+from automax_ros.running.memory import MemoryValueError, ViewSpec, fitting
 
 SIGNALS = ("INPUT", "FEEDBACK")
 """The inputs that carry the signal through a block."""

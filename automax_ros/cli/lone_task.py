@@ -7,14 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.types import Value
+from automax_ros.language.checks.suggestions import Suggester
 from automax_ros.language.program import Program, Symbol
-from automax_ros.language.suggestions import Suggester
-from automax_ros.language.tree import Scope
+from automax_ros.language.syntax.tree import Scope
 from automax_ros.rack.findings import quoted
-from automax_ros.runtime.compiler import CompiledTask, compile_program
-from automax_ros.runtime.memory import CommonMemory, ViewSpec, fitting
-from automax_ros.runtime.task import Task
+from automax_ros.running.memory import CommonMemory, ViewSpec, fitting
+from automax_ros.running.task import Task
 
 _NAME = re.compile(
     r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>[0-9]{1,6}(?:,[0-9]{1,6}){0,3})[)\]])?"

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from automax_ros.bags.messages import VariableType
 from automax_ros.bags.traces import ErrorMark, Line, Traces, thinned
 from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import printable
+from automax_ros.wire.messages import VariableType
 
 DPI = 120
 _LINE_STYLES = ("-", "--", ":", "-.")

@@ -16,11 +16,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from automax_ros.bags.cdr import CdrError
 from automax_ros.bags.errors import BagError, RecordingError
 from automax_ros.bags.live.recording import LiveRecording
-from automax_ros.bags.messages import VariableTable, WriterKind
-from automax_ros.bags.rack_files import RACK_FILE, RackFile, RackFilesError
 from automax_ros.bags.writer import StorageOptions
 from automax_ros.cli.record_options import split_period, storage_options
 from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
@@ -33,6 +30,9 @@ from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.rack.findings import did_you_mean, quoted
 from automax_ros.rack.ros_names import namespace
+from automax_ros.wire.cdr import CdrError
+from automax_ros.wire.messages import VariableTable, WriterKind
+from automax_ros.wire.rack_files import RACK_FILE, RackFile, RackFilesError
 
 if TYPE_CHECKING:
     from automax_ros.nodes.recorder import LiveRecorder

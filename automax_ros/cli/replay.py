@@ -14,10 +14,6 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
-from automax_ros.bags.replay.picture import can_be_drawn, draw, traces
-from automax_ros.bags.replay.rack import SourceRefused
-from automax_ros.bags.replay.report import ReplayReport
 from automax_ros.cli.output_files import require_different_files, require_picture_file
 from automax_ros.cli.progress import share_shown
 from automax_ros.cli.signals import ended_by_signals
@@ -27,6 +23,10 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.task_source import read_task_source
+from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
+from automax_ros.replay.picture import can_be_drawn, draw, traces
+from automax_ros.replay.report import ReplayReport
+from automax_ros.replay.stored_rack import SourceRefused
 
 _TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
 

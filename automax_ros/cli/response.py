@@ -15,7 +15,6 @@ import sys
 from pathlib import Path
 
 from automax_ros.blocks.declaration import Block
-from automax_ros.blocks.step_response import MOST_SCANS, default_scans
 from automax_ros.blocks.tuning import Tuning
 from automax_ros.cli.dynamic_calls import (
     SIGNALS,
@@ -34,6 +33,7 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.types import DataType, Value
 from automax_ros.language.program import Program
+from automax_ros.tuning.step_response import MOST_SCANS, default_scans
 
 _PICTURES = (".png", ".svg", ".pdf")
 _POINTS, _POINTS_DRAWN, _MOST_POINTS = 12, 30, 500

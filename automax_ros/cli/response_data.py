@@ -8,7 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.blocks.frequency import (
+from automax_ros.blocks.transfer import Transfer
+from automax_ros.blocks.tuning import Tuning
+from automax_ros.cli.dynamic_calls import DynamicCall
+from automax_ros.core.types import Value
+from automax_ros.tuning.frequency import (
     Measured,
     Sweep,
     first_phase,
@@ -16,11 +20,7 @@ from automax_ros.blocks.frequency import (
     nearest_phase,
     phases,
 )
-from automax_ros.blocks.step_response import StepResponse, laplace_step, respond
-from automax_ros.blocks.transfer import Transfer
-from automax_ros.blocks.tuning import Tuning
-from automax_ros.cli.dynamic_calls import DynamicCall
-from automax_ros.core.types import Value
+from automax_ros.tuning.step_response import StepResponse, laplace_step, respond
 
 _SAME = 1e-3
 """Frequencies nearer to each other than this share count as one."""

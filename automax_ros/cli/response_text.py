@@ -7,12 +7,12 @@ import math
 from collections.abc import Sequence
 from typing import TextIO
 
-from automax_ros.blocks.driven import STANDING
-from automax_ros.blocks.frequency import Measured, decibels
-from automax_ros.blocks.step_response import SETTLED
 from automax_ros.cli.response_data import BlockResponse, Point
 from automax_ros.cli.transfer_text import fixed, laplace_text, number
 from automax_ros.cli.tune_info_text import frequency_text
+from automax_ros.tuning.driven import STANDING
+from automax_ros.tuning.frequency import Measured, decibels
+from automax_ros.tuning.step_response import SETTLED
 
 COLUMNS = (
     "response", "t_s", "rad_s", "hz", "mark", "amplitude", "measured", "discrete", "laplace",

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.cli.recording_watch import RecordingWatch
 from automax_ros.cli.run import warn
@@ -17,6 +16,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import Watched
+from automax_ros.wire.stream import RackStream
 
 SLICE_NS = 100 * NS_PER_MS
 """Rack time between two looks at signals and the display."""

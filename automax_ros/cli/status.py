@@ -10,12 +10,12 @@ from pathlib import Path
 
 from automax_ros.cli.status_line import fitting
 from automax_ros.cli.terminal import rewrites_lines
+from automax_ros.compile.functions import text_of
 from automax_ros.core.diagnostics import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.rack.rack import Processor, Rack
 from automax_ros.rack.settings import Watched
-from automax_ros.runtime.functions import text_of
 
 _TERMINAL_PERIOD_NS = 200_000_000
 _PLAIN_PERIOD_NS = 5 * NS_PER_S

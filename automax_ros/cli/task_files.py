@@ -12,7 +12,7 @@ from automax_ros.blocks.declaration import Processor
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
-from automax_ros.language.checker import CheckResult, check
+from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.findings import quoted
 from automax_ros.rack.names import NameFault, check_task_name

@@ -28,8 +28,8 @@ from automax_ros.core.decimal_text import real_text, seconds_text
 from automax_ros.core.diagnostics import printable
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType
-from automax_ros.runtime.error_log import LogEntry
-from automax_ros.runtime.task import ScanRecord, Status
+from automax_ros.running.error_log import LogEntry
+from automax_ros.running.task import ScanRecord, Status
 
 _ROWS_A_LOOK = 256
 """Rows between two looks at the clock for the progress bar."""

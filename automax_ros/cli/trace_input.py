@@ -9,7 +9,7 @@ from automax_ros.cli.csv_table import CsvFault, CsvTable, cell_value
 from automax_ros.cli.lone_task import LoneTask, LoneVariable, UnknownVariableError
 from automax_ros.core.decimal_text import real_text
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.constant_values import range_text
+from automax_ros.language.checks.constant_values import range_text
 from automax_ros.language.program import Symbol
 from automax_ros.rack.findings import quoted
 

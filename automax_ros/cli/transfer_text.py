@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from automax_ros.blocks.frequency import decibels
 from automax_ros.blocks.transfer import Transfer
 from automax_ros.blocks.tuning import Tuning
+from automax_ros.tuning.frequency import decibels
 
 _FEWEST, _MOST = 7, 17
 _TRUE_DIGITS = 1e-5

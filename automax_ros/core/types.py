@@ -6,6 +6,8 @@ import enum
 
 Value = int | float | bool | str
 """A value of a variable: int for INTEGER and DOUBLE, float for REAL, bool for BOOLEAN, str for STRING."""
+Latched = tuple[Value, ...]
+"""The commons that a scan latched, in the order of its plan (3.3)."""
 
 NAME_LIMIT = 16
 """Longest variable name without its type character (2.4.1)."""

@@ -8,7 +8,7 @@ from automax_ros.blocks.channels import programmed_channels
 from automax_ros.blocks.declaration import Block
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.tree import (
+from automax_ros.language.syntax.tree import (
     BooleanLiteral,
     Call,
     Event,

@@ -19,9 +19,6 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
-from automax_ros.bags.qos import LATCHED
-from automax_ros.bags.rack_files import files_of, files_text
-from automax_ros.bags.rack_stream import RackStream, Topic
 from automax_ros.core.types import Value
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import COMMAND_QOS, message_class, publisher, ros_qos
@@ -29,7 +26,10 @@ from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.writers import ROS_WRITER
-from automax_ros.runtime.memory import MemoryValueError
+from automax_ros.running.memory import MemoryValueError
+from automax_ros.wire.qos import LATCHED
+from automax_ros.wire.rack_files import files_of, files_text
+from automax_ros.wire.stream import RackStream, Topic
 
 REFUSAL_INTERVAL_S = 1.0
 """A variable's refused writes are reported at most this often."""

@@ -16,7 +16,6 @@ from typing import Any
 
 from rclpy.context import Context
 
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.nodes.common_memory import CommonMemoryNode
@@ -24,6 +23,7 @@ from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.rack.rack import Rack
+from automax_ros.wire.stream import RackStream
 
 LONGEST_WAIT_NS = 50 * NS_PER_MS
 """The loop wakes at least this often, so that a signal is answered at once."""

@@ -23,16 +23,16 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
-from automax_ros.bags.cdr import CdrError, decoder, encoder
-from automax_ros.bags.definitions import message_types
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import RawMessage
-from automax_ros.bags.messages import Clock
 from automax_ros.bags.playback import PlayTopic, Renaming, Survey
-from automax_ros.bags.qos import QosProfile
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.executor import make_executor
+from automax_ros.wire.cdr import CdrError, decoder, encoder
+from automax_ros.wire.definitions import message_types
+from automax_ros.wire.messages import Clock
+from automax_ros.wire.qos import QosProfile
 
 CLOCK_PERIOD_NS = 10 * NS_PER_MS
 """How often ``/clock`` is sent."""

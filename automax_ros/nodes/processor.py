@@ -23,16 +23,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
-from automax_ros.bags.rack_stream import RackStream, Topic
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import publisher
 from automax_ros.nodes.tunables import Tunable, tunables_of
 from automax_ros.rack.rack import Processor, Rack
-from automax_ros.runtime.error_log import LogEntry
-from automax_ros.runtime.memory import Write
-from automax_ros.runtime.scheduler import EventClass, EventKey
-from automax_ros.runtime.task import ScanRecord, Status, Task
+from automax_ros.running.error_log import LogEntry
+from automax_ros.running.memory import Write
+from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.wire.stream import RackStream, Topic
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S
 ERROR_INTERVAL_S = 1.0

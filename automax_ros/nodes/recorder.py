@@ -19,17 +19,17 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from automax_ros.bags.cdr import CdrError, decode
 from automax_ros.bags.live.arrival import ArrivalOrder
 from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.live.topics import LiveTopics, TopicKind
-from automax_ros.bags.messages import VariableTable
-from automax_ros.bags.qos import LATCHED
-from automax_ros.bags.rack_files import RackFile, RackFilesError, files_from_text
 from automax_ros.bags.writer import StorageOptions
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.topics import message_class
+from automax_ros.wire.cdr import CdrError, decode
+from automax_ros.wire.messages import VariableTable
+from automax_ros.wire.qos import LATCHED
+from automax_ros.wire.rack_files import RackFile, RackFilesError, files_from_text
 
 LOOK_S = 0.025
 """Time between two looks at the topics."""

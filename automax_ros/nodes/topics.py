@@ -11,8 +11,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from automax_ros.bags.qos import QosProfile
-from automax_ros.bags.rack_stream import Topic
+from automax_ros.wire.qos import QosProfile
+from automax_ros.wire.stream import Topic
 
 COMMAND_QOS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,

@@ -13,7 +13,7 @@ from automax_ros.core.decimal_text import real_text
 from automax_ros.core.types import DataType, bare_name
 from automax_ros.language.program import TuningLimits
 from automax_ros.rack.ros_names import TYPE_WORDS
-from automax_ros.runtime.task import Task
+from automax_ros.running.task import Task
 
 _GRID_TOLERANCE = 1e-7
 """Stricter than rclpy's 1e-6."""

@@ -13,16 +13,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.tasks_check import check_tasks
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
-from automax_ros.runtime.compiler import compile_program
-from automax_ros.runtime.memory import CommonMemory, ViewSpec, Write, WriteKind
-from automax_ros.runtime.scheduler import EventClass, EventKey, Scheduler
-from automax_ros.runtime.task import ScanRecord, Status, Task
+from automax_ros.running.memory import CommonMemory, ViewSpec, Write, WriteKind
+from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.running.task import ScanRecord, Status, Task
 
 
 class RackError(Exception):

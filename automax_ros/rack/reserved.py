@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from automax_ros.language.functions import FUNCTIONS, REFUSED_FUNCTIONS
-from automax_ros.language.tokens import RESERVED_WORDS
+from automax_ros.language.syntax.functions import FUNCTIONS, REFUSED_FUNCTIONS
+from automax_ros.language.syntax.tokens import RESERVED_WORDS
 
 
 def is_reserved(name: str) -> bool:

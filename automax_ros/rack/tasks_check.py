@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, in_order
-from automax_ros.language.checker import CheckResult, check
+from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
 from automax_ros.rack.config import ProcessorConfig, RackConfig, TaskConfig
 from automax_ros.rack.files import FileFault

@@ -11,8 +11,8 @@ import resource
 import struct
 import sys
 
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.cli.main import main
+from automax_ros.wire.stream import RackStream
 
 if __name__ == "__main__":
     descriptor = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT)

@@ -7,9 +7,10 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from automax_ros.bags.cdr import encode
-from automax_ros.bags.definitions import TIME, Field, message_types
-from automax_ros.bags.messages import (
+from automax_ros.bags.writer import BagWriter
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.definitions import TIME, Field, message_types
+from automax_ros.wire.messages import (
     CLASSES,
     NAMES,
     CommonImage,
@@ -26,8 +27,7 @@ from automax_ros.bags.messages import (
     Writer,
     WriterKind,
 )
-from automax_ros.bags.qos import LATCHED, SCAN, VALUE
-from automax_ros.bags.writer import BagWriter
+from automax_ros.wire.qos import LATCHED, SCAN, VALUE
 
 MS = 1_000_000
 RUN = 77

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.export import export_csv
-from automax_ros.bags.messages import Int16, Values, Variable, VariableTable, VariableType
 from automax_ros.core.decimal_text import seconds_text
 from automax_ros.core.numbers import stored_real
+from automax_ros.wire.messages import Int16, Values, Variable, VariableTable, VariableType
 
 from .recordings import MS, TABLE, image_of, record, sample_recording, write_of
 

@@ -14,12 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer as McapWriter
 
-from automax_ros.bags.cdr import encode
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.info import TaskInfo, bag_info
 from automax_ros.bags.info_tasks import task_facts
-from automax_ros.bags.messages import Int16, Scan, ScanError
 from automax_ros.bags.reader import BagReader
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.messages import Int16, Scan, ScanError
 
 from .independent import GOLDEN, decoded, summary
 from .recordings import MS, TABLE, record, sample_recording, write_of

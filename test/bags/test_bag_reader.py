@@ -21,15 +21,15 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
 from automax_ros.bags import mcap_file
-from automax_ros.bags.cdr import encode
-from automax_ros.bags.definitions import schema_text
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.info import bag_info
-from automax_ros.bags.messages import CommonWrite, Int16, VariableTable
 from automax_ros.bags.playback import survey
 from automax_ros.bags.reader import MAX_METADATA_BYTES, BagReader
 from automax_ros.bags.repair.repairing import repair
 from automax_ros.core.problems import PROBLEMS
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.definitions import schema_text
+from automax_ros.wire.messages import CommonWrite, Int16, VariableTable
 
 from .recordings import TABLE, sample_recording
 

@@ -10,11 +10,9 @@ from typing import Any
 import pytest
 import yaml
 from mcap.reader import make_reader
+from replay.reexecution import Reexecution
 
-from automax_ros.bags.cdr import encode
 from automax_ros.bags.errors import BagError, RecordingError
-from automax_ros.bags.messages import CommonWrite, Int16, Scan, String, Values
-from automax_ros.bags.qos import VALUE
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.bags.repair.contents import SCAN, WRITE
@@ -22,9 +20,11 @@ from automax_ros.bags.repair.repairing import repair
 from automax_ros.bags.repair.rewriting import Found, kept
 from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.messages import CommonWrite, Int16, Scan, String, Values
+from automax_ros.wire.qos import VALUE
 
 from .others import assert_mcap_reads, rosbags_messages
-from .reexecution import Reexecution
 from .test_bag_split import files, recorded
 
 

@@ -9,20 +9,20 @@ from typing import Any
 import pytest
 import yaml
 from mcap.reader import make_reader
+from replay.reexecution import Reexecution
 
-from automax_ros.bags.cdr import encode
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.messages import Int16, String
-from automax_ros.bags.qos import LATCHED, SCAN
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.bags.writer import COMPRESSIONS, MIN_SPLIT_BYTES, BagWriter, StorageOptions
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.messages import Int16, String
+from automax_ros.wire.qos import LATCHED, SCAN
+from automax_ros.wire.stream import RackStream
 
 from .live_racks import build
 from .others import assert_mcap_reads, rosbags_messages
-from .reexecution import Reexecution
 
 SECONDS = 7.0
 TASKS = {"SPEED", "WORK"}

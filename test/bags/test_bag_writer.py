@@ -22,13 +22,13 @@ from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from automax_ros.bags import writer as writer_module
-from automax_ros.bags.cdr import encode
-from automax_ros.bags.definitions import message_types
 from automax_ros.bags.errors import BagError, RecordingError
-from automax_ros.bags.messages import Int16, String
-from automax_ros.bags.qos import LATCHED, SCAN, VALUE
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.writer import BagWriter
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.definitions import message_types
+from automax_ros.wire.messages import Int16, String
+from automax_ros.wire.qos import LATCHED, SCAN, VALUE
 
 from .recordings import sample_recording
 

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags.cdr import CdrError, encode
-from automax_ros.bags.heads import image_head, scan_head, write_head
 from automax_ros.bags.live.arrival import ArrivalOrder
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics, value_type_name
-from automax_ros.bags.messages import CommonImage, CommonWrite, Direction, Scan, Variable, VariableType
-from automax_ros.bags.qos import LATCHED
-from automax_ros.bags.rack_files import MAX_TEXT, RackFilesError, files_from_text, files_of, files_text, fingerprint
-from automax_ros.bags.rack_messages import value_type_name as racks_type_name
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.recorded_qos import MAX_DEPTH, MAX_QOS_BYTES, STREAM, recorded_qos
+from automax_ros.wire.cdr import CdrError, encode
+from automax_ros.wire.heads import image_head, scan_head, write_head
+from automax_ros.wire.messages import CommonImage, CommonWrite, Direction, Scan, Variable, VariableType
+from automax_ros.wire.qos import LATCHED
+from automax_ros.wire.rack_files import MAX_TEXT, RackFilesError, files_from_text, files_of, files_text, fingerprint
+from automax_ros.wire.rack_messages import value_type_name as racks_type_name
+from automax_ros.wire.stream import RackStream
 
 from .live_racks import build
 from .recordings import TABLE, messages

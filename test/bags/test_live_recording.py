@@ -14,20 +14,20 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from replay.reexecution import Reexecution
 
-from automax_ros.bags.cdr import decode
 from automax_ros.bags.live.recording import MAX_PENDING, LiveRecording
 from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.bags.rack_files import RackFile, files_of
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder
-from automax_ros.bags.replay.engine import replay
 from automax_ros.bags.writer import StorageOptions
 from automax_ros.rack.rack import Rack
+from automax_ros.replay.engine import replay
+from automax_ros.wire.cdr import decode
+from automax_ros.wire.rack_files import RackFile, files_of
+from automax_ros.wire.stream import RackStream
 
 from .live_racks import build
-from .reexecution import Reexecution
 
 RUN = 4711
 EPOCH = 1_700_000_000_000_000_000

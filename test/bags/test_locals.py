@@ -9,9 +9,9 @@ import pytest
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.export import export_csv
-from automax_ros.bags.messages import TaskState
 from automax_ros.bags.series import Window
 from automax_ros.bags.traces import traces
+from automax_ros.wire.messages import TaskState
 
 from .independent import GOLDEN, decoded, nanoseconds
 from .recordings import MS, TABLE, image_of, record, write_of

@@ -16,13 +16,13 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.export import CommonTable, export_csv, write_csv
 from automax_ros.bags.export_npz import write_npz
 from automax_ros.bags.info import bag_info
-from automax_ros.bags.messages import Scan, Values
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.bags.scan_table import ScanTable
 from automax_ros.bags.series import Window
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.wire.messages import Scan, Values
+from automax_ros.wire.stream import RackStream
 
 from .independent import GOLDEN, ROOT, decoded, nanoseconds, steps_of
 from .recordings import MS, TABLE, image_of, record, write_of

@@ -8,19 +8,19 @@ from typing import Any
 
 import pytest
 from mcap.reader import make_reader
+from replay.reexecution import Reexecution
 from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import automax_ros
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.rack_stream import RackStream
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.wire.stream import RackStream
 
 from .live_racks import SPEED, WORK, YAML, build
-from .reexecution import Reexecution
 
 ROOT = Path(__file__).parents[2]
 

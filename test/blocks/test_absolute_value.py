@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from compile.support import run_scans, task_of
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime.support import run_scans, task_of
 
 from automax_ros.blocks.instance import InstanceError
 

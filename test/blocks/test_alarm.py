@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
+from compile.support import ran
 from hypothesis import given
-from runtime.support import ran
 
 from automax_ros.blocks.instance import InstanceError
 

@@ -2,9 +2,9 @@ from fractions import Fraction
 from math import trunc
 
 import pytest
+from compile.support import lines, logged, ran, run_scans, task_of
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime.support import lines, logged, ran, run_scans, task_of
 
 from .support import int16, repeatable, run
 

@@ -1,7 +1,7 @@
 import pytest
+from compile.support import lines, run_scans, task_of
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime.support import lines, run_scans, task_of
 
 from .support import int16, repeatable, run
 

@@ -5,8 +5,8 @@ import re
 from dataclasses import dataclass
 
 import pytest
+from compile.support import task_of
 from language.check_support import problems
-from runtime.support import task_of
 
 from automax_ros.blocks.declaration import Processor
 from automax_ros.core.diagnostics import Severity

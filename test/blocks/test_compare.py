@@ -1,6 +1,6 @@
 import pytest
+from compile.support import ran
 from hypothesis import given
-from runtime.support import ran
 
 from .support import int16, repeatable, run
 

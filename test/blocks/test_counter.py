@@ -1,7 +1,7 @@
 import pytest
+from compile.support import OTHER, logged, ran, run_scans, task_of
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime.support import OTHER, logged, ran, run_scans, task_of
 
 from automax_ros.blocks.instance import InstanceError
 

@@ -7,7 +7,7 @@ from automax_ros.blocks.declaration import Access, Form, Processor, Special
 from automax_ros.blocks.describe import WIDTH, description, summary, template, templates
 from automax_ros.core.diagnostics import SourceText, render
 from automax_ros.core.types import DataType
-from automax_ros.language.checker import check
+from automax_ros.language.checks.checker import check
 
 each_block = pytest.mark.parametrize("block", list(CATALOGUE.values()), ids=lambda block: block.name)
 

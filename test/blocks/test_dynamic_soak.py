@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from runtime.support import task_of
+from compile.support import task_of
 
 PERIOD = 1000
 """Scans of the input's period."""

@@ -1,7 +1,7 @@
 import pytest
+from compile.support import ran
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime.support import ran
 
 from automax_ros.blocks.instance import InstanceError
 

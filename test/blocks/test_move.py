@@ -1,10 +1,10 @@
 import pytest
+from compile.support import OTHER, WRITER, lines, ran, run_scans, scan_in_steps, task_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime.support import OTHER, WRITER, lines, ran, run_scans, scan_in_steps, task_of
 
-from automax_ros.runtime.memory import WriteKind
-from automax_ros.runtime.task import Task
+from automax_ros.running.memory import WriteKind
+from automax_ros.running.task import Task
 
 from .support import int16, repeatable, run
 

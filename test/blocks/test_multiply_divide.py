@@ -2,8 +2,8 @@ from fractions import Fraction
 from math import trunc
 
 import pytest
+from compile.support import logged, ran
 from hypothesis import given
-from runtime.support import logged, ran
 
 from .support import int16, repeatable, run
 

@@ -1,9 +1,9 @@
 import struct
 
 import pytest
+from compile.support import OTHER, ran, run_scans, task_of
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime.support import OTHER, ran, run_scans, task_of
 
 from .support import repeatable, run
 

@@ -1,9 +1,9 @@
 import itertools
 
 import pytest
+from compile.support import logged, ran
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime.support import logged, ran
 
 from .support import int16, repeatable, run
 

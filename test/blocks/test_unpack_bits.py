@@ -1,8 +1,8 @@
 import struct
 
 import pytest
+from compile.support import lines, run_scans, task_of
 from hypothesis import given
-from runtime.support import lines, run_scans, task_of
 
 from .support import int16, repeatable, run
 

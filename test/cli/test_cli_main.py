@@ -140,6 +140,6 @@ def test_check_starts_with_what_it_needs_only(tmp_path):
     with started(str(path), code=code) as process:
         out, _ = process.communicate(timeout=60)
     loaded = set(out.split())
-    assert "automax_ros.language.checker" in loaded
-    heavy = {"numpy", "mcap", "rich", "rclpy", "yaml", "automax_ros.runtime.compiler", "automax_ros.cli.trace"}
+    assert "automax_ros.language.checks.checker" in loaded
+    heavy = {"numpy", "mcap", "rich", "rclpy", "yaml", "automax_ros.compile.compiler", "automax_ros.cli.trace"}
     assert not loaded & heavy

@@ -8,10 +8,10 @@ import pytest
 from bags.independent import GOLDEN, steps_of
 from bags.recordings import MS, TABLE, image_of, record, sample_recording, write_of
 
-from automax_ros.bags.messages import Scan, ScanError, VariableType
 from automax_ros.bags.traces import ErrorMark, Line, Traces, traces
 from automax_ros.bags.variables import Watched
 from automax_ros.cli.plot_figure import Layout, figure_of, save
+from automax_ros.wire.messages import Scan, ScanError, VariableType
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from bags.replays import SPEED, WORK, edited, recorded
 from bags.test_bag_split import recorded as recorded_files
+from replay.replays import SPEED, WORK, edited, recorded
 
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.ticks import NS_PER_S
@@ -89,9 +89,9 @@ def test_picture(automax, bag):
 
 def test_picture_of_several_lanes_shows_what_was_compared(source, tmp_path):
     """Both traces, the boolean among them, around the first difference."""
-    from automax_ros.bags.replay.engine import Replay, ReplayOptions
-    from automax_ros.bags.replay.picture import draw, traces
     from automax_ros.core.diagnostics import SourceText
+    from automax_ros.replay.engine import Replay, ReplayOptions
+    from automax_ros.replay.picture import draw, traces
 
     pytest.importorskip("matplotlib")
     changed = edited(WORK, ("TOTAL > 2.0", "TOTAL > 1.0"), ("COUNT! + 1", "COUNT! + 2"), ("LEFT$(NOTE$, 4)", "NOTE$"))

@@ -13,7 +13,7 @@ from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.tasks_check import check_tasks
-from automax_ros.runtime.task import Task
+from automax_ros.running.task import Task
 
 FOLDER = Path(__file__).parents[2] / "config" / "section_drive"
 README = (FOLDER / "README.md").read_text(encoding="utf-8")

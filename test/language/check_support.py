@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Processor
 from automax_ros.core.diagnostics import Diagnostic, SourceText
-from automax_ros.language.checker import CheckResult, check
+from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec, Program
 
 

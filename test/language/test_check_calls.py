@@ -9,7 +9,7 @@ from automax_ros.blocks.declaration import Processor
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import stored_real
 from automax_ros.language.program import BoundCall
-from automax_ros.language.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Unary, Variable
+from automax_ros.language.syntax.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Unary, Variable
 
 from .check_support import codes, one, problems, program, task
 

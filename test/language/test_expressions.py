@@ -3,8 +3,8 @@
 import pytest
 
 from automax_ros.core.types import DataType
-from automax_ros.language.functions import FUNCTIONS, Result
-from automax_ros.language.tree import (
+from automax_ros.language.syntax.functions import FUNCTIONS, Result
+from automax_ros.language.syntax.tree import (
     Binary,
     BooleanLiteral,
     Element,
@@ -16,7 +16,7 @@ from automax_ros.language.tree import (
     Unary,
     Variable,
 )
-from automax_ros.language.unconfirmed import UNCONFIRMED
+from automax_ros.language.syntax.unconfirmed import UNCONFIRMED
 from language.parser_support import codes_of, expression_of
 
 A, B, C = Variable("A%"), Variable("B%"), Variable("C%")

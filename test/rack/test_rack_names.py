@@ -3,7 +3,7 @@
 import pytest
 
 from automax_ros.core.types import DataType
-from automax_ros.language.tokens import RESERVED_WORDS
+from automax_ros.language.syntax.tokens import RESERVED_WORDS
 from automax_ros.rack.names import NameFault, VariableName, variable_name
 
 from .helpers import HEAD, codes

@@ -263,10 +263,10 @@ def test_recording_of_another_program_plays_as_far_as_its_types_are_installed(ro
 def test_malformed_message_ends_the_playback(ros_domain_id, tmp_path):
     from bags.recordings import TABLE
 
-    from automax_ros.bags.cdr import encode
-    from automax_ros.bags.messages import NAMES, Int16, VariableTable
-    from automax_ros.bags.qos import LATCHED, VALUE
     from automax_ros.bags.writer import BagWriter
+    from automax_ros.wire.cdr import encode
+    from automax_ros.wire.messages import NAMES, Int16, VariableTable
+    from automax_ros.wire.qos import LATCHED, VALUE
 
     with BagWriter(tmp_path / "bag") as writer:
         writer.write(writer.channel("/line1/variables", NAMES[VariableTable], LATCHED), 0, encode(TABLE))

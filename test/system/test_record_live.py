@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bags.reexecution import Reexecution
+from replay.reexecution import Reexecution
 
 from automax_ros.bags.reader import BagReader
 

@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 
 import pytest
-from bags.reexecution import Reexecution
 from golden_text import check_golden
+from replay.reexecution import Reexecution
 
 from automax_ros.bags.reader import BagReader
 from automax_ros.core.decimal_text import real_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import automax_ros
-from automax_ros.bags.rack_files import RackFile, fingerprint
+from automax_ros.wire.rack_files import RackFile, fingerprint
 
 _GAPS_NAMED = 20
 

@@ -13,15 +13,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from automax_ros.bags.cdr import CdrError, decode
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.heads import WriteHead, image_head, scan_head, write_head
 from automax_ros.bags.live.provenance import provenance
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
 from automax_ros.bags.live.tracks import Gap, TaskTrack
-from automax_ros.bags.messages import VariableTable, WriterKind
-from automax_ros.bags.rack_files import RACK_FILE, RackFile
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
+from automax_ros.wire.cdr import CdrError, decode
+from automax_ros.wire.heads import WriteHead, image_head, scan_head, write_head
+from automax_ros.wire.messages import VariableTable, WriterKind
+from automax_ros.wire.rack_files import RACK_FILE, RackFile
 
 SETTLE_NS = 1_000_000_000
 """When for so long no write has come, none is missing."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from automax_ros.bags.messages import Direction, Variable, VariableTable, VariableType
-from automax_ros.bags.qos import LATCHED, SCAN, VALUE, QosProfile
+from automax_ros.wire.messages import Direction, Variable, VariableTable, VariableType
+from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
 
 _SCALARS = {
     VariableType.INTEGER: "Int16",

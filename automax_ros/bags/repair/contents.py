@@ -10,8 +10,8 @@ from typing import Any
 import yaml
 from mcap.records import Channel, Schema
 
-from automax_ros.bags.cdr import CdrError, decode
 from automax_ros.bags.metadata import FileSummary, TopicSummary
+from automax_ros.wire.cdr import CdrError, decode
 
 SCAN, WRITE, TABLE = (f"automax_msgs/msg/{name}" for name in ("Scan", "CommonWrite", "VariableTable"))
 _MAX_QOS_TEXT = 1 << 14

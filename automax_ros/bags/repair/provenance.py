@@ -7,8 +7,8 @@ from typing import Any
 
 from mcap.records import Attachment, Metadata
 
-from automax_ros.bags.rack_files import RACK_FILE, RackFile, fingerprint
 from automax_ros.bags.reader import custom_data_of, told_information
+from automax_ros.wire.rack_files import RACK_FILE, RackFile, fingerprint
 
 _MAX_FILES = 200
 _MAX_BYTES = 16 << 20

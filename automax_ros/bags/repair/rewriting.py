@@ -11,15 +11,15 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 import automax_ros
-from automax_ros.bags.cdr import CdrError, decode
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder, McapOutput
-from automax_ros.bags.messages import WriteKind
 from automax_ros.bags.metadata import BagMetadata, yaml_text
 from automax_ros.bags.repair.contents import SCAN, WRITE, FileContents
 from automax_ros.bags.repair.provenance import Provenance
 from automax_ros.bags.repair.salvage import Piece, Salvage, SoundChunk, parsed, records
 from automax_ros.bags.unpacking import MAX_RECORD_BYTES
+from automax_ros.wire.cdr import CdrError, decode
+from automax_ros.wire.messages import WriteKind
 
 _LOOSE_BYTES = 1 << 20
 """Messages that stood outside of chunks are gathered in chunks of this size."""

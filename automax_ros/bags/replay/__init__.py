@@ -1,1 +1,0 @@
-"""Replay: every recorded scan executed again and compared."""

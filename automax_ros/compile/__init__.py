@@ -1,0 +1,1 @@
+"""Program to function: the compiler and its lowerings."""

@@ -1,0 +1,342 @@
+"""The compiler: a checked program becomes Python functions.
+
+Three functions come from one lowering of the same tree:
+
+- ``startup(state, io)``: the statements before SCAN_LOOP;
+- ``scans(state, io)``: a generator; each ``next`` is one scan from SCAN_LOOP to END, at one instant;
+- ``scan_steps(state, io)``: one scan as a generator, which yields the modeled time in ns that has passed before each
+  read or write of actual memory, for execution with modeled times.
+
+``startup`` and ``scan_steps`` return, and ``scans`` yields, True if the task executed STOP. ``state`` is the list of
+the layout's fields: loaded into locals at the start, stored back at the end, also when a scan is broken off. ``scans``
+ends when it is closed: between scans its locals hold the state, so that a scan neither loads nor stores it. ``io`` is
+what a scan may touch: see ``ScanIo``.
+
+``scan_steps`` and the printed source are made when they are first asked for: most runs need neither.
+"""
+
+from __future__ import annotations
+
+import ast
+import gc
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol, cast
+
+from automax_ros.blocks.declaration import HELPERS
+from automax_ros.compile import build
+from automax_ros.compile.calls import BlockInstance, instance_of
+from automax_ros.compile.cost import CostModel
+from automax_ros.compile.emitter import Emitter
+from automax_ros.compile.functions import BUILTINS, OPERATIONS
+from automax_ros.compile.layout import Field, Layout, Role, StateValue
+from automax_ros.compile.pynames import block_prefix, latched_name, variable_name
+from automax_ros.compile.statements import STOPPED, StatementLowering
+from automax_ros.core.types import Latched, Value
+from automax_ros.language.program import Program, Symbol
+from automax_ros.language.syntax.tree import Call, For, If, Scope, Statement, Variable
+
+State = list[StateValue]
+
+
+class ScanTooLong(Exception):
+    """A scan executed more statements than a scan may; ``line`` is the BASIC line it was at."""
+
+    def __init__(self, line: int) -> None:
+        """Take the BASIC line number."""
+        super().__init__(f"more statements than a scan may execute, at line {line}")
+        self.line = line
+
+
+class ScanIo(Protocol):
+    """What a compiled scan touches beside its own state."""
+
+    def latch(self) -> Latched:
+        """Return the latched commons in the order of ``CompiledTask.latched``."""
+        ...
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Write back what blocks changed: pairs of view and value; called only if something changed."""
+        ...
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Read actual memory."""
+        ...
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Write actual memory."""
+        ...
+
+    def log(self, line: int, code: int) -> None:
+        """Log a run-time error."""
+        ...
+
+    def print_line(self, values: tuple[Value, ...], separators: str) -> None:
+        """Print to the task's log; a separator (``,`` ``;`` or a blank) follows each value."""
+        ...
+
+    def errors_logged(self) -> bool:
+        """Return whether the error log holds an entry."""
+        ...
+
+    def clear_errors(self) -> None:
+        """Clear the error log."""
+        ...
+
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+        """Return a register of an I/O module, and the problem or 0."""
+        ...
+
+    def io_write(self, slot: int, register: int, value: int) -> int:
+        """Write a register of an I/O module; return the problem or 0."""
+        ...
+
+
+Startup = Callable[[State, ScanIo], bool]
+Scans = Callable[[State, ScanIo], Generator[bool, None, None]]
+ScanSteps = Callable[[State, ScanIo], Generator[int, None, bool]]
+
+
+@dataclass(frozen=True)
+class CompiledTask:
+    """A task ready to run. ``latched`` are the names of the commons that a scan latches, in order."""
+
+    program: Program
+    layout: Layout
+    latched: tuple[str, ...]
+    startup: Startup
+    scans: Scans
+    _compilation: _Compilation = field(repr=False, compare=False)
+
+    @cached_property
+    def scan_steps(self) -> ScanSteps:
+        """One scan in steps of modeled time."""
+        return cast(ScanSteps, self._compilation.functions("scan_steps")["scan_steps"])
+
+    @cached_property
+    def source(self) -> str:
+        """The three functions as text."""
+        definitions = self._compilation.definitions("startup", "scans", "scan_steps")
+        return "\n\n\n".join(ast.unparse(ast.fix_missing_locations(item)) for item in definitions) + "\n"
+
+
+def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:
+    """Compile a checked program against a rack's views (full name -> view) of all commons it declares."""
+    return _Compilation(program, views, cost_model or CostModel()).result()
+
+
+class _Compilation:
+    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel) -> None:
+        self._program = program
+        self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
+        self._cost = cost_model
+        self._instances = _instances(program)
+        self._latched = tuple(symbol.name for symbol in program.symbols.values() if symbol.latched)
+        self._fields: dict[str, Field] = {
+            variable_name(symbol.name): _local_field(symbol)
+            for symbol in program.symbols.values()
+            if symbol.scope is Scope.LOCAL
+        }
+        for instance in self._instances.values():
+            self._fields.update(instance.fields)
+        self._globals: dict[str, object] = {"ScanTooLong": ScanTooLong}
+
+    def result(self) -> CompiledTask:
+        """Compile the task."""
+        made = self.functions("startup", "scans")
+        return CompiledTask(
+            program=self._program,
+            layout=Layout(tuple(self._fields.values())),
+            latched=self._latched,
+            startup=cast(Startup, made["startup"]),
+            scans=cast(Scans, made["scans"]),
+            _compilation=self,
+        )
+
+    def functions(self, *names: str) -> dict[str, object]:
+        """Compile some of the three functions."""
+        with _collections_paused():
+            definitions: list[ast.stmt] = [*self.definitions(*names)]
+            code = compile(ast.fix_missing_locations(ast.Module(definitions, [])), f"<{self._program.name}>", "exec")
+        made: dict[str, object] = {"__builtins__": {}, **self._globals}
+        exec(code, made)
+        return made
+
+    def definitions(self, *names: str) -> list[ast.FunctionDef]:
+        """Lower some of the three functions; the state's fields are known when ``scans`` was among them."""
+        parts = [self._function(name) for name in names]
+        return [self._wrapped(*part) for part in parts]
+
+    def _function(self, name: str) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
+        scans = name != "startup"
+        statements = self._program.scan if scans else self._program.startup
+        emitter = Emitter(self._program, self._views, name == "scan_steps", self._cost)
+        lowering = StatementLowering(emitter, dict(self._instances.items()))
+        if scans:
+            emitter.line = self._program.scan_loop_line
+            emitter.add_cost(self._cost.scan_loop_ns(self._program))
+            self._latch(emitter)
+        lowering.lower_all(statements)
+        self._fields.update(lowering.fields)
+        body = emitter.body
+        if scans:
+            commit = self._commit(emitter)
+            body.extend([build.when(build.inverse(build.name(STOPPED)), commit)] if lowering.can_stop else commit)
+        return name, body, emitter, lowering
+
+    def _latch(self, emitter: Emitter) -> None:
+        """Emit the latch; a task without latched commons still takes the time of SCAN_LOOP."""
+        emitter.checkpoint()
+        latch = build.call(emitter.member("latch"))
+        if not self._latched:
+            emitter.emit(build.do(latch))
+            return
+        written = self._written()
+        kept = [name for name in self._latched if name in written]
+        names = [latched_name(name) if name in written else variable_name(name) for name in self._latched]
+        emitter.emit(build.assign_all(names, latch))
+        for name in kept:
+            emitter.emit(build.assign(variable_name(name), build.name(latched_name(name))))
+
+    def _written(self) -> frozenset[str]:
+        """Return the latched commons that a block may change."""
+        outputs = {
+            target.name
+            for instance in self._instances.values()
+            for output in instance.bound.block.outputs
+            if isinstance(target := instance.bound.arguments.get(output.name), Variable)
+        }
+        return frozenset(outputs & set(self._latched))
+
+    def _commit(self, emitter: Emitter) -> list[ast.stmt]:
+        """Return END: what differs from the latch is written back."""
+        outer, emitter.body = emitter.body, []
+        emitter.add_cost(self._cost.end_ns(self._program))
+        written = self._written()
+        emitter.checkpoint()
+        if written:
+            emitter.emit(build.assign("changes", ast.List([], ast.Load())))
+        for name in self._latched:
+            if name in written:
+                pair = ast.Tuple([build.constant(self._views[name]), build.name(variable_name(name))], ast.Load())
+                append = build.do(build.call(build.attribute("changes", "append"), pair))
+                changed = build.compare(build.name(variable_name(name)), "<>", build.name(latched_name(name)))
+                emitter.emit(build.when(changed, [append]))
+        if written:
+            commit = build.do(build.call(emitter.member("commit"), build.name("changes")))
+            emitter.emit(build.when(build.name("changes"), [commit]))
+        body, emitter.body = emitter.body, outer
+        return body
+
+    def _stores(self, body: list[ast.stmt]) -> list[ast.stmt]:
+        """Return the stores of the fields that the body sets: one by one, which is faster than all at once."""
+        assigned = _assigned(body)
+        return [
+            build.set_item("state", build.constant(position), build.name(name))
+            for position, name in enumerate(self._fields)
+            if name in assigned
+        ]
+
+    def _wrapped(
+        self, name: str, body: list[ast.stmt], emitter: Emitter, lowering: StatementLowering
+    ) -> ast.FunctionDef:
+        """Return the whole function: load the state, bind what is used, the body, store the state."""
+        self._globals.update(_called(emitter))
+        self._globals.update(emitter.extra_globals)
+        opening: list[ast.stmt] = []
+        if self._fields:
+            opening.append(build.assign_all(list(self._fields), build.name("state")))
+        if lowering.block_lines:
+            lines: list[ast.expr] = [build.constant(line) for line in lowering.block_lines]
+            opening.append(build.assign("block_lines", ast.Tuple(lines, ast.Load())))
+        stores = self._stores(body)
+        body = [*self._start_values(emitter, lowering), *body]
+        stopped = build.name(STOPPED) if lowering.can_stop else build.constant(False)
+        if name == "scans":
+            body.append(build.do(ast.Yield(stopped)))
+            forever = build.loop(build.constant(True), body)
+            return build.function(name, ["state", "io"], [*opening, build.finally_do([forever], stores)])
+        if lowering.counts_steps or emitter.modeled:
+            body = [build.finally_do(body, stores)]
+        else:
+            body += stores
+        return build.function(name, ["state", "io"], [*opening, *body, ast.Return(stopped)])
+
+    def _start_values(self, emitter: Emitter, lowering: StatementLowering) -> list[ast.stmt]:
+        """Return what each execution begins with: an empty GOSUB stack, no statements counted, no STOP, no time."""
+        values = {
+            "gosub_depth": (0, "gosub_depth" in self._fields),
+            "steps": (0, lowering.counts_steps),
+            STOPPED: (False, lowering.can_stop),
+            "cost": (0, emitter.modeled),
+        }
+        return [build.assign(name, build.constant(value)) for name, (value, used) in values.items() if used]
+
+
+@contextmanager
+def _collections_paused() -> Iterator[None]:
+    """Collect no garbage meanwhile: a long task's tree is all alive, and to look through it takes most of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _assigned(body: list[ast.stmt]) -> frozenset[str]:
+    """Return the names that statements set."""
+    return frozenset(
+        node.id
+        for part in body
+        for node in ast.walk(part)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    )
+
+
+def _called(emitter: Emitter) -> dict[str, object]:
+    functions: dict[str, object] = dict(OPERATIONS)
+    functions.update({builtin.carry_out.__name__: builtin.carry_out for builtin in BUILTINS.values()})
+    functions.update(HELPERS)
+    return {**HELPERS, **{name: functions[name] for name in sorted(emitter.calls)}}
+
+
+def _local_field(symbol: Symbol) -> Field:
+    if symbol.tuning is not None:
+        return Field(symbol.name, symbol.type, Role.TUNABLE, symbol.tuning.current)
+    return Field(
+        symbol.name,
+        symbol.type,
+        Role.LOCAL,
+        symbol.type.zero,
+        symbol.elements,
+        is_array=bool(symbol.dimensions),
+        dimensions=symbol.dimensions,
+        length=symbol.length,
+    )
+
+
+def _instances(program: Program) -> dict[object, BlockInstance]:
+    instances: dict[object, BlockInstance] = {}
+    occurrences: dict[int, int] = {}
+    for call in _calls(program.scan):
+        bound = program.calls[call.span]
+        occurrence = occurrences.get(bound.line, 0)
+        occurrences[bound.line] = occurrence + 1
+        instances[call.span] = instance_of(bound, block_prefix(bound.line, occurrence), occurrence, program.period_ns)
+    return instances
+
+
+def _calls(statements: tuple[Statement, ...]) -> list[Call]:
+    found: list[Call] = []
+    for statement in statements:
+        if isinstance(statement, Call) and statement.block != "SCAN_LOOP":
+            found.append(statement)
+        elif isinstance(statement, If):
+            found += _calls(statement.then) + _calls(statement.otherwise)
+        elif isinstance(statement, For):
+            found += _calls(statement.body)
+    return found

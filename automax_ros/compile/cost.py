@@ -1,0 +1,119 @@
+"""Modeled execution times of a task on a Processor (section 53).
+
+Blocks, SCAN_LOOP, END and ``!`` remarks have the manual's times; BASIC statements have none there: the table of
+estimates below is ours (decision).
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Time, Times
+from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES
+from automax_ros.core.ticks import NS_PER_US
+from automax_ros.core.types import DataType
+from automax_ros.language.program import BoundCall, Program, Symbol
+from automax_ros.language.syntax.tree import Remark, Statement
+
+
+class Model(enum.Enum):
+    """Whose times count; NONE: everything takes no time."""
+
+    NONE = "none"
+    MODEL_7010 = "57C435"
+    MODEL_6010 = "57C430A"
+    MODEL_6011 = "57C431"
+    UDC = "udc"
+    PC3000 = "pc3000"
+
+
+STATEMENT_ESTIMATES_US = {
+    "Assignment": 6.0,
+    "If": 4.0,
+    "For": 8.0,
+    "Goto": 2.0,
+    "Gosub": 4.0,
+    "Return": 3.0,
+    "OnJump": 5.0,
+    "Read": 6.0,
+    "Restore": 2.0,
+    "Print": 60.0,
+    "IoWrite": 10.0,
+    "ClearErrorLog": 4.0,
+}
+"""Microseconds on a 7010 by kind of statement; others take none (decision: no source prints these times)."""
+SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8, Model.PC3000: 0.7}
+"""Factors for the estimates, from the ratios of tables 4 to 6 (decision)."""
+
+
+@dataclass(frozen=True)
+class CostModel:
+    """Times of one Processor model, in whole nanoseconds."""
+
+    model: Model = Model.NONE
+
+    def block_ns(self, bound: BoundCall) -> int:
+        """Return the time of one block as it is programmed."""
+        time = self._time(bound.block.times)
+        return 0 if time is None else _to_ns(_sum(time, _programmed(bound)))
+
+    def scan_loop_ns(self, program: Program) -> int:
+        """Return the time of SCAN_LOOP, the latch included."""
+        time = self._time(CATALOGUE["SCAN_LOOP"].times)
+        return 0 if time is None else _to_ns(_sum(time, _commons(program.symbols.values())))
+
+    def end_ns(self, program: Program) -> int:
+        """Return the time of END, the write-back included."""
+        time = self._time(END_TIMES)
+        return 0 if time is None else _to_ns(_sum(time, _commons(program.symbols.values())))
+
+    def statement_ns(self, statement: Statement) -> int:
+        """Return the estimated time of a BASIC statement without what stands inside it."""
+        if isinstance(statement, Remark):
+            time = self._time(REMARK_TIMES) if statement.costs else None
+            return 0 if time is None else _to_ns(time.base)
+        if self.model is Model.NONE:
+            return 0
+        estimate = STATEMENT_ESTIMATES_US.get(type(statement).__name__, 0.0)
+        return _to_ns(estimate * SLOWER_THAN_7010.get(self.model, 1.0))
+
+    def _time(self, times: Times) -> Time | None:
+        if self.model is Model.MODEL_7010:
+            return times.model_7010
+        if self.model in (Model.MODEL_6010, Model.MODEL_6011):
+            return times.model_6010
+        if self.model is Model.UDC:
+            return times.udc
+        return times.pc3000 if self.model is Model.PC3000 else None
+
+
+def _to_ns(microseconds: float) -> int:
+    return round(microseconds * NS_PER_US)
+
+
+def _programmed(bound: BoundCall) -> dict[str, int]:
+    """Return the numbers of what is programmed, by the letters of the manual's tables."""
+    block = bound.block
+    outputs = sum(item.name in bound.arguments for item in block.outputs)
+    channels = sum(item.name in bound.arguments and item.name[-1].isdigit() for item in block.inputs)
+    pairs = sum(item.name in bound.arguments and item.name.startswith("INPUT") for item in block.inputs)
+    order = bound.facts.get("order", 0)
+    return {"n": outputs, "j": channels, "k": pairs, "p": pairs, "m": bound.elements, "o": int(order)}
+
+
+def _commons(symbols: Iterable[Symbol]) -> dict[str, int]:
+    kinds = [symbol.type for symbol in symbols if symbol.latched]
+    return {
+        "t": len(kinds),
+        "i": kinds.count(DataType.INTEGER),
+        "b": kinds.count(DataType.BOOLEAN),
+        "d": kinds.count(DataType.DOUBLE),
+    }
+
+
+def _sum(time: Time, counts: dict[str, int]) -> float:
+    total: float = time.base + sum(getattr(time, term) * count for term, count in counts.items())
+    return total

@@ -1,0 +1,57 @@
+"""Lowering of stores: assignment, READ, the steps of FOR (J-3675 chapter 4; semantics, BASIC)."""
+
+from __future__ import annotations
+
+import ast
+
+from automax_ros.compile import build
+from automax_ros.compile.calls import write_element
+from automax_ros.compile.emitter import Emitter
+from automax_ros.compile.expressions import Lowered, clamped
+from automax_ros.compile.folding import value_of
+from automax_ros.compile.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
+from automax_ros.core.numbers import stored_real
+from automax_ros.core.types import DataType
+from automax_ros.language.syntax.tree import Element, Target
+
+_EXACT_IN_REAL = 2**24
+
+
+def store(emitter: Emitter, target: Target, value: Lowered) -> None:
+    """Emit ``target = value`` with the conversion of the types; a clamp is the statement's overflow."""
+    node = converted(emitter, target.name, target.type, value)
+    if isinstance(target, Element):
+        write_element(emitter, target, emitter.keep(node))
+    else:
+        emitter.write(target.name, node)
+
+
+def converted(emitter: Emitter, name: str, kind: DataType, value: Lowered) -> ast.expr:
+    """Return a value as a variable takes it: truncated, clamped, rounded to 24 bits or cut to its length."""
+    if kind is DataType.STRING:
+        length = emitter.symbol(name).length
+        literal = value_of(value.node)
+        if isinstance(literal, str):
+            return build.constant(literal[:length])
+        return ast.Subscript(value.node, ast.Slice(None, build.constant(length), None), ast.Load())
+    if kind is DataType.BOOLEAN:
+        return value.node
+    if kind is DataType.REAL:
+        return _as_real(emitter, value)
+    if value.type is DataType.REAL:
+        value = Lowered(emitter.operation("whole", value.node), DataType.DOUBLE, -(10**18), 10**18)
+    elif value.type is DataType.BOOLEAN:
+        value = Lowered(build.binary(value.node, "+", build.constant(0)), DataType.DOUBLE, 0, 1)
+    return clamped(emitter, value, kind, INTEGER_CLAMPED if kind is DataType.INTEGER else DOUBLE_CLAMPED).node
+
+
+def _as_real(emitter: Emitter, value: Lowered) -> ast.expr:
+    literal = value_of(value.node)
+    if isinstance(literal, (int, float)):
+        return build.constant(stored_real(float(literal))[0])
+    if value.type is not DataType.REAL and value.low >= -_EXACT_IN_REAL and value.high <= _EXACT_IN_REAL:
+        return build.binary(value.node, "+", build.constant(0.0))
+    result, flag = emitter.temporary(), emitter.temporary()
+    emitter.emit(build.assign_all([result, flag], emitter.operation("store_real", value.node)))
+    emitter.emit(build.when(build.name(flag), emitter.note_overflow(build.constant(REAL_CLAMPED))))
+    return build.name(result)

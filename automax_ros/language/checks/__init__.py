@@ -1,0 +1,1 @@
+"""Tree to checked Program: the checker, and one file for each of its rules."""

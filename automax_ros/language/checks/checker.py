@@ -1,0 +1,142 @@
+"""The checker: from the text of a task to a checked Program, or to all that is wrong with it in one pass."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from automax_ros.blocks.declaration import Block, Processor
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
+from automax_ros.core.ticks import DEFAULT_TICK_NS
+from automax_ros.language.checks.broken_lines import broken_lines
+from automax_ros.language.checks.calls import check_call, check_scan_loop, event_name
+from automax_ros.language.checks.context import Context
+from automax_ros.language.checks.declarations import check_declarations, check_storage
+from automax_ros.language.checks.flow import check_flow
+from automax_ros.language.checks.sharing import check_sharing
+from automax_ros.language.checks.statements import check_reads, check_statement, data_pool
+from automax_ros.language.checks.structures import find_structures
+from automax_ros.language.checks.task_layout import TaskLayout, find_layout
+from automax_ros.language.checks.unconfirmed import find_unconfirmed
+from automax_ros.language.program import CommonSpec, Program
+from automax_ros.language.syntax.parser import parse
+from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
+from automax_ros.language.syntax.tree import Call, Declaration, Module, Read, Statement
+
+AUTOMAX = Processor.AUTOMAX
+THERMAL_OVERLOAD = "THERMAL_OVERLOAD"
+_TOO_LARGE, _TOO_MANY = "AMX0001", "AMX0002"
+_NOT_READ = (_TOO_LARGE, _TOO_MANY)
+"""Findings of the parser after which the tree is not the whole task."""
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """What a check found. ``program`` is None if there are errors; ``diagnostics`` are in the order of the text.
+
+    ``unconfirmed`` are the places at which the task uses a form that no source confirms, with what is not confirmed.
+    """
+
+    program: Program | None
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    unconfirmed: list[tuple[Span, str]] = field(default_factory=list)
+
+
+def check(
+    source: SourceText,
+    *,
+    name: str,
+    catalogue: Mapping[str, Block],
+    target: Processor = AUTOMAX,
+    tick_ns: int = DEFAULT_TICK_NS,
+    commons: Mapping[str, CommonSpec] | None = None,
+) -> CheckResult:
+    """Check a control-block task; never raises, whatever the text.
+
+    ``name`` is the task's name, ``catalogue`` the blocks by name, ``tick_ns`` the tick in ns. ``commons`` is what the
+    rack defines, by full name: a COMMON that it lacks or defines otherwise is an error, and so is a write to an input
+    point. None takes the task's declarations as the definition.
+
+    At most DIAGNOSTIC_LIMIT problems are reported, by one more that says so.
+    """
+    module, found = parse(source)
+    if any(item.code in _NOT_READ for item in found):
+        return CheckResult(None, in_order(found))
+    context = Context(
+        target, tick_ns, catalogue, commons, source.lines, broken_lines(source, found), diagnostics=list(found)
+    )
+    layout = None
+    try:
+        layout = _check_module(context, module)
+    except TooManyProblemsError:
+        message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"
+        context.diagnostics.append(Diagnostic(_TOO_MANY, message, context.diagnostics[-1].span, context.line))
+    diagnostics = in_order(context.diagnostics)
+    unconfirmed = find_unconfirmed(module)
+    if layout is None or has_errors(diagnostics):
+        return CheckResult(None, diagnostics, unconfirmed)
+    return CheckResult(_program(context, layout, name, source), diagnostics, unconfirmed)
+
+
+def _check_module(context: Context, module: Module) -> TaskLayout:
+    layout = find_layout(context, module)
+    check_declarations(context, layout)
+    find_structures(context, layout)
+    if layout.scan_loop is not None:
+        context.line = layout.scan_loop_line
+        check_scan_loop(context, layout.scan_loop)
+    reads: list[tuple[Read, int | None]] = []
+    for statement, line, _ in layout.numbered():
+        context.line = line
+        if isinstance(statement, Call):
+            check_call(context, statement)
+        else:
+            check_statement(context, statement)
+            if isinstance(statement, Read):
+                reads.append((statement, line))
+    check_storage(context)
+    check_reads(context, reads)
+    check_flow(context, layout)
+    check_sharing(context, layout)
+    _check_protection(context, layout)
+    return layout
+
+
+def _check_protection(context: Context, layout: TaskLayout) -> None:
+    """Warn of a UDC task without THERMAL_OVERLOAD, which section 36 requires unless hardware protects the motor."""
+    loop = layout.scan_loop
+    if context.target is not Processor.UDC or loop is None or THERMAL_OVERLOAD not in context.catalogue:
+        return
+    calls = {statement.block for statement, _, _ in layout.numbered() if isinstance(statement, Call)}
+    if THERMAL_OVERLOAD not in calls and THERMAL_OVERLOAD not in context.broken.words:
+        context.line = layout.scan_loop_line
+        hint = "it protects the motor, unless a hardware device does (36)"
+        context.report("AMX4097", "the task has no THERMAL_OVERLOAD block", loop.span, hint)
+
+
+def _program(context: Context, layout: TaskLayout, name: str, source: SourceText) -> Program:
+    assert layout.scan_loop is not None
+    assert context.ticks is not None
+    data, data_lines = data_pool(context)
+    return Program(
+        name=name,
+        symbols=context.symbols,
+        startup=_executed(layout.startup),
+        scan=_executed(layout.scan),
+        ticks=context.ticks,
+        tick_ns=context.tick_ns,
+        calls=context.calls,
+        data=data,
+        data_lines=data_lines,
+        events=tuple(context.events.values()),
+        event=event_name(layout.scan_loop),
+        scan_loop_line=layout.scan_loop_line or 0,
+        target=context.target.value,
+        source_hash=hashlib.sha256(source.text.encode("utf-8", "surrogatepass")).hexdigest(),
+    )
+
+
+def _executed(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Return the statements without the declarations."""
+    return tuple(statement for statement in statements if not isinstance(statement, Declaration))

@@ -1,0 +1,200 @@
+"""Checks of LOCAL, COMMON and EVENT: every name once, sizes in bounds, in agreement with the rack (2.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from automax_ros.blocks.declaration import Processor
+from automax_ros.core.diagnostics import Note
+from automax_ros.core.types import (
+    DEFAULT_STRING_LENGTH,
+    MAX_ARRAY_ELEMENTS,
+    MAX_DIMENSIONS,
+    MAX_STRING_LENGTH,
+    MAX_SUBSCRIPT,
+    DataType,
+    bare_name,
+)
+from automax_ros.language.checks.context import Context
+from automax_ros.language.checks.task_layout import TaskLayout
+from automax_ros.language.checks.tunables import tuning_limits
+from automax_ros.language.program import CommonSpec, Symbol
+from automax_ros.language.syntax.tree import Declaration, Declared, Event, Scope
+
+MAX_TASK_ELEMENTS = 4_000_000
+"""Most values that the variables and blocks of a task hold together (decision: a bound on memory for any source)."""
+MAX_TIMEOUT = 32767
+
+
+def check_declarations(context: Context, layout: TaskLayout) -> None:
+    """Fill the context's symbols and events and report what is wrong with their declarations."""
+    top = {id(statement) for statement in (*layout.startup, *layout.scan)}
+    events: list[tuple[Event, int | None]] = []
+    for statement, line, behind in layout.numbered():
+        context.line = line
+        if isinstance(statement, Declaration):
+            _check_place(context, statement, behind, id(statement) in top)
+            for declared in statement.variables:
+                _declare(context, statement.scope, declared)
+        elif isinstance(statement, Event):
+            events.append((statement, line))
+            _declare_event(context, statement, behind)
+    _check_total(context)
+    for event, line in events:
+        context.line = line
+        _check_event(context, event)
+
+
+def _check_place(context: Context, statement: Declaration, behind: bool, top: bool) -> None:
+    if behind:
+        hint = "all variables are declared before the SCAN_LOOP block"
+        context.report("AMX4003", f"{statement.scope.value} stands behind SCAN_LOOP", statement.span, hint)
+    elif not top:
+        hint = "a declaration holds for the whole task and cannot depend on a condition"
+        context.report("AMX4004", f"{statement.scope.value} stands inside an IF or FOR block", statement.span, hint)
+
+
+def _declare(context: Context, scope: Scope, declared: Declared) -> None:
+    name = declared.name
+    earlier = context.symbols.get(name)
+    event = context.events.get(name)
+    if earlier is not None or event is not None:
+        place = earlier.span if earlier is not None else event.span  # type: ignore[union-attr]
+        note = Note(f"{name} is first declared here", place)
+        context.report("AMX4002", f"{name} is declared twice", declared.span, notes=(note,))
+        return
+    symbol = Symbol(
+        name=name,
+        type=declared.type,
+        scope=scope,
+        span=declared.span,
+        dimensions=_dimensions(context, declared),
+        length=_length(context, declared),
+        tuning=tuning_limits(context, scope, declared) if declared.tuning is not None else None,
+    )
+    context.symbols[name] = symbol
+    if scope is Scope.COMMON and context.commons is not None:
+        _compare_with_rack(context, symbol, context.commons)
+
+
+def _dimensions(context: Context, declared: Declared) -> tuple[int, ...]:
+    """Return the numbers of elements; a dimension that is out of bounds counts as large as allowed."""
+    name, subscripts = declared.name, declared.subscripts
+    if len(subscripts) > MAX_DIMENSIONS:
+        context.report(
+            "AMX4006", f"{name} has {len(subscripts)} dimensions, at most {MAX_DIMENSIONS} are allowed", declared.span
+        )
+        subscripts = subscripts[:MAX_DIMENSIONS]
+    elements = 1
+    for subscript in subscripts:
+        elements *= subscript + 1
+        if not 0 <= subscript <= MAX_SUBSCRIPT:
+            message = f"the subscript {subscript} of {name} is not 0 to {MAX_SUBSCRIPT}"
+            context.report("AMX4007", message, declared.span, "a dimension has at most 65535 elements, from 0 on")
+            return tuple(max(0, min(item, MAX_SUBSCRIPT)) + 1 for item in subscripts)
+    if elements > MAX_ARRAY_ELEMENTS:
+        message = f"{name} has {elements} elements, at most {MAX_ARRAY_ELEMENTS} are allowed"
+        context.report("AMX4007", message, declared.span)
+    return tuple(subscript + 1 for subscript in subscripts)
+
+
+def _length(context: Context, declared: Declared) -> int:
+    """Return a string's maximum length, 0 for other types."""
+    if declared.type is not DataType.STRING:
+        if declared.length is not None:
+            context.report("AMX4008", f"{declared.name} is no string and has no length", declared.span)
+        return 0
+    length = DEFAULT_STRING_LENGTH if declared.length is None else declared.length
+    if not 1 <= length <= MAX_STRING_LENGTH:
+        context.report(
+            "AMX4008", f"the length {length} of {declared.name} is not 1 to {MAX_STRING_LENGTH}", declared.span
+        )
+        return DEFAULT_STRING_LENGTH
+    return length
+
+
+def check_storage(context: Context) -> None:
+    """Report the block whose samples or data structure make the task's data too large (25, 30, 31)."""
+    total = sum(min(symbol.elements, MAX_ARRAY_ELEMENTS) for symbol in context.symbols.values())
+    if total > MAX_TASK_ELEMENTS:
+        return
+    for call in context.calls.values():
+        facts = call.facts
+        total += sum(state.size(facts) for state in call.block.states if state.size is not None)
+        if total > MAX_TASK_ELEMENTS:
+            context.line = call.line
+            message = (
+                f"with this {call.block.name} the task's variables and blocks hold more than {MAX_TASK_ELEMENTS} values"
+            )
+            context.report("AMX4009", message, call.call.span)
+            return
+
+
+def _check_total(context: Context) -> None:
+    """Report the variable that makes the task's data too large."""
+    total = 0
+    for symbol in context.symbols.values():
+        total += min(symbol.elements, MAX_ARRAY_ELEMENTS)
+        if total > MAX_TASK_ELEMENTS:
+            context.line = None
+            message = f"with {symbol.name} the task's variables hold more than {MAX_TASK_ELEMENTS} values"
+            context.report("AMX4009", message, symbol.span)
+            return
+
+
+def _compare_with_rack(context: Context, symbol: Symbol, commons: Mapping[str, CommonSpec]) -> None:
+    """Report a COMMON that the rack lacks or defines otherwise: the hardware's E0."""
+    spec = commons.get(symbol.name)
+    if spec is None:
+        twins = [item for name, item in sorted(commons.items()) if bare_name(name) == bare_name(symbol.name)]
+        if twins:
+            message = (
+                f"{symbol.name} is {symbol.type.word} here, {twins[0].name} at {twins[0].place} is {twins[0].type.word}"
+            )
+            context.report("AMX4011", message, symbol.span)
+        else:
+            hint = context.suggest.hint(symbol.name, commons)
+            context.report("AMX4010", f"the rack does not define the common {symbol.name}", symbol.span, hint)
+    elif spec.dimensions != symbol.dimensions:
+        message = f"{symbol.name} is {_shape(symbol.dimensions)} here, {_shape(spec.dimensions)} at {spec.place}"
+        context.report("AMX4011", message, symbol.span)
+    elif spec.length and spec.length != symbol.length:
+        message = f"{symbol.name} has the length {symbol.length} here, {spec.length} at {spec.place}"
+        context.report("AMX4011", message, symbol.span)
+
+
+def _shape(dimensions: tuple[int, ...]) -> str:
+    return f"an array ({','.join(str(size - 1) for size in dimensions)})" if dimensions else "a simple variable"
+
+
+def _declare_event(context: Context, event: Event, behind: bool) -> None:
+    if behind:
+        context.report("AMX4064", f"the event {event.name} is declared behind SCAN_LOOP", event.span)
+    earlier = context.events.get(event.name) or context.symbols.get(event.name)
+    if earlier is not None:
+        note = Note(f"{event.name} is first declared here", earlier.span)
+        context.report("AMX4002", f"{event.name} is declared twice", event.span, notes=(note,))
+        return
+    context.events[event.name] = event
+
+
+def _check_event(context: Context, event: Event) -> None:
+    if context.target is Processor.UDC:
+        context.report("AMX4027", "EVENT cannot be used in a UDC task", event.span)
+        return
+    if event.interrupt_status is None:
+        return
+    if context.target is Processor.PC3000:
+        context.report("AMX4027", "a PC3000 task has no hardware events", event.span)
+        return
+    variable = event.interrupt_status
+    symbol = context.symbols.get(variable.name)
+    if symbol is None:
+        if not context.broken.may_declare(variable.name):
+            hint = context.suggest.hint(variable.name, context.symbols)
+            context.report("AMX4001", f"{variable.name} is not declared", variable.span, hint)
+    elif symbol.scope is not Scope.COMMON or symbol.type is not DataType.INTEGER or symbol.dimensions:
+        message = f"{variable.name} must be a simple common INTEGER: the interrupt status register of a module"
+        context.report("AMX4062", message, variable.span)
+    if event.timeout is not None and not 1 <= event.timeout <= MAX_TIMEOUT:
+        context.report("AMX4063", f"TIMEOUT = {event.timeout} is not 1 to {MAX_TIMEOUT}", event.span)

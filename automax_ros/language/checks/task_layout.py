@@ -1,0 +1,139 @@
+"""Where the parts of a task lie: what stands before SCAN_LOOP, SCAN_LOOP itself, and the scan up to END (section 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.language.checks.context import Context
+from automax_ros.language.syntax.tree import Call, End, Label, Module, Remark, Statement
+from automax_ros.language.syntax.walk import bodies, statements_in_order
+
+SCAN_LOOP = "SCAN_LOOP"
+
+
+@dataclass(frozen=True)
+class TaskLayout:
+    """The parts of a task. Without a SCAN_LOOP everything counts as scan, so that it is checked as such."""
+
+    startup: tuple[Statement, ...]
+    scan_loop: Call | None
+    scan: tuple[Statement, ...]
+    scan_loop_line: int | None = None
+
+    def numbered(self) -> Iterator[tuple[Statement, int | None, bool]]:
+        """Yield every statement but SCAN_LOOP with the line number in force, and whether it stands behind SCAN_LOOP."""
+        for statement, line in statements_in_order(self.startup):
+            yield statement, line, False
+        for statement, line in statements_in_order(self.scan, self.scan_loop_line):
+            yield statement, line, self.scan_loop is not None
+
+
+def find_layout(context: Context, module: Module) -> TaskLayout:
+    """Split a task at its SCAN_LOOP and report what is wrong with SCAN_LOOP and END."""
+    loops = [
+        (statement, line)
+        for statement, line in statements_in_order(module.statements)
+        if isinstance(statement, Call) and statement.block == SCAN_LOOP
+    ]
+    _check_scan_loops(context, module, loops)
+    layout = _split(module, loops)
+    _check_blocks_before(context, layout)
+    _check_ends(context, module, layout)
+    return layout
+
+
+def _split(module: Module, loops: list[tuple[Call, int | None]]) -> TaskLayout:
+    statements = module.statements
+    if not loops:
+        return TaskLayout((), None, statements)
+    call, line = loops[0]
+    at = next(index for index, item in enumerate(statements) if _contains(item, call))
+    return TaskLayout(statements[:at], call, statements[at + 1 :], line)
+
+
+def _contains(statement: Statement, wanted: Call) -> bool:
+    return any(inner is wanted for inner, _ in statements_in_order((statement,)))
+
+
+def _check_scan_loops(context: Context, module: Module, loops: list[tuple[Call, int | None]]) -> None:
+    if not loops:
+        if SCAN_LOOP not in context.broken.words:
+            context.line = None
+            context.report(
+                "AMX4040",
+                "the task has no SCAN_LOOP block",
+                _end_of_text(module),
+                "every Control Block task needs CALL SCAN_LOOP(TICKS=n) behind its declarations",
+            )
+        return
+    first, _ = loops[0]
+    top = {id(statement) for statement in module.statements}
+    for call, line in loops:
+        context.line = line
+        if call is not first:
+            note = Note("the first SCAN_LOOP is here", first.span)
+            context.report("AMX4041", "a task has only one SCAN_LOOP", call.span, notes=(note,))
+        elif id(call) not in top and not context.broken.blocks:
+            context.report("AMX4043", "SCAN_LOOP stands inside an IF or FOR block", call.span)
+
+
+def _check_blocks_before(context: Context, layout: TaskLayout) -> None:
+    if layout.scan_loop is None:
+        return
+    for statement, line in statements_in_order(layout.startup):
+        if isinstance(statement, Call):
+            context.line = line
+            note = Note("SCAN_LOOP is here", layout.scan_loop.span)
+            message = f"{statement.block} is called before SCAN_LOOP, which must be the first block"
+            context.report("AMX4042", message, statement.span, "move the block behind SCAN_LOOP", (note,))
+
+
+def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
+    for statement, line in statements_in_order(layout.startup):
+        if isinstance(statement, End):
+            context.line = line
+            context.report(
+                "AMX4046",
+                "END stands before SCAN_LOOP",
+                statement.span,
+                "END marks the end of the scan; STOP ends a task",
+            )
+    if context.broken.blocks and isinstance(_last(module), End):
+        return
+    at = next((index for index, item in enumerate(layout.scan) if isinstance(item, End)), None)
+    if at is None:
+        if "END" not in context.broken.words and not any(isinstance(item, End) for item in layout.startup):
+            context.line = None
+            context.report(
+                "AMX4044",
+                "the task has no END",
+                _end_of_text(module),
+                "the last statement of a task is END: it marks the end of the scan",
+            )
+        return
+    following = [item for item in layout.scan[at + 1 :] if not isinstance(item, (Remark, Label))]
+    if following:
+        context.line = following[0].number
+        context.report(
+            "AMX4045",
+            "nothing may follow END",
+            following[0].span,
+            "END is the last statement; subroutines stand before it, and IF ... THEN END ends a scan early",
+            (Note("END is here", layout.scan[at].span),),
+        )
+
+
+def _end_of_text(module: Module) -> Span:
+    """Return the place of the last statement, the first line of an empty text."""
+    last = _last(module)
+    return Span(1, 1, 2) if last is None else last.span
+
+
+def _last(module: Module) -> Statement | None:
+    """Return the last statement of the text, which may stand inside a block."""
+    last = module.statements[-1] if module.statements else None
+    while last is not None and any(bodies(last)):
+        last = [body for body in bodies(last) if body][-1][-1]
+    return last

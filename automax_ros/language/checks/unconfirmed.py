@@ -1,0 +1,33 @@
+"""Finds the forms of a task that no source confirms, so that ``automax check --json`` can mark them."""
+
+from __future__ import annotations
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.language.syntax.tree import Declaration, Expression, FunctionCall, IoWrite, Module, Statement
+from automax_ros.language.syntax.unconfirmed import UNCONFIRMED_FUNCTIONS, UNCONFIRMED_STATEMENTS
+from automax_ros.language.syntax.walk import arguments_of, expressions_of, parts, statements_in_order
+
+
+def find_unconfirmed(module: Module) -> list[tuple[Span, str]]:
+    """Return the places of unconfirmed forms in the order of the text, each with what is not confirmed of it."""
+    found: list[tuple[Span, str]] = []
+    for statement, _ in statements_in_order(module.statements):
+        found += _of_statement(statement)
+        arguments = tuple(argument.value for argument in arguments_of(statement))
+        for expression in (*expressions_of(statement), *arguments):
+            found += _of_expression(expression)
+    return found
+
+
+def _of_statement(statement: Statement) -> list[tuple[Span, str]]:
+    if isinstance(statement, IoWrite):
+        return [(statement.span, UNCONFIRMED_STATEMENTS["IOWRITE"])]
+    if isinstance(statement, Declaration):
+        tunings = [item.tuning for item in statement.variables if item.tuning is not None]
+        return [(tuning.span, UNCONFIRMED_STATEMENTS["TUNABLE"]) for tuning in tunings]
+    return []
+
+
+def _of_expression(expression: Expression) -> list[tuple[Span, str]]:
+    calls = [part for part in parts(expression) if isinstance(part, FunctionCall)]
+    return [(call.span, UNCONFIRMED_FUNCTIONS[call.name]) for call in calls if call.name in UNCONFIRMED_FUNCTIONS]

@@ -1,0 +1,22 @@
+"""Forms of the language that no source confirms: their spelling or meaning is a decision of the emulator.
+
+``automax check --json`` marks what it says about them, so that a user of a real rack knows where to be careful.
+"""
+
+from __future__ import annotations
+
+from automax_ros.language.syntax.functions import FUNCTIONS
+
+UNCONFIRMED_STATEMENTS: dict[str, str] = {
+    "IOWRITE": "IOWRITE slot, register, value: the name and the order of the operands",
+    "TUNABLE": "LOCAL NAME [CURRENT=..., HIGH=..., LOW=..., STEP=...]: the bracket and its keys",
+}
+"""Statements and parts of statements, with what is not confirmed of them."""
+
+UNCONFIRMED_FUNCTIONS: dict[str, str] = {
+    name: f"{name}: the name and its arguments" for name, function in FUNCTIONS.items() if function.unconfirmed
+}
+"""Functions, with what is not confirmed of them."""
+
+UNCONFIRMED: dict[str, str] = {**UNCONFIRMED_STATEMENTS, **UNCONFIRMED_FUNCTIONS}
+"""All of them."""

@@ -1,0 +1,294 @@
+"""Replay: executes every recorded scan again and compares, with the recorded sources or with edited ones.
+
+It is an open loop. Each task gets the inputs that were recorded, whatever the other tasks do in the replay; only what a
+task wrote itself it finds again as it wrote it. Nothing is needed but the recording, and nothing of ROS.
+
+report = replay(Path("out"), {"SPEED": read_task_source(Path("new/SPEED.BLK"))})
+report.identical
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.reader import BagMessage, BagReader
+from automax_ros.bags.span import require_scans
+from automax_ros.core.diagnostics import Diagnostic, SourceText
+from automax_ros.replay.compare import Tallies
+from automax_ros.replay.inputs import RecordedCommons
+from automax_ros.replay.report import ReplayReport
+from automax_ros.replay.stored_rack import ReplaySource, StoredRack, stored_rack
+from automax_ros.replay.task import TaskReplay
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable, WriterKind
+
+DEFAULT_MAX_DIFFERENCES = 50
+"""Things that differ which a report tells in full (decision)."""
+_TYPES = frozenset(
+    f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "Scan", "TaskState", "VariableTable")
+)
+_STATES = frozenset({"automax_msgs/msg/TaskState", "automax_msgs/msg/VariableTable"})
+
+Watcher = Callable[[TaskReplay, Scan], None]
+"""Is told of each scan that was executed again, behind it."""
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """What to replay: tasks (``only``, None: all), the range in ns since the start of the run, both ends included.
+
+    Numbers that differ by at most ``tolerance`` count as equal; ``max_differences`` are told in full.
+    """
+
+    only: tuple[str, ...] | None = None
+    tolerance: float = 0.0
+    from_ns: int = 0
+    to_ns: int | None = None
+    max_differences: int = DEFAULT_MAX_DIFFERENCES
+
+
+def replay(
+    bag: Path,
+    new: Mapping[str, SourceText] | None = None,
+    options: ReplayOptions | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> ReplayReport:
+    """Replay a recording; ``new`` are sources that run in place of the recorded ones, by the name of their task.
+
+    ``on_progress`` is called now and then with the share that is done, 0 to 1. Memory does not grow with the recording.
+
+    Raises:
+        BagError: the recording cannot be read, or does not hold what the replay needs.
+        SourceRefused: a source has errors.
+    """
+    return Replay(bag, new or {}, options or ReplayOptions()).run(on_progress)
+
+
+class Replay:
+    """One recording, ready to be executed again any number of times."""
+
+    def __init__(self, bag: Path, new: Mapping[str, SourceText], options: ReplayOptions) -> None:
+        """Check and compile the tasks.
+
+        Raises:
+            BagError: the recording cannot be read, or lacks a task or its source.
+            SourceRefused: a source has errors.
+        """
+        self.options = options
+        self.rack: StoredRack = stored_rack(bag, BagReader(bag).files)
+        names = self.rack.task_names
+        self.rack.require_tasks(options.only or ())
+        chosen = [name for name in names if options.only is None or name in options.only]
+        self.sources: list[ReplaySource] = self.rack.replay_sources(chosen, new)
+        self._bag = bag
+
+    @property
+    def warnings(self) -> list[tuple[SourceText, list[Diagnostic]]]:
+        """What the check of the new sources found, short of errors."""
+        return [(item.source, list(item.warnings)) for item in self.sources if item.edited and item.warnings]
+
+    def run(
+        self,
+        on_progress: Callable[[float], None] | None = None,
+        watcher: Watcher | None = None,
+        to_ns: int | None = None,
+    ) -> ReplayReport:
+        """Execute and compare; ``to_ns`` ends it earlier than the options say.
+
+        Raises:
+            BagError: the recording cannot be read to its end, or does not hold what the replay needs.
+        """
+        reader = BagReader(self._bag)
+        options = self.options if to_ns is None else replace(self.options, to_ns=to_ns)
+        starts: Mapping[str, int] = {}
+        if options.from_ns:
+            starts = _last_states(reader, options.from_ns)
+        reader.on_progress = on_progress
+        run = _Run(self._bag, self.rack, self.sources, options, starts, watcher)
+        run.take_all(reader)
+        doubtful = run.ends_in_doubt()
+        if doubtful:
+            sources = self.rack.replay_sources([task.name for task in doubtful], {})
+            recorded = _Run(self._bag, self.rack, sources, options, starts, None)
+            reader.on_progress = None
+            recorded.take_all(reader)
+            for task in doubtful:
+                task.compare_end(recorded.stopped_in(task.name))
+        return run.report(reader)
+
+
+class _Run:
+    """One pass over a recording."""
+
+    def __init__(
+        self,
+        bag: Path,
+        rack: StoredRack,
+        sources: list[ReplaySource],
+        options: ReplayOptions,
+        starts: Mapping[str, int],
+        watcher: Watcher | None,
+    ) -> None:
+        self._bag, self._rack, self._sources, self._options = bag, rack, sources, options
+        self._starts = starts
+        self._watcher = watcher
+        self._commons = RecordedCommons(bag, rack.config.variables)
+        self._all_tasks = frozenset(rack.task_names)
+        self._table: VariableTable | None = None
+        self._tallies = Tallies(0, options.max_differences)
+        self._tasks: dict[str, TaskReplay] = {}
+        self._writers: dict[int, TaskReplay] = {}
+        self._begin = 0
+        self._end: int | None = None
+        self._first_stamp: int | None = None
+        self._last_stamp = 0
+
+    def take_all(self, reader: BagReader) -> None:
+        """Take the messages of a recording, up to the end of the range."""
+        for entry in reader.messages(types=_TYPES):
+            if not self.take(entry):
+                return
+
+    def ends_in_doubt(self) -> list[TaskReplay]:
+        """Return the edited tasks that may end where the recorded ones do not, or the other way round."""
+        return [task for task in self._tasks.values() if task.end_in_doubt]
+
+    def stopped_in(self, name: str) -> int | None:
+        """Return the last recorded scan of a task, if it stopped in it by itself."""
+        return self._tasks[name].stopped_in
+
+    def take(self, entry: BagMessage) -> bool:
+        """Take one message; return whether there may be more of interest."""
+        message = entry.message
+        table = self._table
+        if table is None and not isinstance(message, VariableTable):
+            hint = "record /<rack>/variables from the start"
+            raise BagError("AMX6820", self._bag, "scans or values stand before the table of variables", hint)
+        if self._first_stamp is None and table is not None:
+            self._first_stamp = entry.stamp
+        if isinstance(message, Scan):
+            return self._take_scan(message)
+        if isinstance(message, CommonWrite):
+            if table is not None and message.run_id == table.run_id:
+                self._take_write(message)
+        elif isinstance(message, VariableTable):
+            self._take_table(message)
+        elif isinstance(message, CommonImage):
+            if table is not None and message.run_id == table.run_id:
+                self._commons.take_image(message)
+        elif isinstance(message, TaskState):
+            if self._end is not None and message.stamp > self._end:
+                return False
+            task = self._task(message.task)
+            if task is not None:
+                task.take_state(message, entry.log_time, counted=message.stamp >= self._begin)
+        return True
+
+    def report(self, reader: BagReader) -> ReplayReport:
+        """Return what was found.
+
+        Raises:
+            BagError: there was nothing to compare.
+        """
+        if self._table is None:
+            hint = (
+                "record the topics /<rack>/variables, /<rack>/backplane/snapshot, /<rack>/backplane and /<rack>/scans"
+            )
+            raise BagError("AMX6820", self._bag, "has no common memory: no table of variables", hint)
+        tasks = tuple(task.report() for task in self._tasks.values())
+        report = ReplayReport(
+            bag=str(self._bag),
+            rack=self._rack.config.name,
+            version=reader.custom_data.get("version", ""),
+            from_s=self._tallies.time_s(max(self._begin, self._first_stamp or 0)),
+            to_s=self._tallies.time_s(max(self._last_stamp, self._begin)),
+            tolerance=self._options.tolerance,
+            tasks=tasks,
+            first=self._tallies.first(),
+            differences=self._tallies.differences(),
+            more=self._tallies.more,
+        )
+        if not report.scans and report.identical and (self._options.from_ns or self._options.to_ns is not None):
+            require_scans(self._bag, tuple(self._tasks), self._options.from_ns, self._options.to_ns)
+        self._require_compared(report)
+        if not report.scans and report.identical:
+            notes = "; ".join(f"{task.name}: {note}" for task in tasks for note in task.notes)
+            what = f"no scan of {', '.join(task.name for task in tasks)[:80]} can be executed again"
+            raise BagError("AMX6832", self._bag, f"{what}{f' ({notes})' if notes else ''}", "see `automax bag info`")
+        return report
+
+    def _require_compared(self, report: ReplayReport) -> None:
+        """Refuse to call a task that was asked for the same when none of its scans was executed."""
+        asked = {*(self._options.only or ()), *(source.name for source in self._sources if source.edited)}
+        for task in report.tasks:
+            if task.name in asked and not task.scans and not task.different:
+                notes = f" ({'; '.join(task.notes)})" if task.notes else ""
+                what = f"no scan of task {task.name} was executed again{notes}"
+                raise BagError("AMX6832", self._bag, what, "see `automax bag info`, or choose another range")
+
+    def _take_table(self, table: VariableTable) -> None:
+        if self._table is not None:
+            if (table.rack, table.run_id) != (self._table.rack, self._table.run_id):
+                raise BagError("AMX6822", self._bag, "holds more than one run")
+            return
+        self._rack.check_table(table)
+        self._table = table
+        self._tallies.origin = table.stamp
+        self._begin = table.stamp + self._options.from_ns
+        self._end = None if self._options.to_ns is None else table.stamp + self._options.to_ns
+        self._last_stamp = table.stamp
+        writers = {writer.name: writer.id for writer in table.writers if writer.kind == WriterKind.TASK}
+        for source in self._sources:
+            task = TaskReplay(
+                self._bag,
+                source,
+                self._commons,
+                self._tallies,
+                tolerance=self._options.tolerance,
+                starts_at=self._starts.get(source.name),
+            )
+            self._tasks[source.name] = task
+            if source.name in writers:
+                self._writers[writers[source.name]] = task
+
+    def _take_scan(self, scan: Scan) -> bool:
+        if self._end is not None and scan.stamp > self._end:
+            return False
+        task = self._task(scan.task)
+        if task is not None:
+            self._last_stamp = scan.stamp
+            executed = task.take_scan(scan, counted=scan.stamp >= self._begin)
+            if executed and self._watcher is not None:
+                self._watcher(task, scan)
+        return True
+
+    def _take_write(self, write: CommonWrite) -> None:
+        entries = self._commons.take_write(write)
+        for task in self._tasks.values():
+            if task.memory.apart and self._writers.get(write.writer) is not task:
+                task.memory.overwritten(entries)
+
+    def _task(self, name: str) -> TaskReplay | None:
+        task = self._tasks.get(name)
+        if task is None and name not in self._all_tasks:
+            raise BagError(
+                "AMX6831", self._bag, f"has scans of a task {name[:40]!r}, which its rack.yaml does not have"
+            )
+        return task
+
+
+def _last_states(reader: BagReader, from_ns: int) -> dict[str, int]:
+    """Return the log time of each task's last state that is earlier than ``from_ns`` since the start of the run."""
+    found: dict[str, int] = {}
+    latest: int | None = None
+    for entry in reader.messages(types=_STATES):
+        message = entry.message
+        if isinstance(message, VariableTable):
+            latest = message.stamp + from_ns if latest is None else latest
+        elif isinstance(message, TaskState) and latest is not None:
+            if message.stamp >= latest:  # a state of that very instant may contain the scan of the instant
+                break
+            found[message.task] = entry.log_time
+    return found

@@ -1,0 +1,328 @@
+"""What a recorded scan saw: common memory as the write log tells it, and the four memory operations of one scan on it.
+
+In the log a scan stands before the writes that it caused, so common memory as rebuilt so far is what the scan saw.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from automax_ros.bags.errors import BagError
+from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, REAL_MAX
+from automax_ros.core.types import DataType, Latched, Value
+from automax_ros.rack.config import CommonVariable
+from automax_ros.running.memory import CommonMemory, LatchPlan, WriteKind
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, Values
+
+Key = tuple[int, int]
+"""A value of common memory: number of the variable, flat index of the element."""
+Entry = tuple[int, int, Value]
+"""Variable, element, value."""
+
+_RANGES: dict[DataType, tuple[float, float]] = {
+    DataType.INTEGER: (INT16_MIN, INT16_MAX),
+    DataType.DOUBLE: (INT32_MIN, INT32_MAX),
+    DataType.REAL: (-REAL_MAX, REAL_MAX),
+    DataType.BOOLEAN: (0, 1),
+    DataType.STRING: (0, 0),
+}
+_DOUBLE = struct.Struct("<d")
+
+
+class UnknownValue(Exception):
+    """A scan asked for a value that the recording has not told; ``key`` says which."""
+
+    def __init__(self, key: Key) -> None:
+        super().__init__(key)
+        self.key = key
+
+
+def same_bits(one: Value, other: Value) -> bool:
+    """Whether two values are the same to the last bit: -0.0 is not 0.0, and NaN is NaN."""
+    if isinstance(one, float) and isinstance(other, float):
+        return (one == other and one != 0.0) or _DOUBLE.pack(one) == _DOUBLE.pack(other)
+    return one == other and type(one) is type(other)
+
+
+class RecordedCommons:
+    """All of common memory as the recording has told it so far.
+
+    ``gaps`` counts places where writes are missing; behind one nothing is known until the next image.
+    """
+
+    def __init__(self, bag: Path, variables: Sequence[CommonVariable]) -> None:
+        self.variables = tuple(variables)
+        self.gaps = 0
+        self._bag = bag
+        self._sequence: int | None = None
+        self._kinds = [(item.type, _RANGES[item.type], item.elements) for item in variables]
+        self._start: list[int] = []
+        size = 0
+        for item in variables:
+            self._start.append(size)
+            size += item.elements
+        self._cells: list[Value | None] = [None] * size
+
+    def entries(self, values: Values, stamp: int) -> list[Entry]:
+        """Return the entries of a message, each in its variable's own type.
+
+        Raises:
+            BagError: they do not fit the variables of the rack.
+        """
+        if not values.variable:
+            return []
+        texts = iter(values.text)
+        found: list[Entry] = []
+        kinds = self._kinds
+        try:
+            for view, element, number in zip(values.variable, values.element, values.value, strict=True):
+                kind, limits, elements = kinds[view]
+                if element >= elements:
+                    raise ValueError(f"{self.variables[view].name} has no element {element}")
+                if kind is DataType.STRING:
+                    found.append((view, element, next(texts)))
+                elif not limits[0] <= number <= limits[1]:
+                    raise ValueError(f"{self.variables[view].name} cannot be {number!r}")
+                elif kind is DataType.REAL:
+                    found.append((view, element, number))
+                elif number == int(number):
+                    found.append((view, element, bool(number) if kind is DataType.BOOLEAN else int(number)))
+                else:
+                    raise ValueError(f"{self.variables[view].name} cannot be {number!r}")
+        except (ValueError, IndexError, StopIteration) as error:
+            reason = str(error) or "a string variable without its text"
+            raise BagError(
+                "AMX6813", self._bag, f"wrong values at {seconds_text(max(stamp, 0))} s: {reason}"
+            ) from error
+        return found
+
+    def take_image(self, image: CommonImage) -> None:
+        """Take all of memory over.
+
+        Raises:
+            BagError: it does not fit the variables of the rack.
+        """
+        if self._sequence is None or image.sequence >= self._sequence:
+            self._sequence = image.sequence
+            self._put(self.entries(image.values, image.stamp))
+
+    def take_write(self, write: CommonWrite) -> list[Entry]:
+        """Take one message of the write log over; return its entries, none if they were known already.
+
+        Raises:
+            BagError: it does not fit the variables of the rack.
+        """
+        if self._sequence is not None:
+            if write.sequence <= self._sequence:
+                return []
+            if write.sequence > self._sequence + 1:
+                self.gaps += 1
+                self._cells = [None] * len(self._cells)
+        self._sequence = write.sequence
+        entries = self.entries(write.values, write.stamp)
+        self._put(entries)
+        return entries
+
+    def value(self, key: Key) -> Value:
+        """Return a value as it is now.
+
+        Raises:
+            UnknownValue: the recording has not told it.
+        """
+        value = self._cells[self._start[key[0]] + key[1]]
+        if value is None:
+            raise UnknownValue(key)
+        return value
+
+    def _put(self, entries: Iterable[Entry]) -> None:
+        cells, start = self._cells, self._start
+        for view, element, value in entries:
+            cells[start[view] + element] = value
+
+
+class ScanMemory(CommonMemory):
+    """Common memory as one task's recorded scans saw it; what the task does to it is kept apart.
+
+    A scan reads what it wrote itself, in this scan or an earlier one as long as nobody else has written there since. As
+    long as it reads and writes in the recorded order, its other reads are the recorded ones; but where the recorded
+    scan wrote the variable itself, an edited one, which may not have done so, reads the memory of the recording.
+
+    ``apart`` are the values that the task's own writes left different from the recorded ones.
+    """
+
+    def __init__(self, commons: RecordedCommons, *, edited: bool = False) -> None:
+        """Take the memory of the recording; ``edited``: another source runs than the recorded one."""
+        super().__init__([])
+        self._edited = edited
+        self.apart: dict[Key, Value] = {}
+        self._commons = commons
+        self._index = {variable.name: view for view, variable in enumerate(commons.variables)}
+        self._views: tuple[int, ...] = ()
+        self._positions: dict[int, int] = {}
+        self._recorded: list[Value] = []
+        self._untold: set[int] = set()
+        self._in_step = False
+        self._reads: list[Entry] = []
+        self._read_count = 0
+        self._writes: list[Entry] = []
+        self._rewritten: frozenset[Key] = frozenset()
+        self._write_count = 0
+        self._committed: list[Entry] = []
+        self._own: dict[Key, Value] = {}
+
+    def plan(self, views: Sequence[int]) -> LatchPlan:
+        """Remember what the task latches."""
+        self._views = tuple(views)
+        self._positions = {view: position for position, view in enumerate(self._views)}
+        self._recorded = [0] * len(self._views)
+        self.forget_latch()
+        return super().plan(views)
+
+    def forget_latch(self) -> None:
+        """Scans are missing: what the task latched last is not known any more."""
+        self._untold = set(range(len(self._views)))
+
+    def follow(self, scan: Scan) -> None:
+        """Take over what a scan latched anew; to be called for each scan, executed or not.
+
+        Raises:
+            BagError: the scan does not fit the variables of the rack.
+        """
+        if not scan.scan:
+            return
+        if scan.full:
+            self.forget_latch()
+        for view, _, value in self._commons.entries(scan.latched, scan.stamp):
+            position = self._positions.get(view)
+            if position is not None:
+                self._recorded[position] = value
+                self._untold.discard(position)
+
+    def begin(self, scan: Scan) -> None:
+        """Prepare for the execution of a scan that ``follow`` was told of.
+
+        Raises:
+            BagError: the scan does not fit the variables of the rack.
+        """
+        commons = self._commons
+        self._reads = commons.entries(scan.read, scan.stamp)
+        self._writes = commons.entries(scan.written, scan.stamp)
+        self._committed = commons.entries(scan.committed, scan.stamp)
+        self._rewritten = frozenset(entry[:2] for entry in self._writes) if self._edited else frozenset()
+        self._read_count = self._write_count = 0
+        self._in_step = True
+        self._own.clear()
+
+    def latch(self, plan: LatchPlan) -> Latched:  # noqa: ARG002
+        """Return what the recorded scan latched, and of what only this task latches or has changed, what it sees."""
+        if not self._untold and not self.apart:
+            return tuple(self._recorded)
+        values = list(self._recorded)
+        for position in self._untold:
+            if (self._views[position], 0) not in self.apart:
+                values[position] = self._commons.value((self._views[position], 0))
+        for (view, _), value in self.apart.items():
+            latched_at = self._positions.get(view)
+            if latched_at is not None:
+                values[latched_at] = value
+        return tuple(values)
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Return what the scan sees now."""
+        key = (view, element)
+        number = self._read_count
+        if self._in_step:
+            self._read_count = number + 1
+            self._in_step = number < len(self._reads) and self._reads[number][:2] == key
+        if key in self._own:
+            return self._own[key]
+        if key in self.apart:
+            return self.apart[key]
+        if self._in_step and key not in self._rewritten:
+            return self._reads[number][2]
+        return self._commons.value(key)
+
+    def write_now(
+        self,
+        view: int,
+        value: Value,
+        writer: int,  # noqa: ARG002
+        element: int = 0,
+        kind: WriteKind = WriteKind.BASIC,  # noqa: ARG002
+    ) -> None:
+        """Keep what a BASIC statement writes."""
+        self._own[view, element] = value
+        number = self._write_count
+        self._write_count = number + 1
+        if self._in_step:
+            if number < len(self._writes):
+                recorded = self._writes[number]
+                self._in_step = recorded[0] == view and recorded[1] == element and same_bits(recorded[2], value)
+            else:
+                self._in_step = False
+
+    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:  # noqa: ARG002
+        """Keep what blocks changed."""
+        for view, value in changes:
+            self._own[view, 0] = value
+
+    def finish(self, commits: Sequence[tuple[int, Value]]) -> list[tuple[Key, Value, Value]]:
+        """End a scan; return what differs from the recorded memory now: key, recorded and replayed value.
+
+        Raises:
+            UnknownValue: a value is needed that the recording has not told.
+        """
+        if not self.apart and self.writes_agree and self._commits_agree(commits):
+            return []
+        recorded = {(view, element): value for view, element, value in (*self._writes, *self._committed)}
+        different: list[tuple[Key, Value, Value]] = []
+        for key in sorted({*recorded, *self._own, *self.apart}):
+            before = None if key in recorded else self._commons.value(key)
+            its = recorded[key] if before is None else before
+            if key in self._own:
+                own = self._own[key]
+            elif key in self.apart:
+                own = self.apart[key]
+            else:
+                own = self._commons.value(key)
+            if same_bits(its, own):
+                self.apart.pop(key, None)
+            else:
+                self.apart[key] = own
+                different.append((key, its, own))
+        return different
+
+    @property
+    def writes_agree(self) -> bool:
+        """Whether the scan's BASIC statements wrote just what the recorded ones did, in the same order."""
+        return self._in_step and self._write_count == len(self._writes)
+
+    @property
+    def recorded_writes(self) -> list[Entry]:
+        """What the recorded scan's BASIC statements wrote, in their order."""
+        return self._writes
+
+    def after_recorded(self, key: Key) -> Value:
+        """Return a value as it was behind the recorded scan.
+
+        Raises:
+            UnknownValue: the recording has not told it.
+        """
+        for view, element, value in (*reversed(self._committed), *reversed(self._writes)):
+            if (view, element) == key:
+                return value
+        return self._commons.value(key)
+
+    def overwritten(self, entries: Iterable[Entry]) -> None:
+        """Somebody else has written: what the task wrote there before is gone."""
+        for view, element, _ in entries:
+            self.apart.pop((view, element), None)
+
+    def _commits_agree(self, commits: Sequence[tuple[int, Value]]) -> bool:
+        recorded = self._committed
+        return len(commits) == len(recorded) and all(
+            one[0] == other[0] and one[1] == other[2] for one, other in zip(commits, recorded, strict=True)
+        )

@@ -1,0 +1,197 @@
+"""The rack of a recording, built from nothing but the recording: its YAML file and its sources are stored inside.
+
+What is stored is untrusted: sizes and numbers are bounded, no name from inside becomes a path, no file is touched.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap.records import Attachment
+
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.mcap_file import McapFile
+from automax_ros.compile.compiler import CompiledTask, compile_program
+from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
+from automax_ros.language.program import Program
+from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Scope, Variable
+from automax_ros.language.syntax.walk import statements_in_order
+from automax_ros.rack.config import MAX_PROCESSORS, MAX_TASKS, RackConfig
+from automax_ros.rack.files import MAX_BYTES
+from automax_ros.rack.findings import did_you_mean
+from automax_ros.rack.loader import load_stored
+from automax_ros.rack.tasks_check import check_source, commons_of
+from automax_ros.wire.messages import VariableTable
+from automax_ros.wire.rack_messages import VARIABLE_TYPES
+
+_RACK_FILE = "rack.yaml"
+_SOURCE = re.compile(r"([A-Z][A-Z0-9_]{0,7})\.BLK")
+_MOST_SOURCES = MAX_PROCESSORS * MAX_TASKS
+
+
+class SourceRefused(Exception):
+    """A rack file or a source has errors; ``findings`` are the diagnostics with the texts that they refer to."""
+
+    def __init__(self, findings: Sequence[tuple[SourceText, list[Diagnostic]]]) -> None:
+        super().__init__(", ".join(source.name for source, _ in findings))
+        self.findings = list(findings)
+
+
+@dataclass(frozen=True)
+class ReplaySource:
+    """A task that is executed again.
+
+    ``compiled`` is what runs; ``recorded`` is what ran when the recording was made, None if that cannot be told;
+    ``edited`` tells whether their sources differ.
+    """
+
+    name: str
+    source: SourceText
+    compiled: CompiledTask
+    recorded: CompiledTask | None
+    edited: bool
+    warnings: tuple[Diagnostic, ...] = ()
+
+    @property
+    def written_at(self) -> Mapping[str, tuple[int, ...]]:
+        """The BASIC lines that can write each common."""
+        return lines_that_write(self.compiled.program)
+
+
+@dataclass(frozen=True)
+class StoredRack:
+    """What a recording stores beside its messages."""
+
+    bag: Path
+    config: RackConfig
+    sources: Mapping[str, SourceText]
+
+    @property
+    def task_names(self) -> list[str]:
+        """All tasks of the rack, as its file lists them."""
+        return [task.name for processor in self.config.processors for task in processor.tasks]
+
+    def require_tasks(self, names: Iterable[str]) -> None:
+        """Make sure that the rack has these tasks.
+
+        Raises:
+            BagError: it lacks one.
+        """
+        known = self.task_names
+        for name in names:
+            if name not in known:
+                hint = did_you_mean(name, known) or f"it has {', '.join(known[:8])}"
+                raise BagError("AMX6827", self.bag, f"has no task {name[:40]!r}", hint)
+
+    def replay_sources(self, names: Sequence[str], new: Mapping[str, SourceText]) -> list[ReplaySource]:
+        """Check and compile tasks: the stored source, or the one in ``new``.
+
+        Raises:
+            BagError: a task is not in the recording, or its source.
+            SourceRefused: a source has errors.
+        """
+        self.require_tasks([*names, *new])
+        commons = commons_of(self.config)
+        ticks = {task.name: processor.tick_ns for processor in self.config.processors for task in processor.tasks}
+        views = {variable.name: view for view, variable in enumerate(self.config.variables)}
+        made: list[ReplaySource] = []
+        refused: list[tuple[SourceText, list[Diagnostic]]] = []
+        for name in names:
+            stored = self.sources.get(name)
+            source = new.get(name, stored)
+            if source is None:
+                hint = f"give it with --task {name}=FILE, or leave the task out with --only"
+                raise BagError("AMX6830", self.bag, f"lacks the source of task {name}", hint)
+            result = check_source(source, name, ticks[name], commons)
+            if result.program is None or has_errors(result.diagnostics):
+                refused.append((source, result.diagnostics))
+                continue
+            compiled = compile_program(result.program, views)
+            edited = stored is None or source.text != stored.text
+            recorded: CompiledTask | None = compiled
+            if edited:
+                before = check_source(stored, name, ticks[name], commons).program if stored else None
+                recorded = compile_program(before, views) if before else None
+            made.append(ReplaySource(name, source, compiled, recorded, edited, tuple(result.diagnostics)))
+        if refused:
+            raise SourceRefused(refused)
+        return made
+
+    def check_table(self, table: VariableTable) -> None:
+        """Make sure that the recording numbers its variables as its own rack file does.
+
+        Raises:
+            BagError: it does not.
+        """
+        expected = [
+            (number, item.name, int(VARIABLE_TYPES[item.type]), item.dimensions, item.length)
+            for number, item in enumerate(self.config.variables)
+        ]
+        told = [(item.id, item.name, item.type, tuple(item.dimensions), item.length) for item in table.variables]
+        if told != expected:
+            raise BagError("AMX6831", self.bag, "its table of variables is not that of the rack.yaml stored in it")
+
+
+def stored_rack(bag: Path, files: Sequence[Path]) -> StoredRack:
+    """Read what a recording stores inside; ``files`` are its data files, of which each holds everything.
+
+    Raises:
+        BagError: there is no rack file inside, or it is too large, or the recording cannot be read.
+        SourceRefused: the rack file has errors.
+    """
+    texts: dict[str, str] = {}
+    for file in files:
+        for record in McapFile(file).records(messages=False):
+            if isinstance(record, Attachment):
+                _keep(bag, texts, record)
+        if _RACK_FILE in texts:
+            break
+    if _RACK_FILE not in texts:
+        hint = "`automax run --record` and `automax record` store rack file and sources; `ros2 bag record` does not"
+        raise BagError("AMX6830", bag, "has no rack.yaml inside, so its tasks cannot be executed again", hint)
+    source = SourceText(f"{bag.name}:{_RACK_FILE}", texts.pop(_RACK_FILE))
+    result = load_stored(source, Path(_RACK_FILE))
+    if result.config is None:
+        raise SourceRefused([(source, result.diagnostics)])
+    sources = {name: SourceText(f"{bag.name}:{name}.BLK", text) for name, text in texts.items()}
+    return StoredRack(bag, result.config, sources)
+
+
+def _keep(bag: Path, texts: dict[str, str], record: Attachment) -> None:
+    """Keep the rack file or a task's source; the first of a name counts."""
+    match = _SOURCE.fullmatch(record.name)
+    key = _RACK_FILE if record.name == _RACK_FILE else match[1] if match else None
+    if key is None or key in texts or len(texts) > _MOST_SOURCES:
+        return
+    if len(record.data) > MAX_BYTES:
+        raise BagError("AMX6814", bag, f"{record.name} inside has more than {MAX_BYTES} bytes")
+    texts[key] = record.data.decode("utf-8", "replace")
+
+
+def lines_that_write(program: Program) -> dict[str, tuple[int, ...]]:
+    """Return the BASIC lines that can write each common of a task, in the order of the text."""
+    found: dict[str, list[int]] = {}
+
+    def note(target: Expression | None, line: int | None) -> None:
+        if not isinstance(target, (Variable, Element)) or line is None:
+            return
+        symbol = program.symbols.get(target.name)
+        if symbol is not None and symbol.scope is Scope.COMMON and line not in found.setdefault(symbol.name, []):
+            found[symbol.name].append(line)
+
+    for statement, line in statements_in_order((*program.startup, *program.scan)):
+        if isinstance(statement, Assignment):
+            note(statement.target, line)
+        elif isinstance(statement, For):
+            note(statement.variable, line)
+        elif isinstance(statement, Read):
+            for target in statement.targets:
+                note(target, line)
+        elif isinstance(statement, Call) and statement.span in program.calls:
+            bound = program.calls[statement.span]
+            for output in bound.block.outputs:
+                note(bound.arguments.get(output.name), bound.line)
+    return {name: tuple(lines) for name, lines in found.items()}

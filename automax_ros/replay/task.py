@@ -1,0 +1,395 @@
+"""One task of a recording, executed again scan by scan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from pathlib import Path
+from typing import cast
+
+from automax_ros.bags.errors import BagError
+from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.types import Value
+from automax_ros.rack.config import CommonVariable
+from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
+from automax_ros.replay.inputs import Entry, Key, RecordedCommons, ScanMemory, UnknownValue, same_bits
+from automax_ros.replay.report import Kind, NamedValue, TaskReport, errors_text, value_text
+from automax_ros.replay.state import (
+    fitting_state,
+    state_differences,
+    whole_state,
+)
+from automax_ros.replay.stored_rack import ReplaySource
+from automax_ros.replay.tunables import Tunables
+from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.wire.messages import Scan, TaskState
+
+_MOST_NOTES = 20
+"""Notes that a report has about one task."""
+_MOST_NAMES = 8
+_STOPPED_KEY = "status"
+_QUIET_SCANS = 2
+"""A task that has not scanned for more periods than this does not run any more."""
+
+
+class TaskReplay:
+    """Executes the scans of one task again and hands what differs to the tallies.
+
+    ``starts_at`` is the log time of the TaskState to begin with; None begins with the first that comes, or with the
+    task's start.
+    """
+
+    def __init__(
+        self,
+        bag: Path,
+        source: ReplaySource,
+        commons: RecordedCommons,
+        tallies: Tallies,
+        *,
+        tolerance: float = 0.0,
+        starts_at: int | None = None,
+    ) -> None:
+        self.name = source.name
+        self.memory = ScanMemory(commons, edited=source.edited)
+        self._bag, self._source, self._commons, self._tallies = bag, source, commons, tallies
+        self._tolerance = tolerance
+        self._starts_at = starts_at
+        self._task = Task(source.compiled, self.memory)
+        self._task.record_scans()
+        self._layout = self._task.layout
+        self._layout_hash = self._layout.hash
+        recorded = Task(source.recorded, ScanMemory(commons)) if source.recorded else None
+        self._recorded_layout = recorded.layout if recorded else None
+        self._written_at = source.written_at
+        program = (source.recorded or source.compiled).program
+        self._period_ns: float = math.inf if program.event is not None else program.period_ns
+        self._last: int | None = None
+        self._last_stamp = 0
+        self._recorded_ended = False
+        self._synchronous = False
+        self._stopped_in: int | None = None
+        self._record: ScanRecord | None = None
+        self._compared = self._different = self._states = self._left_out = 0
+        self._notes: dict[str, None] = {}
+        if source.edited:
+            self._note_edit()
+        self._tunables = Tunables(bag, source, self._recorded_layout or self._layout, self._note, self._when)
+
+    def report(self) -> TaskReport:
+        """Return what became of the task."""
+        if self._left_out:
+            scans, them = (f"{self._left_out} scans", "them") if self._left_out > 1 else ("1 scan", "it")
+            self._note(f"{scans} could not be executed again: the state before {them} is not recorded")
+        notes = list(self._notes)
+        if len(notes) > _MOST_NOTES:
+            notes = [*notes[:_MOST_NOTES], f"and {len(notes) - _MOST_NOTES} notes more"]
+        source = self._source.source.name if self._source.edited else "as recorded"
+        return TaskReport(
+            self.name, source, self._source.edited, self._compared, self._different, self._states, tuple(notes)
+        )
+
+    @property
+    def edited(self) -> bool:
+        """Whether another source runs than the recorded one."""
+        return self._source.edited
+
+    @property
+    def stopped_in(self) -> int | None:
+        """The last recorded scan, if the task stopped in it by itself."""
+        return self._stopped_in
+
+    @property
+    def end_in_doubt(self) -> bool:
+        """Whether only one of the recorded task and an edited one seems to have ended behind the last scan.
+
+        The recording does not tell why a task scans no more; its own source, executed again, does.
+        """
+        if not self._source.edited or self._source.recorded is None or not self._synchronous:
+            return False
+        return self._stopped_in is not None or (self._recorded_ended and self._task.status is Status.RUNNING)
+
+    def compare_end(self, recorded_in: int | None) -> None:
+        """Compare the task's end with the recorded source's: the scan in which that stops by itself, None if never."""
+        own_in = self._stopped_in
+        if own_in == recorded_in or self._last is None:
+            return
+        recorded = "runs" if recorded_in is None else "ended by itself"
+        replayed = "runs" if own_in is None else self._end_text()
+        found = [Found(Kind.STATUS, _STOPPED_KEY, recorded, replayed)]
+        scan = (own_in if recorded_in is None else recorded_in) or self._last
+        self._different += self._tallies.scan(self.name, scan, self._last_stamp, found, self._label, self._seen)
+        self._stopped_in = None
+
+    def time_s(self, stamp: int) -> float:
+        """Return the time of a stamp since the start of the run."""
+        return self._tallies.time_s(stamp)
+
+    def take_scan(self, scan: Scan, *, counted: bool) -> bool:
+        """Execute a recorded scan again and compare, or only execute it if it is not ``counted``.
+
+        Returns whether it could be executed.
+
+        Raises:
+            BagError: it does not fit the rack, or needs a value that the recording has not told.
+        """
+        self._follow(scan)
+        if not self._synchronous:
+            self._left_out += counted
+            return False
+        if counted and self.memory.apart and not self._compared:
+            self._note(f"differed before {self._when(scan.stamp)} s already: it ran from the recorded state before it")
+        try:
+            self.memory.begin(scan)
+            record = self._execute(scan)
+            changes = self.memory.finish(record.commits) if record is not None else []
+        except UnknownValue as error:
+            self._lose(scan, error)
+            self._left_out += counted
+            return False
+        if record is None:
+            if counted:
+                self._count_stopped(scan)
+            return False
+        self._record = record
+        if counted:
+            self._compared += 1
+            self._compare(scan, record, changes)
+        return True
+
+    def take_state(self, state: TaskState, log_time: int, *, counted: bool) -> None:
+        """Begin with a recorded state, or compare it with ours; a tunable that was set since is set here too.
+
+        Raises:
+            BagError: it does not fit the task.
+        """
+        if self._starts_at is not None:
+            if log_time != self._starts_at:
+                return
+            self._starts_at = None
+            self._synchronous = False
+        self._require_source(state)
+        last = self._last
+        if last is not None and state.scan < last:
+            return
+        if state.scan == last and state.stamp - self._last_stamp > _QUIET_SCANS * self._period_ns:
+            self._recorded_ended = True
+        if self._synchronous and last is not None and state.scan > last:
+            self._note(f"scans {last + 1} to {state.scan} are missing before {self._when(state.stamp)} s")
+            self._synchronous = False
+            self.memory.forget_latch()
+        if not self._synchronous:
+            self._adopt(state)
+            return
+        self._tunables.set_again(self._task, state)
+        if counted and not self._source.edited and not self._tolerance and state.layout_hash == self._layout_hash:
+            self._compare_state(state)
+
+    def _follow(self, scan: Scan) -> None:
+        """Keep up with the numbers of scans and with what is latched."""
+        if scan.scan == 0:
+            first = self._last is None and self._starts_at is None
+            if self._last:
+                self._note(f"went into RUN again at {self._when(scan.stamp)} s")
+            self._synchronous = self._synchronous or first
+        elif self._last is not None and scan.scan != self._last + 1:
+            self._note(
+                f"scans {self._last + 1} to {scan.scan - 1} are missing before {self._when(scan.stamp)} s; "
+                "it goes on from the next recorded state"
+                if scan.scan > self._last
+                else f"scan {scan.scan} follows on {self._last} at {self._when(scan.stamp)} s"
+            )
+            self._synchronous = False
+            self.memory.forget_latch()
+            self.memory.apart.clear()
+        self._last, self._last_stamp = scan.scan, scan.stamp
+        self._recorded_ended = False
+        self.memory.follow(scan)
+
+    def _execute(self, scan: Scan) -> ScanRecord | None:
+        """Execute a scan; None if the task does not run any more.
+
+        Raises:
+            BagError: with the recorded state it cannot be executed; no task can have come to such a state.
+        """
+        try:
+            if scan.scan == 0:
+                self._stopped_in = None
+                record = self._task.run(scan.stamp)
+            else:
+                self._task.scan_number = scan.scan - 1
+                record = self._task.scan(scan.stamp, scan.skipped)
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+            what = f"scan {scan.scan} of task {self.name} cannot be executed: {error}"
+            hint = "its recorded state is none that the task can have"
+            raise BagError("AMX6813", self._bag, what, hint) from error
+        if record is not None and self._task.status is not Status.RUNNING:
+            self._stopped_in = scan.scan
+        return record
+
+    def _compare(self, scan: Scan, record: ScanRecord, changes: Sequence[tuple[Key, Value, Value]]) -> None:
+        found = [
+            Found(Kind.VARIABLE, key, recorded, own, not within(recorded, own, self._tolerance))
+            for key, recorded, own in changes
+        ]
+        if not self._source.edited and not self.memory.writes_agree and not any(item.counts for item in found):
+            found += self._other_writes(record.writes)
+        if record.errors or scan.errors:
+            found += self._other_errors(scan, record)
+        self._different += self._tallies.scan(self.name, scan.scan, scan.stamp, found, self._label, self._seen)
+
+    def _other_writes(self, writes: Sequence[Entry]) -> list[Found]:
+        """What differs in the order of writes, although every variable ends up the same."""
+        recorded = self.memory.recorded_writes
+        for number in range(max(len(writes), len(recorded))):
+            one = recorded[number] if number < len(recorded) else None
+            other = writes[number] if number < len(writes) else None
+            if one and other and one[:2] == other[:2] and self._same(one[2], other[2]):
+                continue
+            return [Found(Kind.WRITES, "writes", self._write_text(one), self._write_text(other))]
+        return []
+
+    def _same(self, recorded: Value, own: Value) -> bool:
+        return same_bits(recorded, own) or within(recorded, own, self._tolerance)
+
+    def _other_errors(self, scan: Scan, record: ScanRecord) -> list[Found]:
+        """Run-time errors that differ; in an edited task lines do not count."""
+        recorded = [(error.line, error.code) for error in scan.errors]
+        own = list(record.errors)
+        if self._source.edited:
+            recorded, own = sorted((0, code) for _, code in recorded), sorted((0, code) for _, code in own)
+        if recorded == own:
+            return []
+        return [Found(Kind.ERRORS, "errors", errors_text(recorded), errors_text(own))]
+
+    def _compare_state(self, state: TaskState) -> None:
+        self._states += 1
+        found = [
+            Found(Kind.STATE, name, one, other) for name, one, other in state_differences(self._bag, self._task, state)
+        ]
+        self._tallies.states(self.name, state.scan, state.stamp, found, self._label, self._seen)
+        self._different += bool(found)
+
+    def _count_stopped(self, scan: Scan) -> None:
+        """The recorded task goes on where the replayed one has stopped."""
+        if self._stopped_in is None:
+            return
+        reason = self._end_text()
+        self._note(f"stopped in scan {self._stopped_in}, {reason}; the scans behind it are not compared")
+        self._stopped_in = None
+        found = [Found(Kind.STATUS, _STOPPED_KEY, "runs", reason)]
+        self._different += self._tallies.scan(self.name, scan.scan, scan.stamp, found, self._label, self._seen)
+
+    def _end_text(self) -> str:
+        log = self._task.errors
+        fault = log.last.describe() if self._task.status is Status.FAULTED and log.last else None
+        return f"faulted: {fault}" if fault else "ended by STOP"
+
+    def _adopt(self, state: TaskState) -> None:
+        """Go on from a recorded state."""
+        same_layout = not self._source.edited and state.layout_hash == self._layout_hash
+        if same_layout:
+            taken = whole_state(self._bag, self._layout, state)
+        else:
+            fresh = self._tunables.fresh(state)
+            before = self._recorded_layout
+            known = before if before is not None and before.hash == state.layout_hash else None
+            taken = fitting_state(self._bag, self._layout, state, known, fresh)
+            if taken.initial:
+                names = ", ".join(taken.initial[:_MOST_NAMES])
+                rest = f" and {len(taken.initial) - _MOST_NAMES} more" if len(taken.initial) > _MOST_NAMES else ""
+                self._note(f"at {self._when(state.stamp)} s these start at their initial values: {names}{rest}")
+        try:
+            self._task.restore(taken.values)
+        except (ValueError, OverflowError) as error:
+            raise BagError("AMX6813", self._bag, f"wrong state of task {self.name}: {error}") from error
+        self._tunables.know(state)
+        self._task.scan_number = self._last = state.scan
+        self._task.status = Status.RUNNING
+        self._stopped_in = None
+        self.memory.apart.clear()
+        self._synchronous = True
+
+    def _require_source(self, state: TaskState) -> None:
+        """Make sure that the source stored inside is the one that ran."""
+        recorded = self._source.recorded
+        if recorded is not None and state.source_hash != recorded.program.source_hash:
+            raise BagError(
+                "AMX6831", self._bag, f"task {self.name} ran with another source than the {self.name}.BLK stored inside"
+            )
+
+    def _lose(self, scan: Scan, error: UnknownValue) -> None:
+        """A value is missing: behind a gap in the write log the task waits for a state, otherwise that is an error."""
+        variable = self._variable(error.key)
+        if not self._commons.gaps:
+            symbol = self._source.compiled.program.symbols.get(variable.name)
+            place = f"{self._source.source.name}:{symbol.span.line}" if symbol else self._source.source.name
+            raise BagError(
+                "AMX6833",
+                self._bag,
+                f"does not tell {variable.name} before {self._when(scan.stamp)} s; task {self.name} reads it ({place})",
+                "record with `automax`, or with the topics /<rack>/backplane and /<rack>/backplane/snapshot",
+            ) from error
+        self._note(
+            f"at {self._when(scan.stamp)} s {variable.name} is not known: writes are missing in the log; "
+            "it goes on from the next recorded state"
+        )
+        self._synchronous = False
+        self.memory.apart.clear()
+
+    def _note_edit(self) -> None:
+        recorded = self._source.recorded
+        if recorded is None:
+            self._note("what it ran with when it was recorded cannot be compiled here; states are taken over by name")
+            return
+        before, after = recorded.program.period_ns, self._source.compiled.program.period_ns
+        if before != after:
+            self._note(
+                f"its scan period was {before / 1e6:g} ms and is {after / 1e6:g} ms now; "
+                "it is executed at the recorded scans all the same"
+            )
+
+    def _label(self, kind: Kind, key: Hashable) -> Label:
+        if kind is Kind.VARIABLE:
+            variable = self._variable(cast(Key, key))
+            lines = self._written_at.get(variable.name, ())
+            return Label(element_name(variable, cast(Key, key)[1]), variable.unit, lines)
+        words = {Kind.WRITES: "order of writes", Kind.ERRORS: "run-time errors", Kind.STATUS: "running"}
+        return Label(words.get(kind) or f"state {key}")
+
+    def _seen(self) -> Seen:
+        record = self._record
+        if record is None:
+            return Seen()
+        names = self._source.compiled.latched
+        latched = [NamedValue(name, value) for name, value in zip(names, record.latched, strict=False)]
+        reads = [
+            NamedValue(element_name(self._variable((view, element)), element), value)
+            for view, element, value in record.reads[:1000]
+        ]
+        return Seen(tuple(latched), tuple(reads))
+
+    def _write_text(self, entry: Entry | None) -> str:
+        if entry is None:
+            return "no write"
+        return f"{element_name(self._variable(entry[:2]), entry[1])} = {value_text(entry[2])}"
+
+    def _variable(self, key: Key) -> CommonVariable:
+        return self._commons.variables[key[0]]
+
+    def _when(self, stamp: int) -> str:
+        return seconds_text(max(0, stamp - self._tallies.origin))
+
+    def _note(self, text: str) -> None:
+        if len(self._notes) < 10 * _MOST_NOTES:
+            self._notes[text] = None
+
+
+def element_name(variable: CommonVariable, element: int) -> str:
+    """Return the name of a variable, or of an array's element with its subscripts."""
+    if not variable.dimensions:
+        return variable.name
+    subscripts: list[int] = []
+    for size in reversed(variable.dimensions):
+        element, subscript = divmod(element, size)
+        subscripts.append(subscript)
+    return f"{variable.name}({','.join(map(str, reversed(subscripts)))})"

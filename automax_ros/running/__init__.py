@@ -1,0 +1,1 @@
+"""A rack's memory and its running tasks: memory, task, scheduler, error log."""

@@ -1,0 +1,275 @@
+"""The stream of a running rack: every topic's messages as CDR bytes, for the recorder and the nodes alike.
+
+The stream observes the rack and hands each message to its sinks, once encoded. Values of commons go out on change, not
+more often than a variable's rate limit allows; the last value before a pause always goes out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.config import CommonVariable, Direction
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.ros_names import topic_names
+from automax_ros.running.memory import Write
+from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.running.task import ScanRecord, Task
+from automax_ros.wire.cdr import encoder
+from automax_ros.wire.messages import NAMES
+from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
+from automax_ros.wire.rack_messages import Message, RackMessages, message_maker, value_type_name
+from automax_ros.wire.scan_encoding import scan_encoder, write_encoder
+
+SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
+"""How often an image, full latches and the tasks' states enter the stream (decision)."""
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of the stream: full name, ROS type, quality of service; ``slot`` of the module that sends on it.
+
+    Several modules send on one topic: each has a Topic of its own. ``slot`` None is the common memory.
+    """
+
+    name: str
+    type_name: str
+    qos: QosProfile
+    slot: int | None = None
+
+
+Sink = Callable[[Topic, int, bytes], None]
+"""Takes a message: its topic, its stamp in ns, its CDR bytes."""
+
+
+class _ValueTopic:
+    """The topic of one variable, with what its rate limit needs."""
+
+    def __init__(self, variable: CommonVariable, topic: Topic) -> None:
+        self.variable = variable
+        self.topic = topic
+        self.make = message_maker(variable)
+        self.encode = encoder(topic.type_name)
+        self.interval_ns = round(NS_PER_S / variable.rate_limit_hz) if variable.rate_limit_hz else 0
+        self.last_ns = -1
+        self.last_payload = b""
+        self.waits = False
+
+
+class _TaskStream:
+    """What of one task goes where: its scans and states to ``sinks``, a state behind each scan to ``watchers``."""
+
+    def __init__(self, scans: Topic, states: Topic) -> None:
+        self.scans = scans
+        self.states = states
+        self.sinks: list[Sink] = []
+        self.watchers: list[Sink] = []
+        self.next_full_ns = 0
+
+
+class RackStream:
+    """Observes a rack and streams it to ``sinks``. ``run_id`` is that of ``RackMessages``."""
+
+    def __init__(self, rack: Rack, run_id: int) -> None:
+        """Prepare the topics; nothing flows before ``begin``."""
+        space = f"/{rack.config.namespace}"
+        self._rack = rack
+        self._messages = RackMessages(rack, run_id)
+        self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
+        self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
+        self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
+        slots = [processor.slot for processor in rack.processors]
+        self.scans_topics = {slot: Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN, slot) for slot in slots}
+        self.states_topics = {
+            slot: Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN, slot) for slot in slots
+        }
+        self._values = self._value_topics(space)
+        self._sinks: list[Sink] = []
+        self._tasks = {
+            task: _TaskStream(self.scans_topics[task.slot], self.states_topics[task.slot]) for task in rack.tasks
+        }
+        self._encoders = {name: encoder(name) for name in NAMES.values() if name.startswith("automax_msgs/")}
+        self._encode_scan, self._encode_write = scan_encoder(), write_encoder()
+        self._next_image_ns = SNAPSHOT_PERIOD_NS
+        self._begun = False
+
+    @property
+    def topics(self) -> list[Topic]:
+        """All topics of the stream."""
+        fixed = [self.variables_topic, self.snapshot_topic, self.backplane_topic, *self.module_topics]
+        return [*fixed, *(value.topic for value in self._values.values())]
+
+    @property
+    def module_topics(self) -> list[Topic]:
+        """The topics that Processors send on."""
+        return [*self.scans_topics.values(), *self.states_topics.values()]
+
+    def value_topic(self, view: int) -> Topic | None:
+        """Return the topic of a variable by its index in the rack's table, None if it has none."""
+        value = self._values.get(view)
+        return value.topic if value else None
+
+    def add_sink(self, sink: Sink, *, tasks: Collection[str] | None = None, every_state: bool = False) -> None:
+        """Hand every message to a further taker.
+
+        With ``tasks`` it gets scans and states of these alone, with ``every_state`` a state behind each of these scans.
+        """
+        self._sinks.append(sink)
+        for task, stream in self._tasks.items():
+            if tasks is None or task.name in tasks:
+                stream.sinks.append(sink)
+                if every_state:
+                    stream.watchers.append(sink)
+
+    def stamp(self, now_ns: int) -> int:
+        """Return the stamp of an instant of rack time."""
+        return self._messages.stamp(now_ns)
+
+    def begin(self, epoch_ns: int = 0) -> None:
+        """Send the facts that stand at the start, and observe the rack: to be called just before ``Rack.start``.
+
+        ``epoch_ns`` is the wall clock at rack time 0; simulated time has none.
+        """
+        self._messages.epoch_ns = epoch_ns
+        self._put(self.variables_topic, self._messages.stamp(self._rack.now_ns), self._messages.table())
+        self._send_image(self._rack.now_ns)
+        self._send_values(self._values, self._rack.now_ns)
+        self._rack.observe(self)
+        self._begun = True
+
+    def send_image(self) -> None:
+        """Send all of common memory as it is now, for somebody who joins a running rack."""
+        if self._begun:
+            self._send_image(self._rack.now_ns)
+
+    def send_states(self, slot: int) -> None:
+        """Send the states of a Processor's tasks, for somebody who joins; the next scan of each is a full one."""
+        now = self._rack.now_ns
+        for task, stream in self._tasks.items():
+            if self._begun and task.slot == slot:
+                self._send_state(task, now)
+                stream.next_full_ns = now
+
+    def repeat_facts(self, sink: Sink) -> None:
+        """Send one taker what stands now, between two scans: table, image, values of commons, states of its tasks.
+
+        The next scan of each task is a full one. So a recording can begin here, or a further file of one.
+        """
+        now = self._rack.now_ns
+        self._put(self.variables_topic, self._messages.stamp(now), self._messages.table(), [sink])
+        self._send_image(now, [sink])
+        for value in self._values.values():
+            if value.last_payload:
+                sink(value.topic, self._messages.stamp(now), value.last_payload)
+        for task, stream in self._tasks.items():
+            stream.next_full_ns = now
+            if sink in stream.sinks:
+                self._send_state(task, now, [sink])
+
+    def end(self) -> None:
+        """Send what is held back by rate limits and the final states."""
+        now = self._rack.now_ns
+        for view, value in self._values.items():
+            if value.waits:
+                self._send_value(view, value, now)
+        for task in self._rack.tasks:
+            self._send_state(task, now)
+
+    # RackObserver
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+        """Send a scan, its writes and the values that changed; every now and then a snapshot behind them."""
+        stream = self._tasks[task]
+        now = record.time_ns
+        full = now >= stream.next_full_ns and record.scan > 0
+        if stream.sinks:
+            message = self._messages.scan(task, record, full=full)
+            payload = self._encode_scan(message)
+            for sink in stream.sinks:
+                sink(stream.scans, message[0], payload)
+        if writes:
+            self._send_writes(writes, now)
+        if full or not record.scan:
+            self._send_state(task, now)
+        elif stream.watchers:
+            self._send_state(task, now, stream.watchers)
+        if full:
+            stream.next_full_ns = (now // SNAPSHOT_PERIOD_NS + 1) * SNAPSHOT_PERIOD_NS
+            if now >= self._next_image_ns:
+                self._next_image_ns = stream.next_full_ns
+                self._send_image(now)
+
+    def written(self, writes: list[Write]) -> None:
+        """Send writes from outside and the values that changed."""
+        self._send_writes(writes, self._rack.now_ns)
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """Send the task's new state: no scan tells that a tunable was set."""
+        self._send_state(task, now_ns)
+
+    def all_stopped(self, reason: str, now_ns: int) -> None:  # noqa: ARG002
+        """Send the states in which the tasks were stopped."""
+        for task in self._rack.tasks:
+            self._send_state(task, now_ns)
+
+    def _value_topics(self, space: str) -> dict[int, _ValueTopic]:
+        variables = self._rack.config.variables
+        names = topic_names(variable.name for variable in variables)
+        topics = {}
+        for view, variable in enumerate(variables):
+            type_name = value_type_name(variable)
+            if variable.direction is not Direction.CLOSED and type_name is not None:
+                topics[view] = _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
+        return topics
+
+    def _send_state(self, task: Task, now_ns: int, sinks: Sequence[Sink] | None = None) -> None:
+        stream = self._tasks[task]
+        takers = stream.sinks if sinks is None else sinks
+        if takers:
+            message = self._messages.state(task, now_ns)
+            self._put(stream.states, message.stamp, message, takers)
+
+    def _send_image(self, now_ns: int, sinks: Sequence[Sink] | None = None) -> None:
+        self._put(self.snapshot_topic, self._messages.stamp(now_ns), self._messages.image(now_ns), sinks)
+
+    def _send_writes(self, writes: list[Write], now_ns: int) -> None:
+        for message in self._messages.writes(writes):
+            payload = self._encode_write(message)
+            for sink in self._sinks:
+                sink(self.backplane_topic, message[0], payload)
+        self._send_values({entry[4]: None for entry in writes}, now_ns)
+
+    def _send_values(self, views: Iterable[int], now_ns: int) -> None:
+        for view in views:
+            value = self._values.get(view)
+            if value is None:
+                continue
+            due = value.last_ns + value.interval_ns
+            if value.last_ns < 0 or not value.interval_ns or now_ns >= due:
+                self._send_value(view, value, now_ns)
+            elif not value.waits:
+                value.waits = True
+                key = EventKey(EventClass.OBSERVE, 0, value.variable.name)
+                self._rack.scheduler.at(due, key, partial(self._send_late, view, value))
+
+    def _send_late(self, view: int, value: _ValueTopic, now_ns: int) -> None:
+        if value.waits and now_ns >= value.last_ns + value.interval_ns:
+            self._send_value(view, value, now_ns)
+
+    def _send_value(self, view: int, value: _ValueTopic, now_ns: int) -> None:
+        value.waits = False
+        present = self._rack.memory.present(view)
+        # A message of a simple variable has one field: a plain tuple is as good, and cheaper.
+        payload = value.encode(value.make(present) if value.variable.is_array else (present,))
+        if payload != value.last_payload:
+            value.last_ns, value.last_payload = now_ns, payload
+            stamp = self._messages.stamp(now_ns)
+            for sink in self._sinks:
+                sink(value.topic, stamp, payload)
+
+    def _put(self, topic: Topic, stamp: int, message: Message, sinks: Sequence[Sink] | None = None) -> None:
+        payload = self._encoders[topic.type_name](message)
+        for sink in self._sinks if sinks is None else sinks:
+            sink(topic, stamp, payload)

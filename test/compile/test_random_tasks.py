@@ -1,0 +1,172 @@
+"""Random tasks: compiled code against an independent interpreter, and the two forms of a scan against each other."""
+
+from __future__ import annotations
+
+import copy
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from automax_ros.compile.compiler import compile_program
+from automax_ros.core.types import DataType
+from automax_ros.running.memory import CommonMemory
+from automax_ros.running.task import Task
+
+from .interpreter import Interpreter
+from .programs import checked, outside_writes, tasks
+from .support import OTHER, WRITER, repeatable, scan_in_steps, views_of
+
+HISTORY = st.lists(outside_writes(), min_size=3, max_size=3)
+TUNINGS = {"G%", "H"}
+
+
+def installed(program) -> tuple[Task, CommonMemory]:
+    memory = CommonMemory(views_of(program))
+    compiled = compile_program(program, {spec.name: view for view, spec in enumerate(memory.specs)})
+    task = Task(compiled, memory, writer=WRITER)
+    task.record_scans()
+    memory.keep_log()
+    return task, memory
+
+
+def bits(value: object) -> object:
+    """A value with its type; floats by their bits, so that -0.0 is not 0.0."""
+    if isinstance(value, list):
+        return [bits(item) for item in value]
+    return (type(value), value.hex() if isinstance(value, float) else value)
+
+
+def local_values(task: Task, names) -> dict[str, object]:
+    return {name: bits(task.value(name)) for name in names}
+
+
+def written(memory: CommonMemory) -> list[tuple[str, str, int, object]]:
+    entries = [entry for entry in memory.drain() if entry.writer == WRITER]
+    return [(entry.kind.name, memory.specs[entry.view].name, entry.element, bits(entry.value)) for entry in entries]
+
+
+def agree_with_interpreter(text: str, history) -> None:
+    program = checked(text)
+    task, memory = installed(program)
+    model = Interpreter(program)
+    record = task.run(0)
+    model.run()
+    compare(task, memory, model, record)
+    for now, writes in enumerate(history, 1):
+        for name, value in writes.items():
+            memory.write_from_outside(memory.view(name), value, OTHER)
+            model.commons[name] = value
+        record = task.scan(now)
+        model.scan()
+        compare(task, memory, model, record)
+
+
+def compare(task: Task, memory: CommonMemory, model: Interpreter, record) -> None:
+    assert record.errors == model.log
+    assert local_values(task, model.locals) == {name: bits(value) for name, value in model.locals.items()}
+    assert written(memory) == [(kind, name, element, bits(value)) for kind, name, element, value in model.writes]
+    assert list(task.printed) == model.printed
+    model.log.clear()
+    model.writes.clear()
+
+
+def agree_in_both_forms(text: str, history) -> None:
+    program = checked(text)
+    (at_once, memory), (in_steps, other) = installed(program), installed(program)
+    at_once.run(0)
+    in_steps.run(0)
+    for now, writes in enumerate(history, 1):
+        for name, value in writes.items():
+            memory.write_from_outside(memory.view(name), value, OTHER)
+            other.write_from_outside(other.view(name), value, OTHER)
+        record = at_once.scan(now)
+        assert sum(scan_in_steps(in_steps, now)) == 0
+        assert copy.deepcopy(in_steps._io.record) == record
+        assert other.drain() == memory.drain()
+        assert list(map(bits, in_steps.snapshot())) == list(map(bits, at_once.snapshot()))
+        assert (in_steps.printed, in_steps.status) == (at_once.printed, at_once.status)
+
+
+def asking_changes_nothing(text: str, history) -> None:
+    """Between scans the compiled code holds the state: whether anybody looks must make no difference."""
+    program = checked(text)
+    (asked, memory), (left_alone, other) = installed(program), installed(program)
+    left_alone.record_scans(on=False)
+    asked.run(0)
+    left_alone.run(0)
+    for now, writes in enumerate(history * 3, 1):
+        for name, value in writes.items():
+            memory.write_from_outside(memory.view(name), value, OTHER)
+            other.write_from_outside(other.view(name), value, OTHER)
+        asked.scan(now)
+        asked.snapshot()
+        left_alone.scan(now)
+    assert other.drain() == memory.drain()
+    assert list(map(bits, left_alone.snapshot())) == list(map(bits, asked.snapshot()))
+    assert (left_alone.printed, left_alone.status) == (asked.printed, asked.status)
+
+
+@given(tasks(), HISTORY)
+@repeatable(40)
+def test_compiled_tasks_do_what_the_interpreter_does(text, history):
+    agree_with_interpreter(text, history)
+
+
+@given(tasks(), HISTORY)
+@repeatable(25)
+def test_both_forms_of_a_scan_agree(text, history):
+    agree_in_both_forms(text, history)
+
+
+@given(tasks(), HISTORY)
+@repeatable(25)
+def test_asking_for_the_state_changes_nothing(text, history):
+    asking_changes_nothing(text, history)
+
+
+@pytest.mark.soak
+@given(tasks(4), HISTORY)
+@repeatable(3000)
+def test_compiled_tasks_do_what_the_interpreter_does_long(text, history):
+    agree_with_interpreter(text, history)
+
+
+@pytest.mark.soak
+@given(tasks(4), HISTORY)
+@repeatable(1500)
+def test_both_forms_of_a_scan_agree_long(text, history):
+    agree_in_both_forms(text, history)
+
+
+@pytest.mark.soak
+@given(tasks(4), HISTORY)
+@repeatable(1500)
+def test_asking_for_the_state_changes_nothing_long(text, history):
+    asking_changes_nothing(text, history)
+
+
+@given(tasks(), HISTORY, st.integers(0, 2))
+@repeatable(15)
+def test_a_snapshot_goes_on_as_the_task_would_have(text, history, after):
+    program = checked(text)
+    task, memory = installed(program)
+    task.run(0)
+    for now, writes in enumerate(history):
+        if now == after:
+            snapshot, image, number, status = task.snapshot(), memory.image(), task.scan_number, task.status
+        for name, value in writes.items():
+            memory.write_from_outside(memory.view(name), value, OTHER)
+        task.scan(now)
+    twin, twin_memory = installed(program)
+    twin_memory.load_image(image)
+    twin.restore(snapshot)
+    twin.scan_number, twin.status = number, status
+    assert list(map(bits, twin.snapshot())) == list(map(bits, snapshot))
+    for now, writes in list(enumerate(history))[after:]:
+        for name, value in writes.items():
+            twin_memory.write_from_outside(twin_memory.view(name), value, OTHER)
+        twin.scan(now)
+    assert list(map(bits, twin.snapshot())) == list(map(bits, task.snapshot()))
+    assert twin_memory.image() == memory.image()
+    assert {field.type for field in task.layout.fields} <= set(DataType)

@@ -1,0 +1,165 @@
+"""The table of message types against msg_defs, rosbags and the installed ROS packages; parsing of definitions."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from automax_ros.wire import messages
+from automax_ros.wire.definitions import (
+    MAX_SCHEMA_BYTES,
+    TIME,
+    Constant,
+    DefinitionError,
+    Field,
+    message_types,
+    parse_definition,
+    parse_schema,
+    same_layout,
+    schema_text,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+OWN = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"))
+
+
+def generator() -> ModuleType:
+    spec = importlib.util.spec_from_file_location(
+        "generate_message_types", ROOT / "tools" / "generate_message_types.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_table_is_what_the_tool_writes_today() -> None:
+    module = generator()
+    assert module.TARGET.read_text(encoding="utf-8") == module.generate()
+
+
+def test_every_own_definition_stands_in_the_table_word_for_word() -> None:
+    assert OWN
+    for stem in OWN:
+        assert (
+            message_types()[f"automax_msgs/msg/{stem}"].text == (ROOT / "msg_defs" / "msg" / f"{stem}.msg").read_text()
+        )
+
+
+def test_hashes_are_those_of_rosbags_for_jazzy() -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    standard = [name for name in message_types() if not name.startswith("automax_msgs")]
+    assert len(standard) == 13
+    assert {name: message_types()[name].hash for name in standard} == {
+        name: store.hash_rihs01(name) for name in standard
+    }
+
+
+def test_hashes_are_those_of_the_installed_packages() -> None:
+    module = generator()
+    checked = 0
+    for name, kind in message_types().items():
+        path = module.installed_file(name, ".json")
+        if path is not None:
+            hashes = {entry["type_name"]: entry["hash_string"] for entry in json.loads(path.read_text())["type_hashes"]}
+            assert kind.hash == hashes[name]
+            checked += 1
+    assert checked >= 13
+
+
+@pytest.mark.parametrize("name", sorted(messages.CLASSES))
+def test_classes_have_the_fields_of_their_definitions(name: str) -> None:
+    fields = [field.name for field in message_types()[name].definition.fields]
+    assert list(messages.CLASSES[name]._fields) == fields  # type: ignore[attr-defined]
+
+
+def test_only_the_time_has_no_class() -> None:
+    assert set(message_types()) - set(messages.CLASSES) == {TIME}
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("CommonWrite", messages.WriteKind),
+        ("Writer", messages.WriterKind),
+    ],
+)
+def test_enumerations_are_the_constants(name: str, values: type) -> None:
+    constants = message_types()[f"automax_msgs/msg/{name}"].definition.constants
+    assert {item.name: int(item.value) for item in constants} == {item.name: item.value for item in values}  # type: ignore[attr-defined]
+
+
+def test_enumerations_of_variables_are_the_constants() -> None:
+    constants = message_types()["automax_msgs/msg/Variable"].definition.constants
+    both = {item.name: int(item) for kind in (messages.VariableType, messages.Direction) for item in kind}
+    assert {item.name: int(item.value) for item in constants} == both
+
+
+@pytest.mark.parametrize("name", sorted(message_types()))
+def test_schema_is_complete_for_rosbags(name: str) -> None:
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(schema_text(name), name))
+    assert store.hash_rihs01(name) == message_types()[name].hash
+
+
+def test_schema_separates_dependencies_by_80_signs_and_the_short_name() -> None:
+    lines = schema_text("automax_msgs/msg/Scan").splitlines()
+    heads = [lines[index + 1] for index, line in enumerate(lines) if line == "=" * 80]
+    assert heads == ["MSG: builtin_interfaces/Time", "MSG: automax_msgs/Values", "MSG: automax_msgs/ScanError"]
+
+
+def test_definition_with_everything() -> None:
+    definition = parse_definition(
+        "pkg/msg/T",
+        "# remark\n\nint32 A=5\nstring B = 'x # y'\nuint8 plain 7\nstring<=10 name\nfloat64[3] fixed\nint8[<=4] few # r"
+        "\nOther[] others\nstd_msgs/String s\nstd_msgs/msg/Int16 i\n",
+    )
+    assert definition.constants == (Constant("A", "int32", "5"), Constant("B", "string", "'x # y'"))
+    assert definition.fields == (
+        Field("plain", "uint8"),
+        Field("name", "string", bound=10),
+        Field("fixed", "float64", "[3]"),
+        Field("few", "int8", "[<=4]"),
+        Field("others", "pkg/msg/Other", "[]"),
+        Field("s", "std_msgs/msg/String"),
+        Field("i", "std_msgs/msg/Int16"),
+    )
+
+
+@pytest.mark.parametrize("text", ["int32", "int32 5a", "a/b/c/d e", "int32[x] a", "=", "\x00", "string<=x a"])
+def test_what_is_no_definition_is_refused(text: str) -> None:
+    with pytest.raises(DefinitionError):
+        parse_definition("pkg/msg/T", text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "int32 a\n" + "=" * 80 + "\nint32 b",
+        "int32 a\n" + "=" * 80,
+        "=" * 80 + "\nMSG: ???\n",
+        " " * (MAX_SCHEMA_BYTES + 1),
+    ],
+)
+def test_what_is_no_schema_is_refused(text: str) -> None:
+    with pytest.raises(DefinitionError):
+        parse_schema("pkg/msg/T", text)
+
+
+def test_layout_is_compared_without_remarks_and_with_nested_types() -> None:
+    name = "automax_msgs/msg/CommonImage"
+    text = schema_text(name)
+    assert same_layout(name, parse_schema(name, text))
+    assert same_layout(name, parse_schema(name, text.replace("# All of common memory", "# Anything")))
+    assert same_layout(
+        name, parse_schema(name, text.replace("MSG: automax_msgs/Values", "MSG: automax_msgs/msg/Values"))
+    )
+    assert not same_layout(name, parse_schema(name, text.replace("uint32[] element", "uint16[] element")))
+    assert not same_layout(name, parse_schema(name, text.replace("uint64 run_id", "uint64 run")))
+    assert not same_layout(name, parse_schema(name, text.split("=" * 80)[0]))
