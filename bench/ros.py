@@ -1,6 +1,6 @@
 """ROS figures of this machine: jitter of the rack's loop, and latency of a write from another process. Fails on none.
 
-The loop is the one of ``nodes/launcher.py``: served by the executor until the next deadline. Latency is the time from a
+The loop is the rack's own, a ``Pacer`` that lets the executor serve until the next deadline. Latency is the time from a
 client's publish on ``/set`` to the latch that takes the value in, by the clocks of one host.
 """
 
@@ -54,6 +54,7 @@ def loop_jitter(period_ns: int) -> tuple[list[float], int]:
     from rclpy.node import Node
 
     from automax_ros.nodes.executor import make_executor
+    from automax_ros.running.pacer import Pacer
     from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 
     context = Context()
@@ -62,18 +63,15 @@ def loop_jitter(period_ns: int) -> tuple[list[float], int]:
     node = Node("bench_loop", context=context)
     executor.add_node(node)
     scheduler, late, skipped_total = Scheduler(), [], 0
-    zero = time.monotonic_ns()
+    pacer = Pacer(scheduler, wait=lambda seconds: executor.spin_once(timeout_sec=seconds))
 
     def scan(instant_ns: int, skipped: int) -> None:
         nonlocal skipped_total
-        late.append((time.monotonic_ns() - zero - instant_ns) / 1000)
+        late.append((pacer.now_ns - instant_ns) / 1000)
         skipped_total += skipped
 
     scheduler.every(period_ns, period_ns, EventKey(EventClass.SCAN, 4, "T"), scan)
-    while (now := time.monotonic_ns() - zero) < LOOP_SECONDS * 1e9:
-        scheduler.run_due(now)
-        due = scheduler.next_ns or now
-        executor.spin_once(timeout_sec=max(0, due - (time.monotonic_ns() - zero)) / 1e9)
+    pacer.run(round(LOOP_SECONDS * 1e9))
     executor.shutdown()
     node.destroy_node()
     context.try_shutdown()

@@ -16,21 +16,15 @@ from typing import Any
 
 from rclpy.context import Context
 
-from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.rack.rack import Rack
+from automax_ros.running.pacer import START_LEAD_NS, Pacer
 from automax_ros.wire.stream import RackStream
 
-LONGEST_WAIT_NS = 50 * NS_PER_MS
-"""The loop wakes at least this often, so that a signal is answered at once."""
-START_LEAD_NS = 50 * NS_PER_MS
-"""Rack time 0 lies so far ahead of the start, so that presets and start-up parts make no scan miss its deadline."""
-CHORE_PERIOD_NS = 100 * NS_PER_MS
-"""How often the loop calls ``on_idle``."""
 _NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 
 
@@ -49,7 +43,7 @@ class LiveRack:
     _context: Context = field(init=False)
     _executor: Any = field(init=False, default=None)
     _nodes: list[Any] = field(init=False, default_factory=list)
-    _zero_ns: int = field(init=False, default=0)
+    _pacer: Pacer = field(init=False)
     _begun: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
@@ -62,42 +56,23 @@ class LiveRack:
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
         self._executor = make_executor(self._context)
-        self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context, self._catch_up))
+        self._pacer = Pacer(self.rack.scheduler, wait=lambda seconds: self._executor.spin_once(timeout_sec=seconds))
+        self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context, self._pacer.catch_up))
         for processor in self.rack.processors:
-            self._nodes.append(ProcessorNode(self.rack, processor, self.stream, self._context, self._catch_up))
+            self._nodes.append(ProcessorNode(self.rack, processor, self.stream, self._context, self._pacer.catch_up))
         for node in self._nodes:
             self._executor.add_node(node)
 
     def start(self, settings: list[tuple[str, Value]]) -> None:
         """Begin the stream and put the rack into RUN; rack time starts in a moment."""
-        self._zero_ns = time.monotonic_ns() + START_LEAD_NS
+        self._pacer.begin(START_LEAD_NS)
         self.stream.begin(time.time_ns() + START_LEAD_NS)
         self._begun = True
         self.rack.start(settings)
 
     def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:
         """Let the rack live until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
-        next_chore = 0
-        scheduler = self.rack.scheduler
-        while not self.stopping:
-            now = time.monotonic_ns() - self._zero_ns
-            if duration_ns is not None and now >= duration_ns:
-                scheduler.run_due(duration_ns - 1)
-                break
-            scheduler.run_due(now)
-            if now >= next_chore:
-                next_chore = now + CHORE_PERIOD_NS
-                on_idle(now)
-            due = scheduler.next_ns
-            wake = now + LONGEST_WAIT_NS if due is None else min(due, now + LONGEST_WAIT_NS)
-            if duration_ns is not None:
-                wake = min(wake, duration_ns)
-            wait = max(0, wake - (time.monotonic_ns() - self._zero_ns))
-            self._executor.spin_once(timeout_sec=wait / NS_PER_S)
-
-    def _catch_up(self) -> None:
-        """Bring rack time to the present, for what comes from outside while the loop waits for the next deadline."""
-        self.rack.scheduler.pass_until(time.monotonic_ns() - self._zero_ns)
+        self._pacer.run(duration_ns, on_idle, lambda: self.stopping)
 
     def close(self) -> None:
         """Stop the tasks, send what is still to be sent, destroy the nodes and end ROS in this process."""

@@ -1,0 +1,93 @@
+"""The pacer: lets a scheduler's time follow the wall clock; the one place below ROS that asks a clock.
+
+rack.start()
+Pacer(rack.scheduler).run(10 * NS_PER_S)      # ten seconds of the wall clock
+
+Every event stands on an absolute deadline. One that the host made the loop miss is skipped and counted, and the next
+stays on the grid (``Scheduler.run_due``). How the time to the next deadline is spent is the caller's: a library sleeps,
+ROS nodes let their executor serve messages, so what comes from outside falls between two events.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.running.scheduler import Scheduler
+
+LONGEST_WAIT_NS = 50 * NS_PER_MS
+"""The loop wakes at least this often, so that a signal is answered at once."""
+START_LEAD_NS = 50 * NS_PER_MS
+"""The start lies this far ahead of ``begin``, so that presets and start-up parts make no scan miss its deadline."""
+CHORE_PERIOD_NS = 100 * NS_PER_MS
+"""How often the loop calls ``on_idle``."""
+
+
+class Pacer:
+    """Keeps a scheduler on the wall clock."""
+
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        *,
+        clock: Callable[[], int] = time.monotonic_ns,
+        wait: Callable[[float], object] = time.sleep,
+    ) -> None:
+        """Take a scheduler; its time passes from ``begin`` on.
+
+        Args:
+            scheduler: whose events are carried out.
+            clock: the wall clock in ns, monotonic.
+            wait: spends at most a time in s, 0 or more; it may return early, as when a message has come.
+        """
+        self._scheduler, self._clock, self._wait = scheduler, clock, wait
+        self._zero_ns: int | None = None
+
+    def begin(self, lead_ns: int = 0) -> None:
+        """Let the scheduler's present be ``lead_ns`` from now on the wall clock."""
+        self._zero_ns = self._clock() + lead_ns - self._scheduler.now_ns
+
+    @property
+    def now_ns(self) -> int:
+        """The time that the scheduler should have by the wall clock, ns; negative during the lead."""
+        if self._zero_ns is None:
+            self.begin()
+        assert self._zero_ns is not None
+        return self._clock() - self._zero_ns
+
+    def catch_up(self) -> None:
+        """Bring the scheduler's time to the present, before something comes from outside; nothing is carried out."""
+        self._scheduler.pass_until(self.now_ns)
+
+    def step(self) -> float:
+        """Carry out what is due, and return how long (s) the caller may spend before the next call."""
+        self._scheduler.run_due(self.now_ns)
+        return self._idle_s(None)
+
+    def run(
+        self,
+        until_ns: int | None = None,
+        on_idle: Callable[[int], None] | None = None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Keep pace until the scheduler's time is ``until_ns`` (what is due then is left), or asked to stop.
+
+        ``on_idle`` gets the time, every 100 ms between events.
+        """
+        next_chore = 0
+        while not should_stop():
+            now = self.now_ns
+            if until_ns is not None and now >= until_ns:
+                self._scheduler.run_due(until_ns - 1)
+                return
+            self._scheduler.run_due(now)
+            if on_idle is not None and now >= next_chore:
+                next_chore = now + CHORE_PERIOD_NS
+                on_idle(now)
+            self._wait(self._idle_s(until_ns))
+
+    def _idle_s(self, until_ns: int | None) -> float:
+        now = self.now_ns
+        ends = (now + LONGEST_WAIT_NS, self._scheduler.next_ns, until_ns)
+        return max(0, min(end for end in ends if end is not None) - now) / NS_PER_S
