@@ -17,7 +17,7 @@ from automax_ros.bags.whole_file import written_whole
 from automax_ros.core.ticks import NS_PER_S
 
 MAX_BYTES = 256 << 20
-"""Most bytes of all columns (decision): they are put together in memory."""
+"""Most bytes of all columns of an .npz export (decision): they are put together in memory."""
 _CHECK_MASK = 0xFFF
 _DTYPES = {"b": np.bool_, "i": np.int32, "q": np.int64, "d": np.float64}
 

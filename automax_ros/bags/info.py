@@ -23,7 +23,7 @@ from automax_ros.wire.heads import scan_head
 from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, ScanError, VariableTable
 
 MOST_KEPT = 1000
-"""Most attachments, tasks and kinds of errors that are listed (decision): a recording may lie about all of them."""
+"""Most attachments, tasks and kinds of errors that `bag info` lists (decision): a recording may lie about them."""
 _TABLE = "automax_msgs/msg/VariableTable"
 _SCAN = "automax_msgs/msg/Scan"
 _NO_ERRORS = bytes(4)

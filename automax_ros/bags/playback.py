@@ -20,7 +20,7 @@ from automax_ros.wire.qos import QosProfile
 
 TABLE_TYPE = "automax_msgs/msg/VariableTable"
 MAX_LATCHED_BYTES = 256 << 20
-"""Bytes of messages that are kept to be sent before the first (decision)."""
+"""Most bytes of latched messages that playback keeps to send before all others (decision: a bound on memory)."""
 _MAX_TOPICS = 10_000
 _MAX_TOPIC = 247
 _PROGRESS_MASK = 0x3FF

@@ -19,7 +19,7 @@ from automax_ros.wire.cdr import CdrError, Message, decoder
 from automax_ros.wire.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
 
 MAX_METADATA_BYTES = 4 << 20
-"""Longest metadata.yaml that is read (decision)."""
+"""Longest metadata.yaml that is read, in bytes (decision: a bound on memory for untrusted recordings)."""
 _MAX_YAML_DEPTH = 16
 _MAX_FILES = 10_000
 _PROGRESS_MASK = 0x3FF

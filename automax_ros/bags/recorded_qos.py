@@ -9,9 +9,9 @@ import yaml
 from automax_ros.wire.qos import QosProfile
 
 MAX_QOS_BYTES = 1 << 16
-"""Longest text that is read (decision)."""
+"""Longest text of a recorded quality of service that is read, in bytes (decision: a bound on untrusted recordings)."""
 MAX_DEPTH = 10_000
-"""Deepest history that is asked for (decision)."""
+"""Deepest history that playback asks for, whatever was recorded (decision: ROS would hold as many messages)."""
 STREAM = QosProfile("reliable", "volatile", "keep_last", 1000)
 """What a topic gets of which nothing is told."""
 _KEEP_ALL_DEPTH = 1000

@@ -23,7 +23,7 @@ from automax_ros.core.decimal_text import seconds_text
 from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, Variable, VariableTable
 
 MAX_GRID_ROWS = 20_000_000
-"""Most rows of a table on a grid (decision): a day at 5.5 ms has 15.7 million."""
+"""Most rows of an export on a grid of time (decision): a day at 5.5 ms has 15.7 million."""
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "VariableTable"))
 _SCAN = "automax_msgs/msg/Scan"
 _STATE = "automax_msgs/msg/TaskState"

@@ -22,7 +22,7 @@ MAX_POINTS = 1 << 16
 COLUMNS = 1 << 12
 """Columns that a line is thinned to: no picture is wider."""
 MAX_LINES = 64
-"""Most variables in one picture (decision)."""
+"""Most variables in one plot (decision: more cannot be told apart)."""
 MAX_ERRORS = 1000
 """Most errors that are marked; the first ones are."""
 Floats = npt.NDArray[np.float64]

@@ -13,10 +13,11 @@ from mcap.records import Chunk
 from automax_ros.bags.errors import BagError
 
 MAX_RECORD_BYTES = 64 << 20
-"""Longest record, longest chunk after decompression, and sum of all schemas and channels that is read (decision)."""
+"""Longest record, longest decompressed chunk and longest sum of all schemas and channels that is read, in bytes
+(decision: a bound on memory for untrusted recordings)."""
 MAX_RATIO = 1000
 FREE_BYTES = 512 << 20
-"""A whole file may become so many times as large, besides these bytes: recordings come to 10 or 50 (decision)."""
+"""A file may unpack to this many times its size and these bytes, not more (decision): recordings come to 10 or 50."""
 DAMAGED_HINT = "copy the file again from where it was recorded, or save what is sound by `automax bag repair`"
 
 

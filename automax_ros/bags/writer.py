@@ -33,13 +33,13 @@ CHUNK_BYTES = 1 << 20
 LONGEST_CHUNK_BYTES = 24 << 20
 """A chunk of more bytes than this ends even inside an instant, so that every reader takes it."""
 MAX_PAYLOAD_BYTES = 32 << 20
-"""Longest message and attachment (decision: what our own reader is sure to accept)."""
+"""Longest message and longest attachment that is written, in bytes (decision: our own reader is sure to accept it)."""
 MAX_STAMP = (2**31 - 1) * NS_PER_S
 """Latest time of a message in nanoseconds: the seconds of a ROS time have 31 bits."""
 COMPRESSIONS = {"zstd": "zstd", "lz4": "lz4", "none": ""}
 """How chunks can be compressed: the word for it, and what the file calls it."""
 MIN_SPLIT_BYTES = 1 << 16
-"""Smallest size to split at: a file that holds little more than the facts at its beginning helps nobody (decision)."""
+"""Smallest size to split a recording at (decision): a smaller file holds little but the facts at its beginning."""
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _MAX_TOPIC = 247
 

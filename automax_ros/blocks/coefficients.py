@@ -69,7 +69,7 @@ def integrator_range(coefficient: float) -> float:
 def is_within(value: float, low: float, high: float) -> bool:
     """Return whether a REAL lies within limits, both allowed.
 
-    A REAL holds 24 bits, so the REAL nearest to a limit counts as the limit: WM=0.01 is not below 0.01 (decision).
+    A REAL holds 24 bits, so the REAL nearest to a limit counts as the limit (decision): WM=0.01 is not below 0.01.
     """
     return low <= value <= high or value in (stored_real(low)[0], stored_real(high)[0])
 
@@ -79,7 +79,7 @@ def limited(declared: Coefficients, period_s: float, given: Mapping[str, float])
 
     ``given`` has the parameters that the CALL programs; the others come from the declaration's defaults.
     A limit that reads a parameter sees its limited value: the order of ``limits`` counts. Only a given parameter is
-    limited: 42.1 bounds WM by 0.01 rad/s, which the default itself falls below at periods over 31 s (decision).
+    limited, not a default (decision): 42.1 bounds WM by 0.01 rad/s, the default falls below it at periods over 31 s.
     """
     values = {**declared.defaults(period_s), **given}
     moved = []

@@ -276,10 +276,10 @@ class Access(enum.Enum):
 class Time:
     """An execution time in microseconds: ``base`` plus a term for each letter of the manual's tables 4 to 6.
 
-    n outputs, k input pairs, j inputs of numbered channels, p input/output pairs, m elements searched (the whole table,
-    as these are maximum times: decision), o order of the filter;
-    t, i, b, d: common variables referenced (all latched ones, INTEGER, BOOLEAN, DOUBLE INTEGER). ``alone`` is added
-    where only one task runs on a UDC module (x and z of table 5).
+    n outputs, k input pairs, j inputs of numbered channels, p input/output pairs, m elements searched, o order of the
+    filter; t, i, b, d: common variables referenced (all latched ones, INTEGER, BOOLEAN, DOUBLE INTEGER). ``alone`` is
+    added where only one task runs on a UDC module (x and z of table 5). The elements searched are the whole table
+    (decision): the tables give maximum times.
     """
 
     base: float

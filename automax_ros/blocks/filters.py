@@ -29,7 +29,8 @@ _LAG_LIMITS = (
     Limit("WM", per_period(2.0**-17), per_period(2.0 * math.pi / 4.5), "2**-17 / T", "2 pi / (4.5 T)"),
     Limit("WLG", times_c(TWO_TO_MINUS_18), times_c(0.71), "C x 2**-18", "0.71 C", uses=("WM",)),
 )
-"""The limits of LAG and of DIFF_LAG, whose defaulted high limit the manual misprints as .071 C (decision)."""
+"""The limits of LAG and of DIFF_LAG. The high limit of WLG with a defaulted WM is 0.71 C (decision): the .071 C of 41.2
+is a misprint, its own 256.055/TICKS needs 0.71."""
 _RANGE_NOTE = "With Kx = WLG / C below 0.125 {what} is limited to +-8191, below 0.25 to +-16383 (section 51)."
 
 
@@ -143,7 +144,8 @@ DIFF_LAG = Block(
 LEAST_RATIO, GREATEST_RATIO = 2.0, 20.0
 """Bounds of WLD:WLG or WLG:WLD (44.1)."""
 ROUNDING = 2.0**-23
-"""What the quotient of two REALs of 24 bits may miss: 0.7 to 14.0 is not beyond 1 to 20 (decision)."""
+"""Share by which LEAD_LAG's ratio may pass its bounds (decision): two REALs of 24 bits miss it by as much, so that
+0.7 to 14.0 is not beyond 1 to 20."""
 LEAST_FREQUENCY = 0.001
 
 

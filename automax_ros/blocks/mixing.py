@@ -33,7 +33,7 @@ def amplifier_step(
     """Sum the products in 32 bit and divide by SCALE, truncating toward zero (7).
 
     A sum that leaves 32 bit ignores the channels that follow, is logged and gives the clamp of its sign, whatever
-    SCALE's sign; division by zero likewise, 0/0 gives 0 (decisions).
+    SCALE's sign; division by zero likewise, 0/0 gives 0 (decision).
     """
     total = input1 * gain1 + input2 * gain2
     if total >= INT32_MIN and total <= INT32_MAX:

@@ -37,7 +37,7 @@ _Q_FACTOR = Input("Q_FACTOR", DataType.REAL, "Q", "Q factor, 1 / (2 x damping fa
 
 
 def notch_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
-    """Return NOTCH's transfer function, mapped at its own WN (decision)."""
+    """Return NOTCH's transfer function, mapped at its own WN (decision: it has no WM)."""
     wn, q = values["WN"], values["Q_FACTOR"]
     return mapped((1.0, 0.0, wn * wn), (1.0, wn / q, wn * wn), mapping_constant(wn, period_s), period_s)
 
@@ -117,7 +117,7 @@ NOTCH = Block(
 
 
 def notchn_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
-    """Return NOTCHN's transfer function, mapped at its own WN (decision)."""
+    """Return NOTCHN's transfer function, mapped at its own WN (decision: it has no WM)."""
     wn, q = values["WN"], values["Q_FACTOR"]
     numerator: Polynomial = (1.0, 0.0, wn * wn)
     denominator: Polynomial = (1.0, wn / q, wn * wn)

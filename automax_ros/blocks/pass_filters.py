@@ -18,13 +18,13 @@ HIGHEST_ORDER = 3
 
 
 def high_pass_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
-    """Return HIGH_PASS_FILTER's transfer function, mapped at its own WLD (decision)."""
+    """Return HIGH_PASS_FILTER's transfer function, mapped at its own WLD (decision: it has no WM)."""
     order = int(values["ORDER"])
     return _butterworth(values["WLD"], period_s, (1.0, *(0.0,) * order))
 
 
 def low_pass_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
-    """Return LOW_PASS_FILTER's transfer function, mapped at its own WLG (decision)."""
+    """Return LOW_PASS_FILTER's transfer function, mapped at its own WLG (decision: it has no WM)."""
     order = int(values["ORDER"])
     return _butterworth(values["WLG"], period_s, (*(0.0,) * order, 1.0))
 

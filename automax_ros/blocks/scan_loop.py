@@ -35,7 +35,7 @@ SCAN_LOOP = Block(
         Time(80.00, t=1.6, i=2.5, b=3.8, d=4.1),
         Time(326.0, t=2.4, i=4.4, b=6.8, d=7.2),
         Time(350.00, i=2.20, b=2.00, d=3.30, alone=312.0),
-        # table 6 lost terms here; every PC3000 time is 0.7 of the 7010's (decision)
+        # Table 6 lost terms here: every PC3000 time is taken as 0.7 of the 7010's (decision)
         Time(56.00, t=1.12, i=1.76, b=2.68, d=2.88),
     ),
     notes=(

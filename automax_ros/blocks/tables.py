@@ -12,7 +12,7 @@ from automax_ros.core.types import DataType
 MAX_INPUTS = tuple(2**n - 1 for n in range(1, 16))
 """The values that MAX_INPUT may have (13)."""
 MOST_SEARCHED = INT16_MAX + 1
-"""Longest table of SEARCH: OUTPUT, an INTEGER, must be able to name its last element (decision)."""
+"""Most elements of SEARCH's table (decision): OUTPUT, an INTEGER, must be able to name the last one."""
 
 
 def function_step(

@@ -14,7 +14,7 @@ from automax_ros.blocks.filters import GREATEST_RATIO, LEAST_RATIO
 from automax_ros.blocks.transfer import Transfer, mapped
 
 NEAR = 0.1
-"""How near to a limit counts as close: as a share of the limit, at most of the room between the two (decision)."""
+"""A coefficient is close to a limit within this share of the limit, at most of the room between the two (decision)."""
 RANGE_EDGES = (0.125, 0.25)
 """The coefficients Kx at which the range of an integrator changes (section 51)."""
 Ends = tuple[float, float]

@@ -34,7 +34,7 @@ _ROWS_A_LOOK = 256
 _MOST_NAMES = 12
 """Names of columns in one message."""
 _MOST_GUESSES = 1000
-"""Names of columns that are searched for a similar one (decision: a header may have half a million)."""
+"""Most names of columns that are searched for a similar one (decision: a header may have half a million)."""
 _NUMBER = re.compile(r"[-+]?[0-9]{1,9}")
 _HEADER = (
     "scan", "feedback", "reset", "pulse_mult", "pmul", "difference",

@@ -19,7 +19,7 @@ from automax_ros.core.diagnostics import printable
 from automax_ros.core.types import DataType, Value
 
 MAX_LINE = 1_000_000
-"""Longest line of a table, in bytes (decision: a bound on memory for untrusted files)."""
+"""Longest line of a CSV table, in bytes (decision: a bound on memory for untrusted files)."""
 
 _WHOLE = re.compile(r"([-+]?[0-9]{1,40})(\.0{0,40})?")
 """A whole number; spreadsheets write 100.0 into columns with empty cells."""

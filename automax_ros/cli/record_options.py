@@ -14,7 +14,7 @@ from automax_ros.rack.findings import did_you_mean, quoted
 _BYTES_PER_MB = 1_000_000
 _MAX_MB = 1_000_000
 MIN_SPLIT_NS = NS_PER_S
-"""Shortest time to split at: each file begins with a whole image of memory (decision)."""
+"""Shortest time to split a recording at, ns (decision): each file begins with a whole image of memory."""
 _NAMES = ("split_mb", "split_s", "compression", "tasks", "locals")
 
 

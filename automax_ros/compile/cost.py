@@ -1,7 +1,7 @@
 """Modeled execution times of a task on a Processor (section 53).
 
 Blocks, SCAN_LOOP, END and ``!`` remarks have the manual's times; BASIC statements have none there: the table of
-estimates below is ours (decision).
+estimates below is ours (decision: no source prints these times).
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ STATEMENT_ESTIMATES_US = {
     "IoWrite": 10.0,
     "ClearErrorLog": 4.0,
 }
-"""Microseconds on a 7010 by kind of statement; others take none (decision: no source prints these times)."""
+"""Estimated microseconds on a 7010 by kind of BASIC statement; others take none (decision)."""
 SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8, Model.PC3000: 0.7}
-"""Factors for the estimates, from the ratios of tables 4 to 6 (decision)."""
+"""How many times the 7010's estimate a BASIC statement takes on each module (decision: the ratios of tables 4 to 6)."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ BAD_ARGUMENT = 7025
 WRONG_DATA = 7032
 INTEGER_CLAMPED, DOUBLE_CLAMPED, REAL_CLAMPED = 7020, 7021, 7022
 WORD = 16
-"""Bits of the word that the bit functions, shifts and rotations work on (decision)."""
+"""Bits of the word that the bit functions, shifts and rotations work on (decision: an INTEGER)."""
 TEMPORARY_STRING = 132
 """Longest string that an expression works with (J-3675 p. 5-4)."""
 

@@ -1,6 +1,6 @@
-"""Lowering of FOR and NEXT: tested at the top; afterwards the variable holds the value that failed the test (decision).
+"""Lowering of FOR and NEXT: FOR tests at the top; after the loop its variable holds the value that failed (decision).
 
-An increment that leaves the variable's range is logged, clamped, and ends the loop (decision: it could never end else).
+An increment that leaves the variable's range is logged, clamped, and ends the loop (decision: or it would never end).
 """
 
 from __future__ import annotations

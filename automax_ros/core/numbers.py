@@ -38,7 +38,7 @@ def truncated_quotient(numerator: int, denominator: int) -> int:
 
 
 def round_count(value: float) -> int:
-    """Round to the nearest count, halves away from zero: the dynamic blocks' output (decision)."""
+    """Round to the nearest count, halves away from zero (decision): so a filter settles on its input exactly."""
     return int(value + 0.5) if value >= 0.0 else int(value - 0.5)
 
 

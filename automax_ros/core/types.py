@@ -19,7 +19,7 @@ MAX_DIMENSIONS = 4
 MAX_SUBSCRIPT = 65534
 """Largest subscript that can be declared: a dimension has at most 65535 elements, the first is 0 (2.4.4)."""
 MAX_ARRAY_ELEMENTS = 1_000_000
-"""Largest number of elements of one array (decision: a bound on memory for untrusted sources)."""
+"""Most elements of one array (decision: a bound on memory for untrusted sources)."""
 
 
 class DataType(enum.Enum):

@@ -11,10 +11,9 @@ from automax_ros.drive.network import Wiring
 from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, numbers_of
 
 REST_NS = 10
-"""How long an SCR that went out conducts no more, gated or not: keeps events from piling up at one instant
-(decision)."""
+"""How long an SCR that went out stays off, gated or not, ns (decision: keeps events from piling up at one instant)."""
 UNLATCHED_NS = 100_000
-"""The same for one that conducted for less than ``REST_NS``: it did not latch (decision)."""
+"""How long it stays off if it had conducted for less than ``REST_NS``, ns (decision: it did not latch)."""
 
 
 class Bridge:

@@ -17,8 +17,8 @@ TURN = 2 * pi
 LONGEST_NS, SHORTEST_NS = 3_500_000, 500_000
 """An interval of constant EMF: at most just over a firing interval at 48 Hz, at least this."""
 HELD_V_S = 1e-3
-"""An interval is so short that the EMF's slope times its square stays below this, V s (decision: 0.1 % of what the line
-gives in a firing interval; keeps the error of speed below 0.01 %)."""
+"""The EMF is held over an interval so short that its slope times the interval's square stays below this, V s (decision:
+0.1 % of what the line gives in a firing interval; keeps the error of speed below 0.01 %)."""
 LONGEST_S2 = (LONGEST_NS * 1e-9) ** 2
 SMOOTH_S = 5e-3
 """The acceleration that decides it is smoothed with this time constant: ripple does not count."""
@@ -69,8 +69,8 @@ class FixedLoad:
 class Field:
     """The field: flux of its current, which follows its voltage with a time constant.
 
-    ``flux = (1 + s) x / (s + x)`` with x the current and flux over rated, s = ``knee`` (drive.md's curve has 0.5;
-    without a knee the flux is proportional: decision).
+    ``flux = (1 + s) x / (s + x)`` with x the current and flux over rated, s = ``knee`` (0.5 is a usual machine's).
+    Without a knee the flux is proportional to the current (decision).
 
     Attributes:
         tau_s: time constant of the field current, s; 0 for none.

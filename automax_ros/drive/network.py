@@ -24,7 +24,7 @@ TURN_ON_V = 1e-5
 """Forward voltage, beyond the drop, at which a gated SCR turns on, V (decision: above rounding, 0.1 ns of a line's
 slope)."""
 SLOWEST_DECAY = 0.01
-"""A resistance below L x this (1/s) counts as this, so that a steady state exists: 20 microohm with 2 mH (decision)."""
+"""A resistance below L x this (1/s) counts as L x this (decision): so a steady state exists; 20 microohm at 2 mH."""
 
 Potential = tuple[float, float, float, float, float, float]
 """A voltage: factors of cos, sin, 1, of the armature wave's k and a, and of the EMF."""

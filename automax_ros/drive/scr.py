@@ -1,7 +1,7 @@
 """The twelve SCRs: numbers, places, directions (the one table that says which SCR sits where).
 
 The anti-parallel pairs 1-14, 2-15, 3-16, 4-11, 5-12, 6-13 are the manual's (52.3.1). Which phase a pair sits on is
-nowhere told; here it follows from firing in the order 1-2-3-4-5-6 on a line that rotates A, B, C (decision).
+not told by any manual; here it follows from firing in the order 1-2-3-4-5-6 on a line that rotates A, B, C (decision).
 
 Inside, an SCR is a bit: ``2 * leg`` for the one that conducts from the phase to the rail, the next for its partner. A
 leg is a place for a pair, ``2 * phase + rail``: phases A, B, C are 0, 1, 2, the rails P (armature A1) and M (A2) are

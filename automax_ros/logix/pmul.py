@@ -38,12 +38,13 @@ class PulseMultiplier:
 
     Registers: ``previous_in`` is In(n-1), ``remainder`` is INT_Remainder, in 1/100,000 of a count and with its sign.
 
-    Decisions, where the page is silent:
+    Where the page is silent:
 
-    - Ans has 64 bits, which it never leaves; INT_Out is a DINT. OutOverflow tells that the quotient left 32 bits:
-      Out is then Infinity of its sign, and the remainder is that of the true quotient.
-    - LostPrecision judges the integer, before it becomes a REAL; an infinite Out has lost precision too.
-    - InstructFault is set with any of the other four bits, which are the errors that its text lists.
+    - Ans has 64 bits, which it never leaves, and INT_Out is a DINT (decision).
+    - OutOverflow tells that the quotient left 32 bits: Out is then Infinity of its sign, and the remainder is that of
+      the true quotient (decision).
+    - LostPrecision judges the integer, before it becomes a REAL; an infinite Out has lost precision too (decision).
+    - InstructFault is set with any of the other four bits (decision): they are the errors that its text lists.
     - The difference keeps its low WordSize bits with their sign, as in PULSE_MULT: a change of exactly half a word
       gives -2**(WordSize - 1) in either direction.
     - An invalid WordSize holds Out with its status bits, In(n-1) and the remainder: a later valid WordSize counts from

@@ -18,8 +18,9 @@ class UpDownAccumulator:
     Covered: all eight members and the three cases of the algorithm: Initialize gives InitialValue, else Hold keeps the
     accumulator, else it becomes accumulator + InPlus - InMinus. Not covered: the controller's math status flags.
 
-    Decisions: InPlus is added first, then InMinus is subtracted, each sum rounded. A sum that overflows is Infinity
-    with EnableOut cleared. The accumulator is 0 on a first scan: the first execution of a new tag or after a prescan.
+    InPlus is added first, then InMinus is subtracted, each sum rounded (decision). A sum that overflows is Infinity
+    with EnableOut cleared (decision). The accumulator is 0 on a first scan, the first execution of a new tag or after
+    a prescan (decision).
     """
 
     EnableIn: bool = True

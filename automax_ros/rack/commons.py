@@ -15,9 +15,9 @@ from automax_ros.rack.yaml_text import Node, Scalar
 
 UNIT_LIMIT = 16
 DESCRIPTION_LIMIT = 200
-"""Longest unit and description, in characters (decision)."""
+"""Longest `unit` and longest `description`, in characters (decision)."""
 MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
-"""Range of a rate limit (decision: 2000 Hz is one message a tick of 0.5 ms)."""
+"""Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
 
 OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "description")
 _DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}

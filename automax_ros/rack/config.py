@@ -20,7 +20,7 @@ MAX_PROCESSORS = 4
 MAX_SLOT = 15
 """Highest slot of the largest rack (J2-3106-1 p. 10-2)."""
 DEFAULT_OUT_LIMIT = 200
-"""Simple commons of a file that are published although it does not say so (decision)."""
+"""How many simple commons, from the top of the file, are published without `ros` (decision)."""
 
 
 class Direction(enum.IntEnum):
@@ -67,7 +67,7 @@ class CommonVariable:
 
     @property
     def registers(self) -> int:
-        """16-bit registers it takes (decision: a BOOLEAN counts 1 bit, a STRING its characters and 1 byte)."""
+        """16-bit registers it takes; a BOOLEAN counts 1 bit, a STRING its characters and 1 byte (decision)."""
         if self.type is DataType.BOOLEAN:
             return -(-self.elements // 16)
         if self.type is DataType.STRING:

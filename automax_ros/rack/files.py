@@ -6,7 +6,7 @@ import stat
 from pathlib import Path
 
 MAX_BYTES = 1_000_000
-"""Largest rack file and largest task source (decision)."""
+"""Largest rack file and largest task source, in bytes (decision: a bound on untrusted files)."""
 
 
 class FileFault(OSError):

@@ -1,6 +1,6 @@
 """The AutoMax modules that a rack file may name, and why it may not name the others.
 
-Numbers and uses are those of the manuals' module tables; a letter behind the number is the revision (57C413B), which
+Numbers and uses are those of the manuals' module tables; a letter after the number is the revision (57C413B), which
 the emulator does not tell apart (decision), except for the 57C430.
 """
 

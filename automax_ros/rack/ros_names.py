@@ -4,7 +4,7 @@ The rack's own names have upper-case letters, digits and underscores only. Whate
 it can never make two names equal:
 
 - the namespace is the rack's name in lower case; one that begins with a digit, which ROS does not allow, gets
-  ``rack_`` in front (decision; a rack's name has no underscore, so none else looks like it);
+  ``rack_`` in front (decision: a rack's name has no underscore, so no other looks like it);
 - the topic of a variable is its name without the type character: ``common/LINE_SPEED``;
 - commons that differ only in type get the type's word: ``common/SPEED_int`` and ``common/SPEED_bool``;
 - a name that begins with an underscore gets ``u`` in front, since ROS tools hide such topics: ``common/u_SPARE``

@@ -17,9 +17,9 @@ from automax_ros.core.diagnostics import SourceText, Span
 from automax_ros.rack.findings import Findings, quoted
 
 MAX_DEPTH = 16
-"""Deepest nesting (decision: a rack file needs 6)."""
+"""Deepest nesting of a YAML file (decision: a rack file needs 6)."""
 MAX_NODES = 100_000
-"""Most keys and values of a file (decision: seconds of reading; fewer variables than 16-bit ids can tell apart)."""
+"""Most keys and values of a YAML file (decision: reading them takes seconds; 16-bit ids tell more variables apart)."""
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,11 @@ from automax_ros.replay.report import (
 )
 
 BAND_COUNTS = 2
-"""A difference of whole numbers counts as settled within so many counts (decision) ..."""
+"""A difference of whole numbers counts as settled within this many counts (decision) ..."""
 BAND_SHARE = 0.05
-"""... or, also for REALs, within this share of itself (decision)."""
+"""... or, for REALs too, within this share of the recorded value (decision)."""
 SETTLED_SCANS = 10
-"""Fewest scans that a difference must have been settled for (decision)."""
+"""Scans that a difference must stay within that band to count as settled (decision)."""
 _MOST_COUNTED = 100_000
 """Most things beyond the limit that are told apart; there may be more, but nobody reads that."""
 

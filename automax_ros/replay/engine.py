@@ -25,7 +25,7 @@ from automax_ros.replay.task import TaskReplay
 from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable, WriterKind
 
 DEFAULT_MAX_DIFFERENCES = 50
-"""Things that differ which a report tells in full (decision)."""
+"""Most differences that a replay's report tells in full, unless said otherwise (decision)."""
 _TYPES = frozenset(
     f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "Scan", "TaskState", "VariableTable")
 )

@@ -22,10 +22,11 @@ from automax_ros.replay.task import TaskReplay
 from automax_ros.wire.messages import Scan
 
 MOST_LANES = 5
-"""Variables that one picture shows (decision)."""
+"""Most variables that one picture shows (decision): more cannot be told apart."""
 BEFORE_S, AFTER_S = 0.5, 1.5
-"""What a picture shows before and behind the first difference, but at least so many scans of the task (decision):"""
+"""Seconds that a picture shows before and after the first difference (decision) ..."""
 BEFORE_SCANS, AFTER_SCANS = 10, 40
+"""... or this many scans of the task, whichever is longer (decision)."""
 _RECORDED, _REPLAYED = "#1f4e9c", "#c1272d"
 
 

@@ -21,7 +21,7 @@ BUS_ERROR, SCAN_TOO_LONG = 7031, 7040
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
 PRINT_ZONE = 14
-"""Width of a print zone, to which a comma leads (decision)."""
+"""Columns of a zone of PRINT, to the next of which a comma leads (decision)."""
 
 
 class Status(enum.Enum):

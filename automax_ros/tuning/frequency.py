@@ -16,7 +16,7 @@ from automax_ros.tuning.driven import DrivenBlock
 NORMAL_AMPLITUDE = 4095
 """Amplitude of the sine in counts unless the block's limits ask for less: 1 PN."""
 UNRELIABLE_DB = 0.5
-"""A point whose gain the rounding of OUTPUT leaves this uncertain or more is not to be relied upon (decision)."""
+"""A measured point is marked unreliable where the rounding of OUTPUT leaves its gain this uncertain, dB (decision)."""
 MOST_SCANS = 3_000_000
 """Scans for one frequency, transient and window together; a slower one is not measured."""
 MOST_SCANS_IN_ALL = 8_000_000

@@ -32,7 +32,7 @@ PRIMITIVES = frozenset(
 TIME = "builtin_interfaces/msg/Time"
 SEPARATOR = "=" * 80
 MAX_SCHEMA_BYTES = 1 << 20
-"""Longest schema text that is read from a bag (decision)."""
+"""Longest schema that is read from a bag, in bytes (decision: a bound on memory for untrusted recordings)."""
 
 _NAME = r"[A-Za-z][A-Za-z0-9_]*"
 _FIELD = re.compile(

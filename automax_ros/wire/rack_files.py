@@ -17,7 +17,7 @@ from automax_ros.rack.rack import Rack
 
 RACK_FILE = "rack.yaml"
 MAX_TEXT = 16 << 20
-"""Longest text of the topic ``config`` that is read (decision)."""
+"""Longest text of the topic ``config`` that is read (decision: a bound on memory for untrusted senders)."""
 _MAX_FILES = 200
 _NAME = re.compile(r"rack\.yaml|[A-Z][A-Z0-9_]{0,63}\.BLK")
 

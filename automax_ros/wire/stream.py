@@ -24,7 +24,8 @@ from automax_ros.wire.rack_messages import Message, RackMessages, message_maker,
 from automax_ros.wire.scan_encoding import scan_encoder, write_encoder
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
-"""How often an image, full latches and the tasks' states enter the stream (decision)."""
+"""Time between two images of memory, with full latches and the tasks' states, in the stream, ns (decision: replay may
+begin at each)."""
 
 
 @dataclass(frozen=True)

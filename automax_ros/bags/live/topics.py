@@ -23,7 +23,7 @@ _ARRAYS = {
 
 
 MAX_VALUE_TOPICS = 2000
-"""Topics of common variables that are listened to (decision: more than ROS serves at the pace of scans)."""
+"""Most topics of common variables that a recorder listens to (decision: ROS serves no more at the pace of scans)."""
 
 
 @dataclass(frozen=True)

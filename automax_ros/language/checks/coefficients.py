@@ -15,7 +15,7 @@ from automax_ros.language.syntax.tree import BooleanLiteral, Element, Expression
 _NUMBERS = (IntegerLiteral, RealLiteral)
 _CONSTANTS = (IntegerLiteral, RealLiteral, BooleanLiteral)
 LOOP_TIME_MISS = 0.02
-"""How far a LOOP_TIME may lie off a whole number of scan periods, as a share of it, without a warning (decision)."""
+"""Share by which a LOOP_TIME may miss a whole number of scan periods without a warning (decision)."""
 
 
 @dataclass(frozen=True)

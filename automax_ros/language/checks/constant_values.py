@@ -68,7 +68,7 @@ def is_constant(expression: Expression) -> bool:
 def literal_of(expression: Expression) -> IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral | None:
     """Return the constant with its sign drawn in (``-5`` becomes one literal), None where it is no constant.
 
-    A REAL is rounded to what a REAL variable holds (decision).
+    A literal of a REAL parameter is rounded to what a REAL variable holds (decision).
     """
     inner, negative = expression, False
     if isinstance(expression, Unary) and is_constant(expression):
@@ -101,7 +101,7 @@ def range_text(kind: DataType) -> str:
 
 
 def hex_hint(expression: Expression, kind: DataType) -> str | None:
-    """Return how to write a negative hex constant, where one of 16 bits was meant for an INTEGER (decision)."""
+    """Return how to write a negative hex constant where 16 bits were meant: a constant has 32 bits (decision)."""
     if not isinstance(expression, IntegerLiteral) or not expression.hexadecimal or kind is not DataType.INTEGER:
         return None
     meant = expression.value - 0x10000 if INT16_MAX < expression.value <= 0xFFFF else -1

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from automax_ros.core.types import bare_name
 
 COMPARISONS = 50_000
-"""Most pairs of words that one check compares (decision: a bound on time for hostile sources)."""
+"""Most pairs of names that one check compares to suggest one (decision: a bound on time for hostile sources)."""
 
 
 class Suggester:

@@ -13,7 +13,7 @@ from automax_ros.language.syntax.tree import Declared, Expression, Scope
 def tuning_limits(context: Context, scope: Scope, declared: Declared) -> TuningLimits | None:
     """Return the tuning of a declared tunable, None where its bracket is at fault, which is reported.
 
-    HIGH and LOW default to the type's range, STEP to 1, for a REAL to the smallest magnitude it can hold (decision).
+    A tunable's HIGH and LOW default to its type's range, STEP to 1, for a REAL to the smallest magnitude (decision).
     """
     tuning, kind = declared.tuning, declared.type
     if tuning is None:

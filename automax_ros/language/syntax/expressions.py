@@ -1,7 +1,7 @@
 """Expressions: precedence, subscripts and function calls.
 
 Precedence, high to low: parentheses; unary - +; ** ; * / ; + - ; relational; NOT; AND; OR XOR. Equal levels go from
-left to right (J-3675, 5; the place of the relational and boolean operators is a decision).
+left to right (J-3675, 5). Relational operators bind closer than NOT, NOT than AND, AND than OR and XOR (decision).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from automax_ros.language.syntax.tree import (
 )
 
 DEPTH_LIMIT = 64
-"""Deepest nesting of operations and parentheses (decision)."""
+"""Deepest nesting of operations and parentheses in an expression (decision: a bound for untrusted sources)."""
 NOT_LEVEL = 3
 RELATIONAL = ("=", "<>", "<", ">", "<=", ">=")
 LEVELS: dict[str, int] = {

@@ -1,6 +1,7 @@
 """The functions of the language, as data: names, arguments, results, where they may be used.
 
-The manuals at hand describe hardly any of them; names, arguments and results are decisions unless a source is named.
+The manuals at hand describe hardly any of them: names, arguments and results are ours unless a source is named
+(decision).
 """
 
 from __future__ import annotations
@@ -135,4 +136,4 @@ REFUSED_FUNCTIONS = {
     "VARPTR!": "a task of the emulator has no physical addresses",
     "GATEWAY_CMD_OK@": "it blocks the task until a network answers, which a control-block task must not",
 }
-"""Functions of the real language that are left out, with the reason (decision)."""
+"""Functions of the hardware's language that are refused, each with the reason (decision)."""

@@ -1,7 +1,7 @@
 """Characters to tokens, one physical line at a time.
 
 Linear in the length of the line whatever it holds. A `!` glued to a preceding name is its type character, otherwise
-it begins a remark; lower case is read as upper case (both decisions).
+it begins a remark; lower case is read as upper case (decisions).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Physical lines to logical lines: line numbers and `&` continuation.
 
-Every line begins with a line number, 1 to 32767, in ascending order (order: decision). A line whose last character is
+Every line begins with a line number, 1 to 32767, in ascending order (decision). A line whose last character is
 `&` goes on in the next physical line that is not blank, which has no number.
 """
 

@@ -14,7 +14,7 @@ from automax_ros.language.syntax.tree import Label, Module, Remark, Statement
 SOURCE_LIMIT = 1_000_000
 """Largest source, in characters (decision: a bound on untrusted texts)."""
 STATEMENT_LIMIT = 8192
-"""Longest statement, in characters (decision)."""
+"""Longest statement with its continuation lines, in characters (decision: a bound on untrusted texts)."""
 
 
 def parse(source: SourceText, basic_task: bool = False) -> tuple[Module, list[Diagnostic]]:

@@ -6,7 +6,7 @@ from automax_ros.core.diagnostics import Diagnostic, Note, Span
 from automax_ros.language.syntax.tokens import Fault, Token
 
 DIAGNOSTIC_LIMIT = 200
-"""Problems reported of one text; one more says that there are others (decision)."""
+"""Most problems reported of one source; one more says that there are others (decision: nobody reads more)."""
 
 
 class TooManyProblemsError(Exception):

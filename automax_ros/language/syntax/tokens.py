@@ -87,7 +87,7 @@ BASIC_TASK_WORDS = {
     "CLOSE": "ports are opened and closed by BASIC tasks",
     "SET": "events between tasks belong to BASIC tasks",
 }
-"""Statements that belong to BASIC tasks only, with the reason (3.2; the list is a decision)."""
+"""Statements that belong to BASIC tasks only, each with the reason (3.2, decision: the section has no list)."""
 
 OPERATOR_WORDS = frozenset({"AND", "OR", "XOR", "NOT"})
 BOOLEAN_WORDS = {"TRUE": True, "ON": True, "FALSE": False, "OFF": False}

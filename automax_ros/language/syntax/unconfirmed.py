@@ -1,4 +1,4 @@
-"""Forms of the language that no source confirms: their spelling or meaning is a decision of the emulator.
+"""Forms of the language that no source confirms: their spelling or meaning is ours (decision).
 
 ``automax check --json`` marks what it says about them, so that a user of a real rack knows where to be careful.
 """
