@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
@@ -70,7 +71,7 @@ def test_package_xml_names_the_messages_and_the_build_type():
 
 def test_automax_is_the_console_script():
     scripts = metadata.entry_points(group="console_scripts", name="automax")
-    assert [script.value for script in scripts] == ["automax_ros.cli.main:main"]
+    assert [script.value for script in scripts] == ["automax_ros.cli.main:entry"]
 
 
 def test_ament_index_marker_is_there_and_empty():
@@ -111,13 +112,48 @@ def test_room_without_ros_imports_none(room):
     assert not wrong
 
 
-def test_library_loads_without_ros():
-    modules = [
-        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        for room in ROOMS
-        if room not in ROOMS_WITH_ROS
-        for path in sources_of(room)
+def module_of(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def file_imports() -> dict[str, set[str]]:
+    """Each module of the package with the modules that its file imports, wherever in the file."""
+    modules = {module_of(path): path for path in PACKAGE.rglob("*.py")}
+    graph: dict[str, set[str]] = {}
+    for module, path in modules.items():
+        names = {name for _, name in imports_of(path)}
+        found = {name if name in modules else name.rpartition(".")[0] for name in names}
+        graph[module] = found & set(modules) - {automax_ros.__name__}
+    return graph
+
+
+def test_no_file_imports_itself_through_others():
+    """Lazy imports count: a circle of files is one file that was cut in the wrong place."""
+    try:
+        list(TopologicalSorter(file_imports()).static_order())
+    except CycleError as error:
+        pytest.fail(f"a circle of files: {' -> '.join(reversed(error.args[1]))}")
+
+
+def test_syntax_knows_no_program_and_a_program_no_checks():
+    """Inside the language: text to tree, then what a checked task is, then the checks that make one."""
+    language = f"{automax_ros.__name__}.language"
+    order = [f"{language}.syntax", f"{language}.program", f"{language}.checks"]
+
+    def rank(module: str) -> int:
+        return next((rank for rank, part in enumerate(order) if module == part or module.startswith(f"{part}.")), -1)
+
+    wrong = [
+        f"{module} imports {name}"
+        for module, names in file_imports().items()
+        for name in names
+        if 0 <= rank(module) < rank(name)
     ]
+    assert not wrong
+
+
+def test_library_loads_without_ros():
+    modules = [module_of(path) for room in ROOMS if room not in ROOMS_WITH_ROS for path in sources_of(room)]
     program = (
         "import importlib, sys\n"
         f"for module in {modules}: importlib.import_module(module)\n"

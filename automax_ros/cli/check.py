@@ -15,26 +15,36 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.blocks.declaration import Processor
-from automax_ros.cli.task_files import Target, add_target_arguments, check_task_file, name_warning, target_of
+from automax_ros.cli.task_files import (
+    Target,
+    add_target_arguments,
+    check_task_file,
+    is_rack_file,
+    name_warning,
+    target_of,
+)
 from automax_ros.cli.terminal import count_of, print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, as_json, has_errors, in_order
 from automax_ros.core.problems import Severity
+from automax_ros.rack.config import RackConfig
 
-_RACK_SUFFIXES = (".YAML", ".YML")
-_CANNOT_BE_READ = "AMX6000"
-_NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
-"""A rack file that is too large or not UTF-8 counts as unreadable, although there is something to show of it."""
 _LINE_NUMBER = re.compile(r"\s*([0-9]{1,6})")
 
 
 @dataclass(frozen=True)
 class _Findings:
-    """What was found in one text; ``unconfirmed`` are the places of forms that no source confirms."""
+    """What was found in one text.
+
+    ``unconfirmed`` are the places of forms that no source confirms, ``size`` says what a rack consists of. A text that
+    is not ``usable`` counts as unreadable, although there is something to show of it.
+    """
 
     source: SourceText
     diagnostics: list[Diagnostic]
     unconfirmed: list[tuple[Span, str]]
+    size: str = ""
+    usable: bool = True
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     unusable = 0
     for path in arguments.files:
         try:
-            if path.suffix.upper() in _RACK_SUFFIXES:
+            if is_rack_file(path):
                 findings += _rack_file(path, allow_outside=arguments.allow_outside)
             else:
                 findings += _task_file(path, target)
@@ -70,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _print(findings, len(arguments.files) - unusable)
     diagnostics = [item for one in findings for item in one.diagnostics]
-    if unusable or any(item.code in _NOT_A_TEXT for item in diagnostics):
+    if unusable or not all(one.usable for one in findings):
         return 2
     return 1 if has_errors(diagnostics) else 0
 
@@ -78,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _refuse_idle_options(arguments: argparse.Namespace) -> None:
     """Refuse ``--target`` and ``--tick-ms`` where no file heeds them: a rack file says itself what runs its tasks."""
     given = arguments.tick_ms is not None or arguments.target != Processor.AUTOMAX.value
-    if given and all(path.suffix.upper() in _RACK_SUFFIXES for path in arguments.files):
+    if given and all(map(is_rack_file, arguments.files)):
         raise UsageError("--target and --tick-ms are for tasks given by themselves", "a rack file has `tick_ms:`")
 
 
@@ -94,16 +104,20 @@ def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
     Raises:
         UsageError: the rack file itself cannot be read.
     """
-    from automax_ros.rack.loader import load
+    # Whoever checks a task alone need not wait until the reader of racks is loaded.
+    from automax_ros.cli.rack_file import is_text, load_rack_file
     from automax_ros.rack.tasks_check import check_tasks
 
-    rack = load(path, allow_outside=allow_outside)
-    for item in rack.diagnostics:
-        if item.code == _CANNOT_BE_READ:
-            raise UsageError(f"{path}: {item.message}")
+    rack = load_rack_file(path, allow_outside=allow_outside)
     tasks = check_tasks(rack.config) if rack.config is not None else []
     return [
-        _Findings(rack.source, rack.diagnostics, []),
+        _Findings(
+            rack.source,
+            rack.diagnostics,
+            [],
+            size=_size(rack.config) if rack.config is not None else "",
+            usable=is_text(rack),
+        ),
         *(_Findings(item.source, item.result.diagnostics, item.result.unconfirmed) for item in tasks),
     ]
 
@@ -118,10 +132,10 @@ def _each_once(findings: list[_Findings]) -> list[_Findings]:
         return not known
 
     return [
-        _Findings(
-            one.source,
-            [item for item in in_order(one.diagnostics) if new(item, one.source.name)],
-            [item for item in one.unconfirmed if new(item, one.source.name)],
+        dataclasses.replace(
+            one,
+            diagnostics=[item for item in in_order(one.diagnostics) if new(item, one.source.name)],
+            unconfirmed=[item for item in one.unconfirmed if new(item, one.source.name)],
         )
         for one in findings
     ]
@@ -134,7 +148,17 @@ def _print(findings: list[_Findings], files: int) -> None:
         severities = [item.severity for one in findings for item in one.diagnostics]
         errors, warnings = severities.count(Severity.ERROR), severities.count(Severity.WARNING)
         counts = [count_of(errors, "error")] * bool(errors) + [count_of(warnings, "warning")] * bool(warnings)
+        for one in findings:
+            if one.size:
+                print(f"{one.source.name}: {one.size}")
         print(", ".join(counts) or f"no problems in {count_of(files, 'file')}")
+
+
+def _size(rack: RackConfig) -> str:
+    """Return what a rack consists of, in words."""
+    tasks = sum(len(processor.tasks) for processor in rack.processors)
+    counts = ((len(rack.processors), "Processor"), (tasks, "task"), (len(rack.variables), "common"))
+    return ", ".join(count_of(number, thing) for number, thing in counts)
 
 
 def _records(findings: _Findings) -> list[dict[str, object]]:

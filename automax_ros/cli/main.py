@@ -1,18 +1,20 @@
-"""The command line `automax`: finds the subcommand, runs it, and turns what goes wrong into exit codes."""
+"""The command line `automax`: finds the subcommand, runs it, and turns what goes wrong into exit codes.
+
+At the top stands only what every Python has loaded already: imports inside `main` may be interrupted by Ctrl-C.
+"""
 
 from __future__ import annotations
 
-import argparse
-import contextlib
-import importlib
 import io
 import os
 import sys
-from collections.abc import Sequence
-from types import ModuleType
+from typing import TYPE_CHECKING
 
-from automax_ros import __version__
-from automax_ros.cli.usage import UsageError
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+    from types import ModuleType
+    from typing import NoReturn
 
 SUBCOMMANDS: dict[str, str] = {
     "check": "find everything that is wrong with tasks and rack files",
@@ -42,10 +44,23 @@ BROKEN_PIPE = 141
 """Exit code where whoever reads our output has gone: 128 + SIGPIPE."""
 
 
+def entry() -> NoReturn:
+    """Run `automax` as the program of this process: once the exit code stands, no Ctrl-C changes it any more."""
+    code = main()
+    try:
+        import signal
+
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except KeyboardInterrupt:
+        pass
+    sys.exit(code)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `automax` with the arguments (the process's own by default) and return its exit code."""
-    _accept_every_character()
     try:
+        _open_closed_streams()
+        _accept_every_character()
         code = _run(sys.argv[1:] if argv is None else list(argv))
         sys.stdout.flush()
     except KeyboardInterrupt:
@@ -62,6 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: list[str]) -> int:
+    from automax_ros.cli.usage import UsageError
+
     # The options in front of the subcommand take no values, so the first word is its name.
     name = next((word for word in argv if not word.startswith("-")), None)
     try:
@@ -85,8 +102,19 @@ def _run(argv: list[str]) -> int:
 
 def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.ArgumentParser, argparse.ArgumentParser]:
     """Return the parser of the whole command line and the chosen subcommand's, which alone knows its arguments."""
+    import argparse
+
+    from automax_ros import __version__
+
+    class WideHelp(argparse.HelpFormatter):
+        """Leaves room for the longest subcommand: argparse forgets that they are indented twice."""
+
+        def add_argument(self, action: argparse.Action) -> None:
+            super().add_argument(action)
+            self._action_max_length = max(self._action_max_length, max(map(len, SUBCOMMANDS)) + 4)
+
     parser = argparse.ArgumentParser(
-        prog="automax", description="A Reliance Electric AutoMax rack, emulated.", formatter_class=_HelpFormatter
+        prog="automax", description="A Reliance Electric AutoMax rack, emulated.", formatter_class=WideHelp
     )
     parser.add_argument("--version", action="version", version=f"automax {__version__}")
     chosen_parser = parser
@@ -105,20 +133,14 @@ def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.Arg
     return parser, chosen_parser
 
 
-class _HelpFormatter(argparse.HelpFormatter):
-    """Leaves room for the longest subcommand: argparse forgets that they are indented twice."""
-
-    def add_argument(self, action: argparse.Action) -> None:
-        """Take in an argument for the width of the first column."""
-        super().add_argument(action)
-        self._action_max_length = max(self._action_max_length, max(map(len, SUBCOMMANDS)) + 4)
-
-
 def _module(name: str) -> ModuleType:
+    import importlib
+
     return importlib.import_module(f"automax_ros.cli.{name.replace('-', '_')}")
 
 
-def _unknown(name: str) -> UsageError:
+def _unknown(name: str) -> Exception:
+    from automax_ros.cli.usage import UsageError
     from automax_ros.rack.findings import did_you_mean, quoted
 
     hint = did_you_mean(name, SUBCOMMANDS) or f"there are {', '.join(SUBCOMMANDS)}"
@@ -127,6 +149,17 @@ def _unknown(name: str) -> UsageError:
 
 def _exit_code(code: object) -> int:
     return code if isinstance(code, int) else 0 if code is None else 1
+
+
+def _open_closed_streams() -> None:
+    """Put /dev/null where the caller has closed a standard stream: Python has None there, and files take its number."""
+    for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8"))
 
 
 def _accept_every_character() -> None:
@@ -138,11 +171,13 @@ def _accept_every_character() -> None:
 
 def _discard_output() -> None:
     """Point standard output nowhere, so that Python's own flush at the end does not complain again."""
-    with contextlib.suppress(OSError, ValueError):
+    try:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
+    except (OSError, ValueError):
+        pass
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    entry()

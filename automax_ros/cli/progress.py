@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import TracebackType
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+from automax_ros.cli.status_line import erasing, fitting
+from automax_ros.cli.terminal import rewrites_lines
 
 _PATIENCE_S = 2.0
+_PERIOD_S = 0.1
+_WIDTH = 30
 _SHARES = 1000
 
 
@@ -22,35 +24,38 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __init__(self, title: str, total: int, *, wanted: bool = True) -> None:
         self._title = title
         self._total = total
-        self._wanted = wanted and total > 0 and sys.stderr.isatty()
+        self._wanted = wanted and total > 0 and rewrites_lines(sys.stderr)
         self._start = time.monotonic()
-        self._bar: Progress | None = None
-        self._line: TaskID | None = None
+        self._next = self._start + _PATIENCE_S
+        self._drawn = 0
 
     def show(self, done: int) -> None:
         """Tell how much is done by now."""
-        if not self._wanted or time.monotonic() - self._start < _PATIENCE_S:
+        if not self._wanted:
             return
-        if self._bar is None:
-            self._bar = self._opened()
-            self._line = self._bar.add_task(self._title, total=self._total)
-        if self._line is not None:
-            self._bar.update(self._line, completed=done)
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + _PERIOD_S
+            self._draw(min(1.0, done / self._total), now - self._start)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Take the bar away."""
-        if self._bar is not None:
-            self._bar.stop()
+        if self._drawn:
+            sys.stderr.write(erasing(self._drawn, shutil.get_terminal_size().columns))
+            sys.stderr.flush()
 
-    def _opened(self) -> Progress:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        bar = Progress(console=Console(stderr=True), transient=True)
-        bar.start()
-        return bar
+    def _draw(self, share: float, seconds: float) -> None:
+        filled = int(share * _WIDTH)
+        parts = [f"{self._title} {share:4.0%}", f"[{'#' * filled}{'.' * (_WIDTH - filled)}]"]
+        if share > 0:
+            parts.append(f"{seconds / share - seconds:.0f} s left")
+        columns = shutil.get_terminal_size().columns
+        line = fitting(parts, columns - 1)
+        sys.stderr.write(erasing(self._drawn, columns) + line)
+        sys.stderr.flush()
+        self._drawn = len(line)
 
 
 @contextmanager

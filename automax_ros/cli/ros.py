@@ -5,8 +5,8 @@ from __future__ import annotations
 from automax_ros.cli.usage import UsageError
 
 
-def prepare_ros() -> int:
-    """Make ROS 2 usable, before any input is read, and return the domain.
+def prepare_ros(hint: str | None = None) -> int:
+    """Make ROS 2 usable, before any input is read, and return the domain; ``hint`` says what to do without it.
 
     Raises:
         UsageError: it is not there, or the domain is none.
@@ -19,4 +19,4 @@ def prepare_ros() -> int:
 
         return domain_id()
     except RosUnavailable as error:
-        raise UsageError(str(error)) from error
+        raise UsageError(str(error), hint) from error

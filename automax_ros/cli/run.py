@@ -12,7 +12,11 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.rack_file import is_text, load_rack_file
 from automax_ros.cli.record_options import add_record_arguments, recording_options
+from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.run_plan import RunPlan
+from automax_ros.cli.run_simulated import run_simulated
 from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
@@ -21,12 +25,10 @@ from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.rack import Rack, RackError
+from automax_ros.rack.rack import RackError
 from automax_ros.rack.settings import SettingError, Watched, setting, watched
 
 WITHOUT_ROS = "or run with --simulated, which needs no ROS"
-_CANNOT_BE_READ = "AMX6000"
-_NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,34 +57,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
     duration_ns = _duration(arguments.duration)
+    if arguments.simulated and arguments.record is not None and duration_ns is None:
+        raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
     with stop_signals() as stop:
         if not arguments.simulated:
-            _prepare_ros()
+            prepare_ros(WITHOUT_ROS)
         config = _config(arguments.config, allow_outside=arguments.allow_outside)
         if config is None:
             return 1
-        settings = _settings(config, arguments.settings)
-        watch = _watched(config, arguments.watch)
-        recording = recording_options(arguments, config)
+        plan = RunPlan(
+            config,
+            duration_ns,
+            arguments.record,
+            recording_options(arguments, config),
+            tuple(_settings(config, arguments.settings)),
+            tuple(_watched(config, arguments.watch)),
+        )
         try:
             if arguments.simulated:
-                from automax_ros.cli.run_simulated import run_simulated
-
-                return run_simulated(config, duration_ns, arguments.record, recording, settings, watch, stop)
+                return run_simulated(plan, stop)
             from automax_ros.cli.run_live import run_live
 
-            return run_live(config, duration_ns, arguments.record, recording, settings, watch, stop)
+            return run_live(plan, stop)
         except RackError as error:
             return _refused(error)
         except BagError as error:
             print(error, file=sys.stderr)
             return 2
-
-
-def warn(rack: Rack) -> None:
-    """Print the warnings that the tasks' checks gave."""
-    for source, diagnostics in rack.warnings:
-        print_diagnostics(diagnostics, source, sys.stderr)
 
 
 def _duration(text: str | None) -> int | None:
@@ -97,24 +98,10 @@ def _duration(text: str | None) -> int | None:
     return duration_ns
 
 
-def _prepare_ros() -> None:
-    from automax_ros.nodes.environment import RosUnavailable, prepare
-
-    try:
-        prepare()
-    except RosUnavailable as error:
-        raise UsageError(str(error), WITHOUT_ROS) from error
-
-
 def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:
-    from automax_ros.rack.loader import load
-
-    result = load(path, allow_outside=allow_outside)
-    for item in result.diagnostics:
-        if item.code == _CANNOT_BE_READ:
-            raise UsageError(f"{path}: {item.message}")
+    result = load_rack_file(path, allow_outside=allow_outside)
     print_diagnostics(result.diagnostics, result.source, sys.stderr)
-    if any(item.code in _NOT_A_TEXT for item in result.diagnostics):
+    if not is_text(result):
         raise UsageError(f"{path} cannot be used")
     return result.config if not has_errors(result.diagnostics) else None
 

@@ -3,59 +3,36 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from pathlib import Path
 
-from automax_ros.bags.recorder import Recorder, RecordingOptions
+from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import DiskSync, RecordingWatch, live_options
-from automax_ros.cli.run import warn
-from automax_ros.cli.run_simulated import report_end
+from automax_ros.cli.run_plan import RunPlan, report_end, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.types import Value
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import LockError, RackLock, domain_id
-from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import Watched
 
 
-def run_live(
-    config: RackConfig,
-    duration_ns: int | None,
-    record: Path | None,
-    options: RecordingOptions,
-    settings: list[tuple[str, Value]],
-    watch: Sequence[Watched],
-    stop: StopRequest,
-) -> int:
+def run_live(plan: RunPlan, stop: StopRequest) -> int:
     """Run until the duration has passed or a stop is requested; return the exit code."""
     try:
         domain = domain_id()
-        with RackLock(config.namespace, domain):
-            return _run_locked(config, duration_ns, record, options, settings, watch, stop, domain)
+        with RackLock(plan.config.namespace, domain):
+            return _run_locked(plan, stop, domain)
     except (LockError, RosUnavailable) as error:
         raise UsageError(str(error)) from error
 
 
-def _run_locked(
-    config: RackConfig,
-    duration_ns: int | None,
-    record: Path | None,
-    options: RecordingOptions,
-    settings: list[tuple[str, Value]],
-    watch: Sequence[Watched],
-    stop: StopRequest,
-    domain: int,
-) -> int:
-    rack = Rack(config, stopwatch=time.perf_counter_ns)
+def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
+    rack = Rack(plan.config, stopwatch=time.perf_counter_ns)
     warn(rack)
     live = LiveRack(rack)
     recorder: Recorder | None = None
     sync: DiskSync | None = None
-    display = StatusDisplay(rack, watch, live=True)
+    display = StatusDisplay(rack, plan.watch, live=True)
     recording = RecordingWatch(None, display)
     told = False
 
@@ -70,13 +47,13 @@ def _run_locked(
         recording.tell()
 
     try:
-        if record is not None:
-            recorder = Recorder(rack, live.stream, record, live_options(options))
+        if plan.record is not None:
+            recorder = Recorder(rack, live.stream, plan.record, live_options(plan.recording))
             recording = RecordingWatch(recorder, display)
             sync = DiskSync(recorder.sync)
         display.message(_opening(rack, domain))
-        live.start(settings)
-        live.run(duration_ns, on_idle)
+        live.start(list(plan.settings))
+        live.run(plan.duration_ns, on_idle)
     finally:
         try:
             live.close()
@@ -87,7 +64,7 @@ def _run_locked(
                 recorder.close()
                 recorder.sync_at_end()
     recording.tell()
-    display.finish(record, complete=not recording.failed)
+    display.finish(plan.record, complete=not recording.failed)
     return report_end(rack, failed=recording.failed)
 
 

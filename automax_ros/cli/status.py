@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from automax_ros.cli.status_line import fitting
-from automax_ros.cli.terminal import rewrites_lines
+from automax_ros.cli.status_line import StatusLine
 from automax_ros.compile.functions import text_of
 from automax_ros.core.diagnostics import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.rack.rack import Processor, Rack
 from automax_ros.rack.settings import Watched
-
-_TERMINAL_PERIOD_NS = 200_000_000
-_PLAIN_PERIOD_NS = 5 * NS_PER_S
 
 
 class StatusDisplay:
@@ -27,24 +22,20 @@ class StatusDisplay:
     def __init__(self, rack: Rack, watch: Sequence[Watched], *, live: bool) -> None:
         """Begin; nothing is printed before the first update is due."""
         self._rack, self._watch, self._live = rack, watch, live
-        self._terminal = rewrites_lines(sys.stdout)
-        self._period_ns = _TERMINAL_PERIOD_NS if self._terminal else _PLAIN_PERIOD_NS
-        self._began = self._last = time.monotonic_ns()
+        self._line = StatusLine()
         self._last_rack_ns = 0
         self._last_scans = 0
         self._last_busy: dict[int, int] = {}
-        self._drawn = False
 
     def update(self, now_ns: int) -> None:
         """Show the state at a rack time if it is time to."""
-        wall = time.monotonic_ns()
-        if wall - self._last >= self._period_ns:
-            self._show(now_ns, wall)
+        passed = self._line.due()
+        if passed:
+            self._show(now_ns, passed)
 
     def message(self, text: str) -> None:
         """Print a line of its own."""
-        self._clear()
-        print(text, flush=True)
+        self._line.message(text)
 
     def printed(self) -> None:
         """Show what PRINT statements have written since the last call."""
@@ -54,10 +45,9 @@ class StatusDisplay:
 
     def finish(self, bag: Path | None, *, complete: bool = True) -> None:
         """Print the last state and the summary; ``complete`` tells whether all of the run is in the recording."""
-        wall = time.monotonic_ns()
-        self._clear()
+        self._line.clear()
         rack = self._rack
-        seconds, took = rack.now_ns / NS_PER_S, (wall - self._began) / NS_PER_S
+        seconds, took = rack.now_ns / NS_PER_S, (time.monotonic_ns() - self._line.began_ns) / NS_PER_S
         pace = "" if self._live else f" in {took:.2f} s ({seconds / took if took else 0:.0f} times real time)"
         print(f"ran {seconds:.3f} s{pace}")
         print(f"  {'task':10}{'slot':>4}{'period ms':>11}{'scans':>10}{'late':>7}{'errors':>8}", end="")
@@ -82,39 +72,29 @@ class StatusDisplay:
             print(f"recorded {bag}: {size / 1e6:.2f} MB{rest}")
         sys.stdout.flush()
 
-    def _show(self, now_ns: int, wall: int) -> None:
+    def _show(self, now_ns: int, passed_ns: int) -> None:
         scans = sum(item.scans for item in self._rack.statistics.values())
         elapsed = (now_ns - self._last_rack_ns) / NS_PER_S
         rate = (scans - self._last_scans) / elapsed if elapsed else 0.0
         parts = [f"{now_ns / NS_PER_S:8.1f} s", f"{rate:.0f} scans/s"]
         if self._live:
-            parts += [self._load(processor, wall) for processor in self._rack.processors]
+            parts += [self._load(processor, passed_ns) for processor in self._rack.processors]
         else:
-            parts.append(f"{(now_ns - self._last_rack_ns) / max(1, wall - self._last):.0f}x")
+            parts.append(f"{(now_ns - self._last_rack_ns) / passed_ns:.0f}x")
         parts += self._values()
-        self._last, self._last_rack_ns, self._last_scans = wall, now_ns, scans
-        if self._terminal:
-            sys.stdout.write(f"\r\x1b[K{fitting(parts, shutil.get_terminal_size().columns - 1)}")
-            self._drawn = True
-        else:
-            sys.stdout.write("  ".join(parts) + "\n")
-        sys.stdout.flush()
+        self._last_rack_ns, self._last_scans = now_ns, scans
+        self._line.show(parts)
 
-    def _load(self, processor: Processor, wall: int) -> str:
+    def _load(self, processor: Processor, passed_ns: int) -> str:
         """Return a Processor's share of the time since the last line, and the deadlines it has missed."""
         busy = sum(self._rack.statistics[task.name].total_ns for task in processor.tasks)
-        share = (busy - self._last_busy.get(processor.slot, 0)) / max(1, wall - self._last)
+        share = (busy - self._last_busy.get(processor.slot, 0)) / passed_ns
         self._last_busy[processor.slot] = busy
         late = sum(self._rack.statistics[task.name].skipped for task in processor.tasks)
         return f"P{processor.slot} {100 * share:.1f} % late {late}"
 
     def _values(self) -> list[str]:
         return [f"{item.label}={_shown(self._rack.value(item.name, item.element))}" for item in self._watch]
-
-    def _clear(self) -> None:
-        if self._drawn:
-            sys.stdout.write("\r\x1b[K")
-            self._drawn = False
 
 
 def _shown(value: Value) -> str:

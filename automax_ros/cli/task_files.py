@@ -19,6 +19,7 @@ from automax_ros.rack.names import NameFault, check_task_name
 from automax_ros.rack.task_source import read_task_source
 
 TASK_SUFFIX = ".BLK"
+_RACK_SUFFIXES = (".YAML", ".YML")
 _MILLISECONDS = re.compile(r"[0-9]{1,6}(\.[0-9]{0,6})?|\.[0-9]{1,6}")
 """Bounded: an exponent of many digits would take for ever to become an exact number."""
 _OTHER_TASKS = {".BAS": "BASIC tasks", ".PC": "ladder tasks", ".CNF": "configuration tasks", ".INC": "include files"}
@@ -64,6 +65,12 @@ def target_of(arguments: argparse.Namespace) -> Target:
     if is_udc and tick != UDC_TICK_NS:
         raise UsageError(f"--tick-ms {arguments.tick_ms}: the tick of a UDC is always 0.5 ms")
     return Target(processor, tick)
+
+
+def is_rack_file(path: Path) -> bool:
+    """Whether a path means a rack file: by its name, or as the folder of one."""
+    suffix = path.suffix.upper()
+    return suffix in _RACK_SUFFIXES or (suffix != TASK_SUFFIX and path.is_dir())
 
 
 def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult]:

@@ -279,6 +279,15 @@ def test_terminal_tells_that_all_is_well(automax, monkeypatch):
     assert automax("check", name).out == "no problems in 1 file\n"
 
 
+def test_terminal_tells_what_a_rack_consists_of(automax, monkeypatch):
+    automax.write("SPEED.BLK", SPEED)
+    automax.write("rack.yaml", RACK)
+    Terminal(monkeypatch)
+    shown = "rack.yaml: 1 Processor, 1 task, 2 commons\nno problems in 1 file\n"
+    assert automax("check", "rack.yaml").out == shown
+    assert automax("check", ".").out == shown
+
+
 @pytest.mark.parametrize(("variable", "value"), [("NO_COLOR", "1"), ("TERM", "dumb")])
 def test_colours_can_be_refused(automax, monkeypatch, variable, value):
     name = automax.write("TASK.BLK", WRONG)

@@ -109,6 +109,62 @@ def test_full_disk_is_told_without_a_traceback(tmp_path):
     assert err == f"automax: error: the output cannot be written: {os.strerror(errno.ENOSPC)}\n"
 
 
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "blocks",
+        "check rack.yaml",
+        "run rack.yaml --simulated --duration 0.1",
+        "run rack.yaml --duration 0.01",
+        "bag info bag",
+    ],
+)
+def test_closed_streams_are_nobody_who_reads(tmp_path, ros_domain_id, closed, arguments):
+    """The command does what it should; its exit code tells, and nothing lands in a file that got the number."""
+    config = ROOT / "config" / "section_drive" / "rack.yaml"
+    line = arguments.replace("rack.yaml", str(config)).replace("bag info bag", f"bag info {ROOT}/bags/section_drive")
+    command = f"{sys.executable} -m automax_ros.cli.main {line} {closed}"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    result = subprocess.run(
+        ["/bin/sh", "-c", command], capture_output=True, text=True, check=False, cwd=tmp_path, env=environment
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_interrupt_while_imports_last_is_silent(tmp_path):
+    """However early Ctrl-C comes once `automax` itself has begun."""
+    code = (
+        "import sys, importlib, builtins\n"
+        "from automax_ros.cli import main\n"
+        "class Interrupting:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == sys.argv[1]:\n"
+        "            raise KeyboardInterrupt\n"
+        "wanted = sys.argv[1]\n"
+        "sys.meta_path.insert(0, Interrupting())\n"
+        "sys.modules.pop(wanted, None)\n"
+        "sys.argv[1:] = [wanted]\n"
+        "main.sys.exit(main.main(['check', 'none.BLK']))\n"
+    )
+    for module in ("argparse", "automax_ros.cli.usage", "automax_ros.cli.check", "automax_ros.blocks.catalogue"):
+        with started(module, code=code) as process:
+            out, err = process.communicate(timeout=60)
+        assert (process.returncode, out, err) == (INTERRUPTED, "", ""), module
+
+
+def test_interrupt_after_the_end_leaves_the_exit_code(tmp_path):
+    code = (
+        "import atexit, os, signal, sys\n"
+        "atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))\n"
+        "from automax_ros.cli.main import entry\n"
+        "entry()"
+    )
+    with started("--version", code=code) as process:
+        _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "")
+
+
 def test_terminal_without_a_character_does_not_stop_the_program(tmp_path):
     path = tmp_path / "TASK.BLK"
     path.write_text("10 CALL SCAN_LOOP(TICKS=4)\n20 PRINT 'Grüße', X%\n30 END\n", encoding="utf-8")

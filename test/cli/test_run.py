@@ -7,7 +7,7 @@ import pytest
 
 from automax_ros.cli import status as status_module
 from automax_ros.cli.status import StatusDisplay
-from automax_ros.cli.status_line import fitting
+from automax_ros.cli.status_line import erasing, fitting
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import Watched
@@ -151,11 +151,47 @@ def test_bad_watch_is_wrong_usage(run, watch, words):
 
 
 def test_unreadable_file_is_wrong_usage(automax, tmp_path):
-    for name in ("missing.yaml", "."):
+    (tmp_path / "folder" / "rack.yaml").mkdir(parents=True)
+    for name in ("missing.yaml", "folder/rack.yaml/missing.yaml"):
         result = automax("run", name, "--simulated", "--duration", "1")
         assert result.code == 2, name
         assert result.err.startswith(f"automax run: error: {name}: the rack file "), result.err
         assert result.err.count("\n") == 1
+
+
+def test_folder_means_its_rack_file(run, automax):
+    result = automax("run", ".", "--simulated", "--duration", "0.1")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith("ran 0.100 s")
+
+
+def test_folder_without_a_rack_file_says_what_to_do(automax, tmp_path):
+    result = automax("run", tmp_path, "--simulated", "--duration", "1")
+    assert (result.code, result.out) == (2, "")
+    assert "is a folder without a rack.yaml" in result.err
+    assert "`automax new" in result.err
+
+
+def test_task_in_place_of_a_rack_says_what_to_do(run, automax):
+    result = automax("run", "TASK.BLK", "--simulated", "--duration", "1")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith("automax run: error: TASK.BLK is a task, and a rack is made of its rack file (.yaml)")
+    assert "`automax trace TASK.BLK --input IN.csv`" in result.err
+
+
+def test_simulated_recording_needs_an_end(run, automax):
+    result = run("--record", "bag")
+    assert (result.code, result.out) == (2, "")
+    assert "--record of a simulated run needs --duration" in result.err
+    assert not (automax.folder / "bag").exists()
+
+
+def test_simulated_run_without_an_end_says_so(automax):
+    automax.write("rack.yaml", RACK)
+    automax.write("TASK.BLK", TASK.replace("120 IF RUN@ THEN X% = 1 / NIL%", "120 IF TOTAL! > 20 THEN 120"))
+    result = automax("run", "rack.yaml", "--simulated")
+    assert result.code == 1
+    assert result.out.startswith("simulated time without an end: Ctrl-C ends the run (or give --duration S)\n")
 
 
 def test_text_that_is_no_yaml_is_wrong_usage(automax):
@@ -322,3 +358,10 @@ def test_no_part_of_the_status_line_is_cut():
     assert fitting(parts, len(whole)) == whole
     assert fitting(parts, len(whole) - 1) == "  ".join(parts[:3])
     assert fitting(parts, 4) == "  1."
+
+
+def test_line_that_a_narrower_terminal_has_wrapped_is_erased_whole():
+    assert erasing(0, 80) == erasing(79, 80) == erasing(80, 80) == "\r\x1b[K"
+    assert erasing(79, 40) == "\r\x1b[1A\x1b[J"
+    assert erasing(79, 20) == "\r\x1b[3A\x1b[J"
+    assert fitting(["1.0 s"], -1) == ""

@@ -85,7 +85,7 @@ def test_stop_at_any_moment_is_clean(ros_domain_id, number):
 
 def test_simulated_run_stops_on_a_signal(tmp_path):
     bag = tmp_path / "bag"
-    with Automax("run", TYPES, "--simulated", "--record", bag) as process:
+    with Automax("run", TYPES, "--simulated", "--duration", "1e6", "--record", bag) as process:
         process.wait_until_catching(signal.SIGTERM)
         wait_until(lambda: bag.exists() and (bag / "scans_0.mcap").stat().st_size > 0)
         ended = process.end(signal.SIGTERM)

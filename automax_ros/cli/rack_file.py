@@ -1,0 +1,51 @@
+"""Rack files on the command line: which file is meant, reading it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from automax_ros.cli.task_files import TASK_SUFFIX
+from automax_ros.cli.usage import UsageError
+from automax_ros.rack.loader import LoadResult, load
+
+DEFAULT_RACK_FILE = "rack.yaml"
+"""What a folder means where a rack file is asked for."""
+_CANNOT_BE_READ = "AMX6000"
+_NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
+
+
+def load_rack_file(path: Path, *, allow_outside: bool) -> LoadResult:
+    """Read a rack file, or the ``rack.yaml`` of a folder.
+
+    Raises:
+        UsageError: it cannot be read, or is a task.
+    """
+    path = _meant(path)
+    result = load(path, allow_outside=allow_outside)
+    for item in result.diagnostics:
+        if item.code == _CANNOT_BE_READ:
+            raise UsageError(f"{path}: {item.message}")
+    return result
+
+
+def is_text(result: LoadResult) -> bool:
+    """Whether a rack file could be read as text; too large, or not UTF-8, it counts as unreadable."""
+    return not any(item.code in _NOT_A_TEXT for item in result.diagnostics)
+
+
+def _meant(path: Path) -> Path:
+    """Return the rack file that an argument means.
+
+    Raises:
+        UsageError: it is a task, or a folder without a rack file.
+    """
+    if path.suffix.upper() == TASK_SUFFIX:
+        hint = f"`automax trace {path} --input IN.csv` runs a task alone; `automax new {path.parent}` makes a rack file"
+        raise UsageError(f"{path} is a task, and a rack is made of its rack file (.yaml)", hint)
+    if not path.is_dir():
+        return path
+    found = path / DEFAULT_RACK_FILE
+    if not found.is_file():
+        hint = f"name the rack's YAML file; `automax new {path}` makes one from the folder's tasks"
+        raise UsageError(f"{path} is a folder without a {DEFAULT_RACK_FILE}", hint)
+    return found
