@@ -143,7 +143,7 @@ class ProcessorNode(Node):  # type: ignore[misc]
         elif task.status is not Status.RUNNING:
             level = DiagnosticStatus.WARN
         elif newly_skipped:
-            level, text = DiagnosticStatus.WARN, f"{newly_skipped} deadlines missed since the last report"
+            level, text = DiagnosticStatus.WARN, f"AMX7042 deadlines missed since the last report: {newly_skipped}"
         elif task.errors.last is not None:
             level, text = DiagnosticStatus.WARN, task.errors.last.describe()
         mean_ns = statistics.total_ns / statistics.scans if statistics.scans else 0.0

@@ -185,6 +185,27 @@ def test_fault_stops_all_tasks(ros_domain_id):
     )
 
 
+def test_missed_deadlines_are_told(ros_domain_id):
+    """A host that stands still makes every task late; the next scans are on the grid again, and nothing stops."""
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+    with Automax("run", TYPES) as process, Client() as client:
+        process.wait_for_line(READY)
+        arrays = client.listen(DiagnosticArray, "/diagnostics")
+        client.until(lambda: arrays)
+        process.send(signal.SIGSTOP)
+        time.sleep(0.3)
+        process.send(signal.SIGCONT)
+        late = re.compile(r"AMX7042 deadlines missed since the last report: (\d+)")
+
+        def missed() -> list[int]:
+            found = [(status.level, late.fullmatch(status.message)) for array in arrays for status in array.status]
+            return [int(match[1]) for level, match in found if match and level == DiagnosticStatus.WARN]
+
+        client.until(lambda: any(count >= 50 for count in missed()))
+        assert process.end(signal.SIGINT).code == 0
+
+
 def test_fault_before_the_first_scan_is_told_once(ros_domain_id):
     ended = automax("run", STUCK, "--set", "GO@=1", "--duration", "0.5")
     assert ended.code == 1

@@ -24,7 +24,5 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX7032", "DATA value of another kind than the variable"),
     Problem("AMX7031", "bus error", hardware="31"),
     Problem("AMX7040", "scan stopped: too many statements", hardware="14"),
-    Problem("AMX7041", "overlap: scan not finished when the next is due", hardware="14"),
     Problem("AMX7042", "deadline missed on the wall clock"),
-    Problem("AMX7090", "the scan failed inside the emulator"),
 )
