@@ -1,0 +1,111 @@
+"""Every key of docs/rack_yaml.md does something: two racks that differ in it alone behave differently."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack
+from automax_ros.wire.cdr import decode
+from automax_ros.wire.stream import RackStream
+
+PAGE = Path(__file__).parents[2] / "docs" / "rack_yaml.md"
+COUNTING = "10 COMMON COUNT%\n20 CALL SCAN_LOOP(TICKS=1)\n30 COUNT% = COUNT% + {step}\n40 END\n"
+RACK = """\
+rack: LINE1
+slots:
+  0: {module: 57C413}
+  1: {module: 57C435, tick_ms: 5.5, tasks: {ONE: {priority: 5}, TWO: {priority: 6}}}
+common:
+  COUNT%: {ros: out, unit: ft, description: length}
+"""
+
+
+class Behaviour(NamedTuple):
+    """What a rack did in 22 ms: its topics and messages in order, COUNT% at the end and after STOP ALL."""
+
+    messages: list[tuple[str, Any]]
+    count: object
+    after_stop: object
+
+    def on(self, topic: str) -> list[Any]:
+        return [message for name, message in self.messages if name.endswith(f"/{topic}")]
+
+    @property
+    def variable(self) -> Any:
+        return self.on("variables")[0].variables[0]
+
+
+def behaviour(folder: Path, text: str) -> Behaviour:
+    for name, step in (("ONE", 1), ("TWO", 10), ("other", 100)):
+        (folder / f"{name}.BLK").write_text(COUNTING.format(step=step))
+    path = folder / "rack.yaml"
+    path.write_text(text)
+    result = load(path)
+    assert result.config is not None, result.diagnostics
+    rack = Rack(result.config)
+    messages: list[tuple[str, Any]] = []
+    stream = RackStream(rack, 1)
+    stream.add_sink(lambda topic, _, data: messages.append((topic.name, decode(topic.type_name, data))))
+    stream.begin()
+    rack.start()
+    rack.run(0.022)
+    count = rack.value("COUNT%")
+    rack.stop_all("test")
+    return Behaviour(messages, count, rack.value("COUNT%"))
+
+
+def tasks(found: Behaviour) -> list[str]:
+    """The tasks of the first scans, in order."""
+    return [scan.task for scan in found.on("scans") if scan.stamp == 0 and scan.scan == 1]
+
+
+CHANGES: dict[str, tuple[tuple[str, str], Callable[[Behaviour], object], object, object]] = {
+    "rack": (("LINE1", "MILL"), lambda found: found.messages[0][0], "/line1/variables", "/mill/variables"),
+    "slots": (("1: {module", "3: {module"), lambda found: found.on("scans")[0].slot, 1, 3),
+    "common": (
+        ("common:\n", "common:\n  SPARE@:\n"),
+        lambda found: len(found.on("variables")[0].variables),
+        1,
+        2,
+    ),
+    "tick_ms": (("5.5", "10"), lambda found: found.count, 44, 33),
+    "tasks": (("ONE: {priority: 5}, ", ""), tasks, ["ONE", "TWO"], ["TWO"]),
+    "priority": (("priority: 6", "priority: 4"), tasks, ["ONE", "TWO"], ["TWO", "ONE"]),
+    "file": (("priority: 6", "priority: 6, file: other.BLK"), lambda found: found.count, 44, 404),
+    "ros": (("ros: out, ", "ros: closed, "), lambda found: len(found.on("common/COUNT")), 10, 0),
+    "rate_limit_hz": (("ros: out", "ros: out, rate_limit_hz: 10"), lambda found: len(found.on("common/COUNT")), 10, 1),
+    "preset": (("ros: out", "ros: out, preset: 7"), lambda found: found.count, 44, 51),
+    "non_volatile": (("ros: out", "ros: out, non_volatile: true"), lambda found: found.after_stop, 0, 44),
+    "unit": (("ft", "m"), lambda found: found.variable.unit, "ft", "m"),
+    "description": (("length", "speed"), lambda found: found.variable.description, "length", "speed"),
+}
+"""For each key: the text that is replaced and by what, what is looked at, what it is before and after."""
+
+
+@pytest.mark.parametrize("key", CHANGES)
+def test_a_key_changes_what_the_rack_does(key, tmp_path):
+    (old, new), look, before, after = CHANGES[key]
+    assert old in RACK
+    assert look(behaviour(tmp_path, RACK)) == before
+    assert look(behaviour(tmp_path, RACK.replace(old, new, 1))) == after
+
+
+def test_the_module_decides_how_many_registers_there_are(tmp_path):
+    text = RACK + "  BIG!(40000):\n"
+    (tmp_path / "rack.yaml").write_text(text)
+    assert [item.code for item in load(tmp_path / "rack.yaml").diagnostics][-1:] == ["AMX6409"]
+    behaviour(tmp_path, text.replace("57C413", "57C423"))
+
+
+def test_every_documented_key_is_tried():
+    """The services of ``operator`` are still to come; the page says so."""
+    text = PAGE.read_text(encoding="utf-8")
+    tables = re.findall(r"^\| (?:key|option) \| value .*\n\| --- .*\n((?:\|.*\n)+)", text, re.M)
+    rows = [re.match(r"\| `(\w+)` \|", row) for table in tables for row in table.splitlines()]
+    keys = {match[1] for match in rows if match}
+    assert keys == {*CHANGES, "module", "operator"}
+    assert "`operator` | `true` or `false` | `false` | No effect yet" in text
