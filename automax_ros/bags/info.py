@@ -14,7 +14,8 @@ from mcap.records import Attachment
 from automax_ros.bags.common_log import CommonLog, variables_of
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.reader import BagReader, size_of
+from automax_ros.bags.opening import size_of
+from automax_ros.bags.reader import BagReader
 from automax_ros.bags.series import Progress
 from automax_ros.core.decimal_text import seconds_text
 from automax_ros.wire.cdr import CdrError, decoder
@@ -173,7 +174,8 @@ def _data_files(info: BagInfo) -> list[Path]:
     try:
         reader = BagReader(info.path)
     except BagError as error:
-        files = sorted(info.path.glob("*.mcap"), key=_in_order) if info.path.is_dir() else []
+        found = info.path.glob("*.mcap") if info.path.is_dir() else ()
+        files = sorted(filter(Path.is_file, found), key=_in_order)
         if not files or error.code == "AMX6811":
             raise
         info.problems.append(_with_repair(error))

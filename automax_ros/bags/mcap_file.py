@@ -22,6 +22,7 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Me
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.bags.opening import NO_BAG_HINT, opened
 from automax_ros.bags.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Unpacker
 
 _FIRST_PRIVATE_OPCODE = 0x80
@@ -72,20 +73,13 @@ class McapFile:
         Raises:
             BagError: the file is truncated, damaged, beyond the limits or no recording of ROS 2.
         """
-        try:
-            with self.path.open("rb") as file:
-                self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
-                yield from self._records(file, messages)
-        except OSError as error:
-            raise BagError("AMX6810", self.path, f"cannot be read: {error.strerror or error}") from error
-        except MemoryError as error:
-            raise BagError("AMX6814", self.path, "not enough memory for a record of this file") from error
+        with opened(self.path) as file:
+            self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
+            yield from self._records(file, messages)
 
     def _records(self, file: BinaryIO, messages: bool) -> Iterator[RawMessage | Attachment | Metadata]:
         if file.read(len(MAGIC)) != MAGIC:
-            raise BagError(
-                "AMX6810", self.path, "is not an mcap file", "give the folder or the .mcap file of a recording"
-            )
+            raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
         self._position, self._crc = len(MAGIC), zlib.crc32(MAGIC)
         self._check_header(*self._next_record(file)[1:])
         while True:

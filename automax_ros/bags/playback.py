@@ -11,7 +11,8 @@ from mcap.records import Channel, Schema
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.reader import BagReader, FileOrder, size_of
+from automax_ros.bags.opening import size_of
+from automax_ros.bags.reader import BagReader, FileOrder
 from automax_ros.bags.recorded_qos import recorded_qos
 from automax_ros.wire.cdr import CdrError, decode, encode
 from automax_ros.wire.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout

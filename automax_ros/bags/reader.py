@@ -14,6 +14,7 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE
+from automax_ros.bags.opening import no_recording, opened, size_of
 from automax_ros.core.diagnostics import printable
 from automax_ros.wire.cdr import CdrError, Message, decoder
 from automax_ros.wire.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
@@ -26,7 +27,6 @@ _PROGRESS_MASK = 0x3FF
 """Progress is told once in so many records."""
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 """Leaves every scalar a string: numbers and dates of a hostile file cost nothing."""
-NO_BAG_HINT = "give the folder of a recording, which holds metadata.yaml, or one .mcap file"
 
 
 class BagMessage(NamedTuple):
@@ -193,24 +193,6 @@ class _ChannelReader:
             ) from error
 
 
-def no_recording(path: Path) -> BagError:
-    """Return the error that tells why nothing can be read at a path that is neither a folder nor a regular file."""
-    what = "does not exist"
-    if path.exists():
-        what = "is no regular file"
-    elif path.is_symlink():
-        what = "is no regular file but a link that leads nowhere"
-    return BagError("AMX6810", path, what, NO_BAG_HINT)
-
-
-def size_of(file: Path) -> int:
-    """Return the size of a file in bytes, at least 1; 1 if the system does not tell."""
-    try:
-        return max(1, file.stat().st_size)
-    except OSError:
-        return 1
-
-
 def _is_wanted(record: RawMessage, topics: Collection[str] | None, types: Collection[str] | None) -> bool:
     type_name = record.schema.name if record.schema else ""
     return (topics is None or record.channel.topic in topics) and (types is None or type_name in types)
@@ -257,17 +239,14 @@ def read_information(folder: Path) -> dict[str, Any]:
         BagError: it is not there, cannot be read, or describes no mcap files.
     """
     path = folder / METADATA_FILE
-    try:
-        with path.open("rb") as file:
-            text = file.read(MAX_METADATA_BYTES + 1)
-    except FileNotFoundError:
+    if not path.exists():
         hint = (
             "the recording was not finished: `automax bag repair` completes it; or this is another folder; "
             "a single .mcap file can be read by its own name"
         )
-        raise BagError("AMX6810", folder, "has no metadata.yaml", hint) from None
-    except OSError as error:
-        raise BagError("AMX6810", path, f"cannot be read: {error.strerror or error}") from error
+        raise BagError("AMX6810", folder, "has no metadata.yaml", hint)
+    with opened(path) as file:
+        text = file.read(MAX_METADATA_BYTES + 1)
     if len(text) > MAX_METADATA_BYTES:
         raise BagError("AMX6814", path, f"is longer than {MAX_METADATA_BYTES} bytes")
     data = load_yaml(path, text)

@@ -18,8 +18,8 @@ _LONGEST_SUFFIX = 16
 def written_whole(path: Path) -> Iterator[Path]:
     """Give the path to write to, in the same folder and with the same suffix; ``path`` is replaced when the block ends.
 
-    If the block ends with an exception the new file is removed, and ``path`` stays as it was. What is no regular file,
-    such as a pipe or /dev/stdout, is given itself.
+    If the block ends with an exception the new file is removed, and ``path`` stays as it was. A pipe, /dev/stdout
+    and whatever else is not a regular file is given itself.
 
     Raises:
         OSError: the folder or the file there cannot be written.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import stat
+from io import BufferedReader
 from pathlib import Path
 
 MAX_BYTES = 1_000_000
@@ -18,16 +20,32 @@ class FileFault(OSError):
         self.too_large = too_large
 
 
+def open_regular(path: Path) -> BufferedReader:
+    """Open a regular file for reading; a pipe or a device is refused at once, so nobody waits for its other end.
+
+    Raises:
+        FileFault: a folder, a pipe or a device stands there.
+        OSError: the file does not exist or cannot be opened.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if not stat.S_ISREG(mode):
+            raise FileFault("is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file")
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return os.fdopen(descriptor, "rb")
+
+
 def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
     """Return what a regular file holds.
 
     Raises:
-        FileFault: the file does not exist, is no regular file, cannot be read, or has more than ``limit`` bytes.
+        FileFault: the file does not exist, is not a regular file, cannot be read, or has more than ``limit`` bytes.
     """
     try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise FileFault("is not a file" if not path.is_dir() else "is a folder, not a file")
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             data = stream.read(limit + 1)
     except FileFault:
         raise

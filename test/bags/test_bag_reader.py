@@ -306,12 +306,12 @@ def test_special_files_are_no_recordings(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to("nowhere")
     for path in (Path("/dev/zero"), tmp_path / "pipe"):
-        assert refused("AMX6810", lambda path=path: BagReader(path)).message == "is no regular file"
-        assert refused("AMX6810", lambda path=path: repair(path)).message == "is no regular file"
+        assert refused("AMX6810", lambda path=path: BagReader(path)).message == "is not a regular file"
+        assert refused("AMX6810", lambda path=path: repair(path)).message == "is not a regular file"
     assert "a link that leads nowhere" in refused("AMX6810", lambda: BagReader(tmp_path / "link")).message
     assert refused("AMX6810", lambda: BagReader(tmp_path / "none")).message == "does not exist"
     (tmp_path / "metadata.yaml").write_text(METADATA.replace("scans_0.mcap", "pipe"))
-    assert refused("AMX6810", lambda: BagReader(tmp_path)).message == "is no regular file"
+    assert refused("AMX6810", lambda: BagReader(tmp_path)).message == "is not a regular file"
 
 
 def test_every_message_before_the_cut_is_handed_out(tmp_path: Path) -> None:

@@ -17,7 +17,8 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError, RecordingError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, yaml_text
-from automax_ros.bags.reader import NO_BAG_HINT, BagReader, no_recording, read_information
+from automax_ros.bags.opening import NO_BAG_HINT, no_recording
+from automax_ros.bags.reader import BagReader, read_information
 from automax_ros.bags.repair.contents import FileContents, topics_of
 from automax_ros.bags.repair.provenance import Provenance
 from automax_ros.bags.repair.rewriting import Definitions, Rewriting

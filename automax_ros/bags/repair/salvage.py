@@ -22,6 +22,7 @@ from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.bags.opening import NO_BAG_HINT, opened
 from automax_ros.bags.unpacking import MAX_RECORD_BYTES, Unpacker
 
 _CHUNK_FIELDS = struct.Struct("<QQQII")
@@ -76,24 +77,17 @@ class Salvage:
         Raises:
             BagError: the file cannot be read or is beyond the limits, or is no recording of ROS 2 at all.
         """
-        try:
-            with self.path.open("rb") as file:
-                size = file.seek(0, io.SEEK_END)
-                file.seek(0)
-                yield from self._pieces(file, size)
-        except OSError as error:
-            raise BagError("AMX6810", self.path, f"cannot be read: {error.strerror or error}") from error
-        except MemoryError as error:
-            raise BagError("AMX6814", self.path, "not enough memory for a record of this file") from error
+        with opened(self.path) as file:
+            size = file.seek(0, io.SEEK_END)
+            file.seek(0)
+            yield from self._pieces(file, size)
 
     def _pieces(self, file: BinaryIO, size: int) -> Iterator[Piece]:
         unpacker = Unpacker(self.path, size)
         magic = file.read(len(MAGIC))
         if magic != MAGIC:
             if not MAGIC.startswith(magic):
-                raise BagError(
-                    "AMX6810", self.path, "is not an mcap file", "give the folder or the .mcap file of a recording"
-                )
+                raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
             self._lose(len(magic), "is empty")
             return
         position = len(MAGIC)
