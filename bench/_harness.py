@@ -13,8 +13,9 @@ from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.core.types import DataType
 from automax_ros.language.checks.checker import check
 from automax_ros.language.syntax.tree import Scope
-from automax_ros.running.memory import CommonMemory, ViewSpec
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
+from automax_ros.running.views import ViewSpec
 
 REPEATS = 60
 """Short runs of which the fastest counts, so that other work on the machine disturbs little."""

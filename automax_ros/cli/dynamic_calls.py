@@ -31,7 +31,7 @@ from automax_ros.language.syntax.tree import (
 )
 from automax_ros.language.syntax.walk import bodies, statements_in_order
 from automax_ros.rack.findings import did_you_mean, quoted
-from automax_ros.running.memory import MemoryValueError, ViewSpec, fitting
+from automax_ros.running.views import MemoryValueError, ViewSpec, fitting
 
 SIGNALS = ("INPUT", "FEEDBACK")
 """The inputs that carry the signal through a block."""

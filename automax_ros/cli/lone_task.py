@@ -13,8 +13,9 @@ from automax_ros.language.checks.suggestions import Suggester
 from automax_ros.language.program import Program, Symbol
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.rack.findings import quoted
-from automax_ros.running.memory import CommonMemory, ViewSpec, fitting
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
+from automax_ros.running.views import ViewSpec, fitting
 
 _NAME = re.compile(
     r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>[0-9]{1,6}(?:,[0-9]{1,6}){0,3})[)\]])?"

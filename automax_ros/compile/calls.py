@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from automax_ros.blocks.coefficients import evaluate, evaluate_noting
@@ -30,7 +30,7 @@ from automax_ros.compile.expressions import SUBSCRIPT, lower_element, lower_inde
 from automax_ros.compile.folding import TableReader
 from automax_ros.compile.inline import Binding, inline
 from automax_ros.compile.layout import Field, Role
-from automax_ros.compile.pynames import structure_prefix, variable_name
+from automax_ros.compile.pynames import forced_name, latched_name, structure_prefix, variable_name
 from automax_ros.compile.simplify import log_in_place
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
@@ -172,6 +172,15 @@ def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     for output in block.outputs:
         if output.name in wanted:
             _store_output(emitter, output, bound.arguments[output.name], inlined.outputs[output.name], held)
+    _drop_forced(emitter, [bound.arguments[name] for name in wanted])
+
+
+def _drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
+    """Emit that forced commons among a block's targets have the forced value, whatever the block gave them."""
+    names = [target.name for target in targets if isinstance(target, Variable) and target.name in emitter.forces]
+    for name in dict.fromkeys(names):
+        restore = build.assign(variable_name(name), build.name(latched_name(name)))
+        emitter.emit(build.when(build.name(forced_name(name)), [restore]))
 
 
 def _is_value(block: Block, item: Input) -> bool:

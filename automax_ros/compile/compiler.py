@@ -7,6 +7,9 @@ Three functions come from one lowering of the same tree:
 - ``scan_steps(state, io)``: one scan as a generator, which yields the modeled time in ns that has passed before each
   read or write of actual memory, for execution with modeled times.
 
+``scans`` and ``scan_steps`` have a second form for tasks with forced commons: there a block's write to a forced common
+is dropped in the scan's buffer, so that later blocks see the forced value (decision).
+
 ``startup`` and ``scan_steps`` return, and ``scans`` yields, True if the task executed STOP. ``state`` is the list of
 the layout's fields: loaded into locals at the start, stored back at the end, also when a scan is broken off. ``scans``
 ends when it is closed: between scans its locals hold the state, so that a scan neither loads nor stores it. ``io`` is
@@ -32,7 +35,7 @@ from automax_ros.compile.cost import CostModel
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.functions import BUILTINS, OPERATIONS
 from automax_ros.compile.layout import Field, Layout, Role, StateValue
-from automax_ros.compile.pynames import block_prefix, latched_name, variable_name
+from automax_ros.compile.pynames import block_prefix, forced_name, latched_name, variable_name
 from automax_ros.compile.statements import STOPPED, StatementLowering
 from automax_ros.core.types import Latched, Value
 from automax_ros.language.program import Program, Symbol
@@ -55,6 +58,10 @@ class ScanIo(Protocol):
 
     def latch(self) -> Latched:
         """Return the latched commons in the order of ``CompiledTask.latched``."""
+        ...
+
+    def forces(self) -> tuple[bool, ...]:
+        """Return which of ``CompiledTask.written`` a force holds."""
         ...
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
@@ -101,19 +108,30 @@ ScanSteps = Callable[[State, ScanIo], Generator[int, None, bool]]
 
 @dataclass(frozen=True)
 class CompiledTask:
-    """A task ready to run. ``latched`` are the names of the commons that a scan latches, in order."""
+    """A task ready to run. ``latched`` are the commons that a scan latches, ``written`` what blocks can change."""
 
     program: Program
     layout: Layout
     latched: tuple[str, ...]
+    written: tuple[str, ...]
     startup: Startup
     scans: Scans
     _compilation: _Compilation = field(repr=False, compare=False)
 
     @cached_property
+    def scans_forced(self) -> Scans:
+        """The same as ``scans`` while commons that blocks write may be forced."""
+        return cast(Scans, self._compilation.functions("scans_forced")["scans_forced"])
+
+    @cached_property
     def scan_steps(self) -> ScanSteps:
         """One scan in steps of modeled time."""
         return cast(ScanSteps, self._compilation.functions("scan_steps")["scan_steps"])
+
+    @cached_property
+    def scan_steps_forced(self) -> ScanSteps:
+        """The same as ``scan_steps`` while commons that blocks write may be forced."""
+        return cast(ScanSteps, self._compilation.functions("scan_steps_forced")["scan_steps_forced"])
 
     @cached_property
     def source(self) -> str:
@@ -150,13 +168,14 @@ class _Compilation:
             program=self._program,
             layout=Layout(tuple(self._fields.values())),
             latched=self._latched,
+            written=self._written(),
             startup=cast(Startup, made["startup"]),
             scans=cast(Scans, made["scans"]),
             _compilation=self,
         )
 
     def functions(self, *names: str) -> dict[str, object]:
-        """Compile some of the three functions."""
+        """Compile some of the functions."""
         with _collections_paused():
             definitions: list[ast.stmt] = [*self.definitions(*names)]
             code = compile(ast.fix_missing_locations(ast.Module(definitions, [])), f"<{self._program.name}>", "exec")
@@ -172,7 +191,8 @@ class _Compilation:
     def _function(self, name: str) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
         scans = name != "startup"
         statements = self._program.scan if scans else self._program.startup
-        emitter = Emitter(self._program, self._views, name == "scan_steps", self._cost)
+        emitter = Emitter(self._program, self._views, name.startswith("scan_steps"), self._cost)
+        emitter.forces = frozenset(self._written()) if name.endswith("_forced") else frozenset()
         lowering = StatementLowering(emitter, dict(self._instances.items()))
         if scans:
             emitter.line = self._program.scan_loop_line
@@ -199,16 +219,19 @@ class _Compilation:
         emitter.emit(build.assign_all(names, latch))
         for name in kept:
             emitter.emit(build.assign(variable_name(name), build.name(latched_name(name))))
+        if emitter.forces:
+            flags = [forced_name(name) for name in kept]
+            emitter.emit(build.assign_all(flags, build.call(emitter.member("forces"))))
 
-    def _written(self) -> frozenset[str]:
-        """Return the latched commons that a block may change."""
+    def _written(self) -> tuple[str, ...]:
+        """Return the latched commons that a block may change, in the order of the latch."""
         outputs = {
             target.name
             for instance in self._instances.values()
             for output in instance.bound.block.outputs
             if isinstance(target := instance.bound.arguments.get(output.name), Variable)
         }
-        return frozenset(outputs & set(self._latched))
+        return tuple(name for name in self._latched if name in outputs)
 
     def _commit(self, emitter: Emitter) -> list[ast.stmt]:
         """Return END: what differs from the latch is written back."""
@@ -254,7 +277,7 @@ class _Compilation:
         stores = self._stores(body)
         body = [*self._start_values(emitter, lowering), *body]
         stopped = build.name(STOPPED) if lowering.can_stop else build.constant(False)
-        if name == "scans":
+        if name.startswith("scans"):
             body.append(build.do(ast.Yield(stopped)))
             forever = build.loop(build.constant(True), body)
             return build.function(name, ["state", "io"], [*opening, build.finally_do([forever], stores)])

@@ -27,7 +27,7 @@ class Emitter:
 
     ``modeled`` makes the generator form, which yields the modeled cost in ns before each access to actual memory.
     ``views`` maps the full names of commons to their views. ``in_block`` is set inside a block statement, subscripts
-    included: there a latched common is the value of the latch.
+    included: there a latched common is the value of the latch. ``forces`` are the latched commons that may be forced.
     """
 
     program: Program
@@ -40,6 +40,7 @@ class Emitter:
     extra_globals: dict[str, object] = field(default_factory=dict)
     pending_ns: int = 0
     in_block: bool = False
+    forces: frozenset[str] = frozenset()
     _temporaries: int = 0
     _statement_start: tuple[list[ast.stmt], int] | None = None
     _overflows: bool = False

@@ -26,6 +26,11 @@ def latched_name(full_name: str) -> str:
     return f"latched_{variable_name(full_name)}"
 
 
+def forced_name(full_name: str) -> str:
+    """Return the Python name of the flag that a force holds a variable."""
+    return f"forced_{variable_name(full_name)}"
+
+
 def block_prefix(line: int, occurrence: int) -> str:
     """Return what begins the names of a block's locals; ``occurrence`` counts the calls of one line from 0."""
     return f"b{line}_" if occurrence == 0 else f"b{line}_{occurrence + 1}_"

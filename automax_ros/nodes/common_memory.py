@@ -26,7 +26,7 @@ from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.writers import ROS_WRITER
-from automax_ros.running.memory import MemoryValueError
+from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED
 from automax_ros.wire.rack_files import files_of, files_text
 from automax_ros.wire.stream import RackStream, Topic

@@ -29,9 +29,9 @@ from automax_ros.nodes.topics import publisher
 from automax_ros.nodes.tunables import Tunable, tunables_of
 from automax_ros.rack.rack import Processor, Rack
 from automax_ros.running.error_log import LogEntry
-from automax_ros.running.memory import Write
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.running.views import Write
 from automax_ros.wire.stream import RackStream, Topic
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S

@@ -32,12 +32,23 @@ class Direction(enum.IntEnum):
 
 
 @dataclass(frozen=True)
+class Point:
+    """Where an I/O point stands: slot, (first) register, and its bit (0 to 15) where it is a BOOLEAN."""
+
+    slot: int
+    register: int
+    bit: int | None = None
+
+
+@dataclass(frozen=True)
 class CommonVariable:
     """One variable of common memory.
 
     ``name`` carries its type character. ``dimensions`` are numbers of elements (largest subscript + 1), () for a simple
     variable. ``length`` is the longest text of a STRING, 0 for other types. ``preset`` is one value, for an array with
     different values one for each element in the order of memory (last subscript fastest), None where the file has none.
+    ``point`` is its place on a module, None for common memory itself. A variable with ``bank`` is all the registers of
+    the module in that slot; its name, ``SLOT:5%``, is one that no task can declare.
     """
 
     name: str
@@ -51,6 +62,8 @@ class CommonVariable:
     unit: str = ""
     description: str = ""
     line: int = 0
+    point: Point | None = None
+    bank: int | None = None
 
     @property
     def is_array(self) -> bool:

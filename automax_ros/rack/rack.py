@@ -16,13 +16,15 @@ from typing import Protocol
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
-from automax_ros.core.types import Value
-from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.core.types import DataType, Value
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rack.views import view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
-from automax_ros.running.memory import CommonMemory, ViewSpec, Write, WriteKind
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.running.views import MemoryValueError, Write, WriteKind
 
 
 class RackError(Exception):
@@ -85,7 +87,7 @@ class Rack:
             RackError: a task has errors; nothing is started then (the hardware's E0).
         """
         self.config = config
-        self.memory = CommonMemory([_view_of(variable) for variable in config.variables])
+        self.memory = CommonMemory(view_specs(config.variables))
         self.writers: tuple[WriterSpec, ...] = writers_of(config)
         self.scheduler = Scheduler()
         self.warnings: list[tuple[SourceText, list[Diagnostic]]] = []
@@ -168,6 +170,39 @@ class Rack:
         for element, value in accepted:
             memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
         self._tell_writes()
+
+    def force(self, name: str, value: Value, writer: int = OPERATOR_WRITER) -> None:
+        """Hold a common at a value against every write, between scans.
+
+        Raises:
+            KeyError: the rack has no such variable.
+            MemoryValueError: the value does not fit, or the variable cannot be forced: a string, an array, or a
+                register of which both the word and bits are named (J2-3106-1 p. 18-10).
+        """
+        view = self.memory.view(name)
+        reason = self._why_not_forced(view)
+        if reason is not None:
+            raise MemoryValueError(f"{name} cannot be forced: {reason}")
+        self.memory.now_ns = self.now_ns
+        self.memory.force(view, value, writer=writer)
+        self._tell_writes()
+
+    def unforce(self, name: str, writer: int = OPERATOR_WRITER) -> None:
+        """End a force; the value stays until the next write.
+
+        Raises:
+            KeyError: the rack has no such variable.
+        """
+        self.memory.now_ns = self.now_ns
+        self.memory.release(self.memory.view(name), writer=writer)
+        self._tell_writes()
+
+    def _why_not_forced(self, view: int) -> str | None:
+        spec = self.memory.specs[view]
+        if spec.is_array or spec.type is DataType.STRING:
+            return "it is an array" if spec.is_array else "it is a string"
+        others = self.memory.registers.others(view)
+        return f"{self.memory.specs[others[0]].name} is part of the same register" if others else None
 
     def tune(self, task: Task, name: str, value: object) -> None:
         """Set a tunable of a task, between scans.
@@ -295,17 +330,6 @@ class Rack:
         if writes:
             for observer in self._observers:
                 observer.written(writes)
-
-
-def _view_of(variable: CommonVariable) -> ViewSpec:
-    return ViewSpec(
-        variable.name,
-        variable.type,
-        variable.elements,
-        is_array=variable.is_array,
-        length=variable.length,
-        non_volatile=variable.non_volatile,
-    )
 
 
 def scans_per_second(rack: Rack) -> float:

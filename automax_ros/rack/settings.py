@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import CommonVariable, Direction, RackConfig
 from automax_ros.rack.findings import did_you_mean, quoted
-from automax_ros.running.memory import MemoryValueError, ViewSpec, fitting
+from automax_ros.running.views import MemoryValueError, ViewSpec, fitting
 
 _SUBSCRIPTED = re.compile(r"(?P<name>[^()\[\]]+)[(\[](?P<subscripts>[0-9]{1,6}(?:,[0-9]{1,6}){0,3})[)\]]")
 _TRUTH = {"TRUE": True, "ON": True, "1": True, "FALSE": False, "OFF": False, "0": False}

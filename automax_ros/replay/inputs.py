@@ -6,7 +6,7 @@ In the log a scan stands before the writes that it caused, so common memory as r
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
@@ -14,7 +14,9 @@ from automax_ros.core.decimal_text import seconds_text
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, REAL_MAX
 from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.rack.config import CommonVariable
-from automax_ros.running.memory import CommonMemory, LatchPlan, WriteKind
+from automax_ros.rack.views import view_specs
+from automax_ros.running.registers import RegisterMap
+from automax_ros.running.views import LatchPlan, WriteKind, latch_plan
 from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, Values
 
 Key = tuple[int, int]
@@ -50,12 +52,16 @@ def same_bits(one: Value, other: Value) -> bool:
 class RecordedCommons:
     """All of common memory as the recording has told it so far.
 
-    ``gaps`` counts places where writes are missing; behind one nothing is known until the next image.
+    ``gaps`` counts places where writes are missing; after one nothing is known until the next image. ``forced`` are the
+    values that a force holds; ``on_forces`` are called when they change.
     """
 
     def __init__(self, bag: Path, variables: Sequence[CommonVariable]) -> None:
         self.variables = tuple(variables)
+        self.registers = RegisterMap(view_specs(variables))
         self.gaps = 0
+        self.forced: frozenset[Key] = frozenset()
+        self.on_forces: list[Callable[[], None]] = []
         self._bag = bag
         self._sequence: int | None = None
         self._kinds = [(item.type, _RANGES[item.type], item.elements) for item in variables]
@@ -108,6 +114,7 @@ class RecordedCommons:
         if self._sequence is None or image.sequence >= self._sequence:
             self._sequence = image.sequence
             self._put(self.entries(image.values, image.stamp))
+            self._hold(frozenset())
 
     def take_write(self, write: CommonWrite) -> list[Entry]:
         """Take one message of the write log over; return its entries, none if they were known already.
@@ -124,6 +131,7 @@ class RecordedCommons:
         self._sequence = write.sequence
         entries = self.entries(write.values, write.stamp)
         self._put(entries)
+        self._follow_forces(write)
         return entries
 
     def value(self, key: Key) -> Value:
@@ -137,13 +145,27 @@ class RecordedCommons:
             raise UnknownValue(key)
         return value
 
+    def _follow_forces(self, write: CommonWrite) -> None:
+        """Take over which values are held: a force tells it, and after an image it is told again."""
+        keys = zip(write.values.variable, write.values.element, strict=False)
+        if write.kind == WriteKind.FORCE:
+            self._hold(self.forced.union(keys))
+        elif write.kind == WriteKind.RELEASE:
+            self._hold(self.forced.difference(keys))
+
+    def _hold(self, forced: frozenset[Key]) -> None:
+        if forced != self.forced:
+            self.forced = forced
+            for changed in self.on_forces:
+                changed()
+
     def _put(self, entries: Iterable[Entry]) -> None:
         cells, start = self._cells, self._start
         for view, element, value in entries:
             cells[start[view] + element] = value
 
 
-class ScanMemory(CommonMemory):
+class ScanMemory:
     """Common memory as one task's recorded scans saw it; what the task does to it is kept apart.
 
     A scan reads what it wrote itself, in this scan or an earlier one as long as nobody else has written there since. As
@@ -155,7 +177,7 @@ class ScanMemory(CommonMemory):
 
     def __init__(self, commons: RecordedCommons, *, edited: bool = False) -> None:
         """Take the memory of the recording; ``edited``: another source runs than the recorded one."""
-        super().__init__([])
+        self.now_ns = 0
         self._edited = edited
         self.apart: dict[Key, Value] = {}
         self._commons = commons
@@ -173,13 +195,25 @@ class ScanMemory(CommonMemory):
         self._committed: list[Entry] = []
         self._own: dict[Key, Value] = {}
 
+    def view(self, name: str) -> int:
+        """Return the view of a variable by its full name; KeyError if the rack has none."""
+        return self._index[name]
+
+    def is_forced(self, view: int) -> bool:
+        """Return whether a force held a simple view when the scan was recorded."""
+        return (view, 0) in self._commons.forced
+
+    def watch_forces(self, changed: Callable[[], None]) -> None:
+        """Call ``changed`` whenever the recording tells that a force begins or ends."""
+        self._commons.on_forces.append(changed)
+
     def plan(self, views: Sequence[int]) -> LatchPlan:
         """Remember what the task latches."""
         self._views = tuple(views)
         self._positions = {view: position for position, view in enumerate(self._views)}
         self._recorded = [0] * len(self._views)
         self.forget_latch()
-        return super().plan(views)
+        return latch_plan(views)
 
     def forget_latch(self) -> None:
         """Scans are missing: what the task latched last is not known any more."""
@@ -254,7 +288,7 @@ class ScanMemory(CommonMemory):
         kind: WriteKind = WriteKind.BASIC,  # noqa: ARG002
     ) -> None:
         """Keep what a BASIC statement writes."""
-        self._own[view, element] = value
+        self._take(view, element, value)
         number = self._write_count
         self._write_count = number + 1
         if self._in_step:
@@ -267,7 +301,7 @@ class ScanMemory(CommonMemory):
     def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:  # noqa: ARG002
         """Keep what blocks changed."""
         for view, value in changes:
-            self._own[view, 0] = value
+            self._take(view, 0, value)
 
     def finish(self, commits: Sequence[tuple[int, Value]]) -> list[tuple[Key, Value, Value]]:
         """End a scan; return what differs from the recorded memory now: key, recorded and replayed value.
@@ -277,7 +311,7 @@ class ScanMemory(CommonMemory):
         """
         if not self.apart and self.writes_agree and self._commits_agree(commits):
             return []
-        recorded = {(view, element): value for view, element, value in (*self._writes, *self._committed)}
+        recorded = self._recorded_changes()
         different: list[tuple[Key, Value, Value]] = []
         for key in sorted({*recorded, *self._own, *self.apart}):
             before = None if key in recorded else self._commons.value(key)
@@ -320,6 +354,39 @@ class ScanMemory(CommonMemory):
         """Somebody else has written: what the task wrote there before is gone."""
         for view, element, _ in entries:
             self.apart.pop((view, element), None)
+
+    def _take(self, view: int, element: int, value: Value) -> None:
+        """Keep what the scan writes, and what else shows the same registers; a force keeps its value."""
+        if (view, element) in self._commons.forced:
+            return
+        if view in self._commons.registers.views:
+            others = list(self._commons.registers.consequences(view, element, value, self._present))
+            self._own.update({entry[:2]: entry[2] for entry in others if entry[:2] not in self._commons.forced})
+        self._own[view, element] = value
+
+    def _recorded_changes(self) -> dict[Key, Value]:
+        """Return what the recorded scan changed: its writes, and what else shows the same registers."""
+        commons, changes = self._commons, dict[Key, Value]()
+
+        def read(view: int, element: int) -> Value:
+            key = (view, element)
+            return changes[key] if key in changes else commons.value(key)
+
+        for view, element, value in (*self._writes, *self._committed):
+            if (view, element) in commons.forced:
+                continue
+            if view in commons.registers.views:
+                others = list(commons.registers.consequences(view, element, value, read))
+                changes.update({entry[:2]: entry[2] for entry in others if entry[:2] not in commons.forced})
+            changes[view, element] = value
+        return changes
+
+    def _present(self, view: int, element: int) -> Value:
+        """Return a value as the task has left it, else as the recording has it."""
+        key = (view, element)
+        if key in self._own:
+            return self._own[key]
+        return self.apart[key] if key in self.apart else self._commons.value(key)
 
     def _commits_agree(self, commits: Sequence[tuple[int, Value]]) -> bool:
         recorded = self._committed

@@ -8,16 +8,18 @@ from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from functools import partial
+from typing import cast
 
 from automax_ros.compile.compiler import CompiledTask, ScanTooLong, State
 from automax_ros.compile.functions import text_of
 from automax_ros.compile.layout import Field, Layout, Role
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Latched, Value
+from automax_ros.running.backplane import BUS_ERROR, NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
-from automax_ros.running.memory import CommonMemory, WriteKind
+from automax_ros.running.views import Memory, WriteKind
 
-BUS_ERROR, SCAN_TOO_LONG = 7031, 7040
+SCAN_TOO_LONG = 7040
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
 PRINT_ZONE = 14
@@ -64,6 +66,7 @@ class TaskIo:
         self.latch: Callable[[], Latched] = partial(memory.latch, task.plan)
         self.read_now = memory.read_now
         self._memory, self._writer, self._task = memory, task.writer, task
+        self._backplane = task.backplane
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
         """Write back what blocks changed."""
@@ -73,6 +76,10 @@ class TaskIo:
     def write_now(self, view: int, value: Value, element: int = 0) -> None:
         """Write actual memory for a BASIC statement."""
         self._memory.write_now(view, value, self._writer, element, WriteKind.BASIC)
+
+    def forces(self) -> tuple[bool, ...]:
+        """Return which of the commons that blocks write a force holds."""
+        return tuple(map(self._memory.is_forced, self._task.written))
 
     def log(self, line: int, code: int) -> None:
         """Log a run-time error of this scan."""
@@ -90,13 +97,21 @@ class TaskIo:
         """Clear the error log (CLR_ERRLOG)."""
         self._task.errors.clear()
 
-    def io_read(self, slot: int, register: int) -> tuple[int, int]:  # noqa: ARG002
-        """Return a register; without a module in that slot it is a bus error."""
-        return 0, BUS_ERROR
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+        """Return a register's word and 0, or 0 and the bus error of a register that does not answer."""
+        place = self._backplane.readable(slot, register)
+        if place is None:
+            return 0, BUS_ERROR
+        return cast(int, self.read_now(*place)), 0
 
-    def io_write(self, slot: int, register: int, value: int) -> int:  # noqa: ARG002
-        """Write a register; without a module in that slot it is a bus error."""
-        return BUS_ERROR
+    def io_write(self, slot: int, register: int, value: int) -> int:
+        """Write a register's word; return 0, or the bus error of a register that does not answer or take it."""
+        place = self._backplane.writable(slot, register)
+        if place is None:
+            return BUS_ERROR
+        view, element = place
+        self.write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
+        return 0
 
 
 class RecordingIo(TaskIo):
@@ -142,7 +157,14 @@ class Task:
     """
 
     def __init__(
-        self, compiled: CompiledTask, memory: CommonMemory, *, writer: int = 0, slot: int = 0, priority: int = 11
+        self,
+        compiled: CompiledTask,
+        memory: Memory,
+        *,
+        writer: int = 0,
+        slot: int = 0,
+        priority: int = 11,
+        backplane: Backplane = NO_MODULES,
     ) -> None:
         """Install the task: its state is as at installation (2.4.5)."""
         self.compiled = compiled
@@ -150,7 +172,9 @@ class Task:
         self.writer = writer
         self.slot = slot
         self.priority = priority
+        self.backplane = backplane
         self.plan = memory.plan([memory.view(name) for name in compiled.latched])
+        self.written = tuple(memory.view(name) for name in compiled.written)
         self._state: State = compiled.layout.fresh()
         self._scans: Generator[bool, None, None] | None = None
         self.errors = ErrorLog()
@@ -158,7 +182,9 @@ class Task:
         self.status = Status.STOPPED
         self.scan_number = 0
         self._recording = False
+        self._forced = False
         self._io: TaskIo = TaskIo(self)
+        memory.watch_forces(self._look_at_forces)
 
     @property
     def name(self) -> str:
@@ -215,7 +241,8 @@ class Task:
         record = self._begin_record(now_ns, skipped) if self._recording else None
         self.memory.now_ns = now_ns
         if self._scans is None:
-            self._scans = self.compiled.scans(self._state, self._io)
+            scans = self.compiled.scans_forced if self._forced else self.compiled.scans
+            self._scans = scans(self._state, self._io)
         try:
             if next(self._scans):
                 self.status = Status.ENDED
@@ -238,7 +265,8 @@ class Task:
         self.scan_number += 1
         record = self._begin_record(now_ns, skipped)
         self.memory.now_ns = now_ns
-        steps = self.compiled.scan_steps(self.state, self._io)
+        scan_steps = self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
+        steps = scan_steps(self.state, self._io)
         try:
             while True:
                 later = yield next(steps)
@@ -310,6 +338,11 @@ class Task:
         if not low <= stored <= high:
             raise ValueError(f"{name} = {value:.8g} lies outside {low:.8g} to {high:.8g}")
         return stored
+
+    def _look_at_forces(self) -> None:
+        """Scan from now on in the form that heeds forces, or in the quick one."""
+        self._put_down()
+        self._forced = any(map(self.memory.is_forced, self.written))
 
     def _put_down(self) -> None:
         """Let the compiled scan store the state that it holds."""

@@ -17,6 +17,8 @@ class WriteKind(enum.IntEnum):
     COMMIT = 1
     BASIC = 2
     OUTSIDE = 3
+    FORCE = 4
+    RELEASE = 5
 
 
 class VariableType(enum.IntEnum):

@@ -12,8 +12,9 @@ from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
-from automax_ros.running.memory import Write
+from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.task import ScanRecord, Task
+from automax_ros.running.views import Write, WriteKind
 from automax_ros.wire.messages import (
     NO_LAYOUT,
     NO_VALUES,
@@ -190,6 +191,14 @@ class RackMessages:
             values[position] = 0.0
         image = Values(self._image_variables, self._image_elements, values, texts)
         return CommonImage(self.stamp(now_ns), self._run_id, self._sequence, image)
+
+    def forces(self, now_ns: int) -> CommonWrite | None:
+        """Return what is forced as a further entry of the write log, None if nothing is: an image does not tell it."""
+        memory = self._rack.memory
+        if not memory.forced:
+            return None
+        entries = ((view, element, memory.read_now(view, element)) for view, element in sorted(memory.forced))
+        return self._write((now_ns, PRESET_WRITER, WriteKind.FORCE), entries)
 
     def writes(self, writes: Sequence[Write]) -> list[CommonWrite]:
         """Return entries of the write log, those of one writer, kind and instant together."""

@@ -14,9 +14,9 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
-from automax_ros.running.memory import Write
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Task
+from automax_ros.running.views import Write
 from automax_ros.wire.cdr import encoder
 from automax_ros.wire.messages import NAMES
 from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
@@ -234,6 +234,9 @@ class RackStream:
 
     def _send_image(self, now_ns: int, sinks: Sequence[Sink] | None = None) -> None:
         self._put(self.snapshot_topic, self._messages.stamp(now_ns), self._messages.image(now_ns), sinks)
+        forces = self._messages.forces(now_ns)
+        if forces is not None:
+            self._put(self.backplane_topic, forces.stamp, forces)
 
     def _send_writes(self, writes: list[Write], now_ns: int) -> None:
         for message in self._messages.writes(writes):

@@ -35,7 +35,10 @@ class Ended(Exception):
 
 
 class Interpreter(Functions):
-    """``commons`` is actual memory; ``log`` (line, code) and ``writes`` (kind, name, element, value) are filled."""
+    """``commons`` is actual memory, of which no write changes ``forced``.
+
+    ``log`` (line, code) and ``writes`` (kind, name, element, value) are filled.
+    """
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -46,6 +49,7 @@ class Interpreter(Functions):
             name: self._fresh(symbol) for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON
         }
         self.latch = {}
+        self.forced = set()
         self.log, self.writes, self.printed = [], [], []
         self.blocks = {}
         self.pointer = 0
@@ -294,6 +298,8 @@ class Interpreter(Functions):
                 self.locals[name] = value
             else:
                 self.locals[name][element] = value
+        elif name in self.forced:
+            return
         elif in_block and name in self.latch:
             self.latch[name] = value
         else:

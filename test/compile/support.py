@@ -13,8 +13,9 @@ from automax_ros.core.types import Value
 from automax_ros.language.checks.checker import check
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Scope
-from automax_ros.running.memory import CommonMemory, ViewSpec
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
+from automax_ros.running.views import ViewSpec
 
 TICK = 5_500_000
 WRITER, OTHER = 1, 9

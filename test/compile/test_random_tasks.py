@@ -125,6 +125,60 @@ def test_asking_for_the_state_changes_nothing(text, history):
     asking_changes_nothing(text, history)
 
 
+def forced_tasks_agree(text: str, history, forced: dict[str, object]) -> None:
+    """From the second scan on commons are forced, after the third no more."""
+    program = checked(text)
+    (task, memory), (in_steps, other) = installed(program), installed(program)
+    model = Interpreter(program)
+    for one in (task, in_steps, model):
+        one.run()
+    compare(task, memory, model, task._io.record)
+    other.drain()
+    for now, writes in enumerate(history * 2, 1):
+        for name, value in forced.items() if now == 2 else ():
+            memory.force(memory.view(name), value, writer=OTHER)
+            other.force(other.view(name), value, writer=OTHER)
+            model.commons[name] = value
+            model.forced.add(name)
+        for name in forced if now == 4 else ():
+            memory.release(memory.view(name), writer=OTHER)
+            other.release(other.view(name), writer=OTHER)
+            model.forced.clear()
+        for name, value in writes.items():
+            memory.write_from_outside(memory.view(name), value, OTHER)
+            other.write_from_outside(other.view(name), value, OTHER)
+            if name not in model.forced:
+                model.commons[name] = value
+        record = task.scan(now)
+        model.scan()
+        scan_in_steps(in_steps, now)
+        compare_states(task, in_steps)
+        assert [entry[:5] for entry in other.drain()] == [entry[:5] for entry in memory._log or []]
+        compare(task, memory, model, record)
+
+
+def compare_states(one: Task, other: Task) -> None:
+    assert list(map(bits, other.snapshot())) == list(map(bits, one.snapshot()))
+
+
+FORCED = outside_writes().map(
+    lambda values: {name: value for name, value in values.items() if name[-1] in "%!@" and name[:-1].isalpha()}
+)
+
+
+@given(tasks(), HISTORY, FORCED)
+@repeatable(40)
+def test_forced_commons_keep_their_value_inside_a_scan_too(text, history, forced):
+    forced_tasks_agree(text, history, forced)
+
+
+@pytest.mark.soak
+@given(tasks(4), HISTORY, FORCED)
+@repeatable(1500)
+def test_forced_commons_keep_their_value_inside_a_scan_too_long(text, history, forced):
+    forced_tasks_agree(text, history, forced)
+
+
 @pytest.mark.soak
 @given(tasks(4), HISTORY)
 @repeatable(3000)

@@ -7,8 +7,8 @@ import pytest
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, RackError, scans_per_second
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER, WriterKind
-from automax_ros.running.memory import MemoryValueError, WriteKind
 from automax_ros.running.task import Status
+from automax_ros.running.views import MemoryValueError, WriteKind
 
 RACK = """\
 rack: LINE1

@@ -16,8 +16,8 @@ from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.report import Kind
 from automax_ros.replay.task import element_name
-from automax_ros.running.memory import Write
 from automax_ros.running.task import ScanRecord, Task
+from automax_ros.running.views import Write
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed
 from .replays import YAML as YAML_OF_TWO

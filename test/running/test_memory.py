@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.types import DataType
-from automax_ros.running.memory import CommonMemory, MemoryValueError, ViewSpec, WriteKind
+from automax_ros.running.memory import CommonMemory
+from automax_ros.running.views import MemoryValueError, ViewSpec, WriteKind
 
 VIEWS = (
     ViewSpec("SPEED%", DataType.INTEGER),
@@ -137,9 +138,13 @@ def test_the_force_itself_is_in_the_write_log(memory):
     memory.force(SPEED, 42, writer=OTHER)
     memory.force(SPEED, 43, writer=OTHER)
     assert [(entry.writer, entry.kind, entry.value) for entry in memory.drain()] == [
-        (OTHER, WriteKind.OUTSIDE, 42),
-        (OTHER, WriteKind.OUTSIDE, 43),
+        (OTHER, WriteKind.FORCE, 42),
+        (OTHER, WriteKind.FORCE, 43),
     ]
+    memory.release(SPEED, writer=OTHER)
+    assert [(entry.kind, entry.value) for entry in memory.drain()] == [(WriteKind.RELEASE, 43)]
+    memory.release(SPEED, writer=OTHER)
+    assert memory.drain() == []
 
 
 def test_release_leaves_the_value_until_the_next_write(memory):

@@ -1,0 +1,64 @@
+"""The private image of a module that works on copies of common memory, such as a UDC (S-3006 p. 4-2).
+
+Its tasks latch, commit, read and write here; the module copies chosen views in and out at the instants of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from automax_ros.core.types import Value
+from automax_ros.running.image import Image
+from automax_ros.running.memory import CommonMemory
+from automax_ros.running.views import ViewSpec, WriteKind
+
+
+class PrivateImage(Image):
+    """Views of a rack as one module's tasks see them. Nothing is logged: only what is copied out is common memory."""
+
+    def __init__(self, views: Sequence[ViewSpec], common: CommonMemory) -> None:
+        """Make the image as it is at installation, over the memory that it copies from and to."""
+        super().__init__(views)
+        self._common = common
+
+    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
+        """Write what a scan's blocks changed."""
+        for view, value in changes:
+            self.write_now(view, value, writer)
+
+    def write_now(
+        self,
+        view: int,
+        value: Value,
+        writer: int,  # noqa: ARG002
+        element: int = 0,
+        kind: WriteKind = WriteKind.BASIC,  # noqa: ARG002
+    ) -> None:
+        """Write the image, unless a force holds the view; words and bits of the same register change together."""
+        if self._common.is_forced(view):
+            return
+        entries = list(self.registers.consequences(view, element, value, self.read_now)) if view in self._shared else []
+        for entry in ((view, element, value), *entries):
+            self._put(*entry)
+
+    def is_forced(self, view: int) -> bool:
+        """Return whether a force holds a simple view."""
+        return self._common.is_forced(view)
+
+    def watch_forces(self, changed: Callable[[], None]) -> None:
+        """Call ``changed`` whenever a force begins or ends."""
+        self._common.watch_forces(changed)
+
+    def copy_in(self, views: Iterable[int]) -> None:
+        """Take over views as common memory has them now."""
+        for view in views:
+            for element in range(self.specs[view].elements):
+                self._put(view, element, self._common.read_now(view, element))
+
+    def copy_out(self, views: Iterable[int], writer: int) -> None:
+        """Write to common memory what differs there, as commits of ``writer``."""
+        for view in views:
+            for element in range(self.specs[view].elements):
+                value = self.read_now(view, element)
+                if value != self._common.read_now(view, element):
+                    self._common.write_now(view, value, writer, element, WriteKind.COMMIT)

@@ -1,0 +1,95 @@
+"""Registers of modules in common memory: what a write of one view makes of the others that show the same bits.
+
+A word and its bits alias in actual memory; the latch copies views, so that in a scan they are apart (3.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from automax_ros.core.types import DataType, Value
+from automax_ros.running.views import Place, ViewSpec
+
+Entry = tuple[int, int, Value]
+"""View, element, value."""
+_WORD = 0xFFFF
+
+
+class RegisterMap:
+    """Which views show which registers. ``views`` are those that share registers with others: points and banks."""
+
+    def __init__(self, specs: Sequence[ViewSpec]) -> None:
+        """Sort the points of all banks by register."""
+        self._types = {view: spec.type for view, spec in enumerate(specs)}
+        self._places: dict[int, Place] = {view: spec.place for view, spec in enumerate(specs) if spec.place is not None}
+        self._points: dict[tuple[int, int], list[int]] = {}
+        for view, place in self._places.items():
+            for register in self._registers(view):
+                self._points.setdefault((place.bank, register), []).append(view)
+        self.views = frozenset({*self._places, *(place.bank for place in self._places.values())})
+
+    def consequences(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> Iterator[Entry]:
+        """Yield what else changes when ``view`` takes ``value``: words of the bank, then the other points, by register.
+
+        ``read`` returns what a view holds before the write. Yields no value that is there already.
+        """
+        place = self._places.get(view)
+        bank = view if place is None else place.bank
+        words = self._words(view, element, value, read)
+        if place is not None:
+            for register, word in words.items():
+                if read(bank, register) != _signed(word):
+                    yield bank, register, _signed(word)
+        others = dict.fromkeys(
+            other for register in words for other in self._points.get((bank, register), ()) if other != view
+        )
+        for other in others:
+            shown = self._shown(other, words, read)
+            if shown != read(other, 0):
+                yield other, 0, shown
+
+    def others(self, view: int) -> list[int]:
+        """Return the points that share a bit with a point: a word, and each of its named bits."""
+        place = self._places.get(view)
+        if place is None:
+            return []
+        near = {other for register in self._registers(view) for other in self._points[place.bank, register]}
+        near.discard(view)
+        return sorted(other for other in near if place.bit is None or self._places[other].bit in (None, place.bit))
+
+    def _registers(self, view: int) -> range:
+        first = self._places[view].register
+        return range(first, first + (2 if self._types[view] is DataType.DOUBLE else 1))
+
+    def _words(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[int, int]:
+        """Return the registers that a write touches, as 16-bit words without sign."""
+        assert not isinstance(value, str)
+        place, number = self._places.get(view), int(value)
+        if place is None:
+            return {element: number & _WORD}
+        first = place.register
+        if place.bit is not None:
+            before = _unsigned(read(place.bank, first))
+            return {first: before & ~(1 << place.bit) | number << place.bit}
+        if self._types[view] is DataType.DOUBLE:
+            return {first: number >> 16 & _WORD, first + 1: number & _WORD}
+        return {first: number & _WORD}
+
+    def _shown(self, view: int, words: dict[int, int], read: Callable[[int, int], Value]) -> Value:
+        """Return what a point shows of its registers; ``words`` are those that have just changed."""
+        place = self._places[view]
+        found = [words.get(number, _unsigned(read(place.bank, number))) for number in self._registers(view)]
+        if place.bit is not None:
+            return bool(found[0] >> place.bit & 1)
+        if len(found) == 2:
+            return _signed(found[0]) << 16 | found[1]
+        return _signed(found[0])
+
+
+def _signed(word: int) -> int:
+    return word - 0x10000 if word & 0x8000 else word
+
+
+def _unsigned(value: Value) -> int:
+    assert not isinstance(value, str)
+    return int(value) & _WORD

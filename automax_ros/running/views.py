@@ -1,0 +1,160 @@
+"""Views of common memory: what memory, tasks, recordings and replays know of a variable, and the four operations on it.
+
+A variable is a view, known by its index in the rack's table of variables. A plain common is a cell of its own. The
+registers of a module are one view too, an array of 16-bit words (its bank); an I/O point is a view with a ``Place`` in
+such a bank, so that a word and its bits show the same registers.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from operator import itemgetter
+from typing import NamedTuple, Protocol
+
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, stored_real
+from automax_ros.core.types import DataType, Latched, Value
+
+
+class WriteKind(enum.IntEnum):
+    """How a value came into common memory; the numbers are those of ``CommonWrite.kind``.
+
+    FORCE and RELEASE are entries of the write log too: they tell from when to when a view is held.
+    """
+
+    COMMIT = 1
+    BASIC = 2
+    OUTSIDE = 3
+    FORCE = 4
+    RELEASE = 5
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an I/O point stands: the view of its module's bank, its (first) register, its bit where it is a BOOLEAN.
+
+    A DOUBLE INTEGER takes two registers, the high word first (57C421 p. 4-4).
+    """
+
+    bank: int
+    register: int
+    bit: int | None = None
+
+
+@dataclass(frozen=True)
+class ViewSpec:
+    """What memory must know of a variable: ``elements`` values of one type, ``length`` of a string."""
+
+    name: str
+    type: DataType
+    elements: int = 1
+    is_array: bool = False
+    length: int = 0
+    non_volatile: bool = False
+    place: Place | None = None
+
+
+class Write(NamedTuple):
+    """One entry of the write log. ``sequence`` counts from 1 without gaps; ``writer`` is the id of a writer."""
+
+    sequence: int
+    time_ns: int
+    writer: int
+    kind: WriteKind
+    view: int
+    element: int
+    value: Value
+
+
+LatchPlan = Callable[[list[Value]], Latched]
+"""Takes all cells of a memory and returns those that a task latches."""
+
+
+class Memory(Protocol):
+    """What a task works on: the four operations, and which views are held by a force.
+
+    The live memory of a rack, the private image of a module and the memory of a replay each fulfil it. ``now_ns`` is
+    the time of what happens next; whoever runs tasks sets it.
+    """
+
+    now_ns: int
+
+    def view(self, name: str) -> int:
+        """Return the view of a variable by its full name; KeyError if there is none."""
+        ...
+
+    def plan(self, views: Sequence[int]) -> LatchPlan:
+        """Return the prepared list of simple views that a task latches."""
+        ...
+
+    def latch(self, plan: LatchPlan) -> Latched:
+        """Return copies of the planned views, in their order (3.3)."""
+        ...
+
+    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
+        """Write what a scan's blocks changed, at END: pairs of view and value, already within the view's type."""
+        ...
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Return an actual value, for BASIC statements, arrays, REALs and strings."""
+        ...
+
+    def write_now(
+        self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
+    ) -> None:
+        """Write an actual value, already within the view's type."""
+        ...
+
+    def is_forced(self, view: int) -> bool:
+        """Return whether a force holds a simple view."""
+        ...
+
+    def watch_forces(self, changed: Callable[[], None]) -> None:
+        """Call ``changed`` whenever a force begins or ends, between two scans."""
+        ...
+
+
+class MemoryValueError(ValueError):
+    """A value from outside does not fit the variable it is meant for."""
+
+
+def latch_plan(views: Sequence[int]) -> LatchPlan:
+    """Return the quickest function that picks views out of the list of cells."""
+    if not views:
+        return _latch_nothing
+    if len(views) == 1:
+        only = views[0]
+        return lambda cells: (cells[only],)
+    return itemgetter(*views)
+
+
+def _latch_nothing(_: list[Value]) -> Latched:
+    return ()
+
+
+def fitting(spec: ViewSpec, value: Value) -> Value:
+    """Return a value from outside in the variable's own type.
+
+    Raises:
+        MemoryValueError: wrong kind of value, or out of the type's range.
+    """
+    kind = spec.type
+    if kind is DataType.BOOLEAN:
+        if isinstance(value, bool) or value in (0, 1):
+            return bool(value)
+    elif kind is DataType.STRING:
+        if isinstance(value, str) and len(value) <= spec.length:
+            return value
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        if kind is DataType.REAL:
+            with contextlib.suppress(OverflowError):
+                single, clamped = stored_real(float(value))
+                if not clamped:
+                    return single
+        else:
+            low, high = (INT16_MIN, INT16_MAX) if kind is DataType.INTEGER else (INT32_MIN, INT32_MAX)
+            if low <= value <= high and value == int(value):
+                return int(value)
+    raise MemoryValueError(f"{value!r} is no value for {spec.name}, type {kind.word}")
