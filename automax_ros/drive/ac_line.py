@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import enum
 import heapq
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, cos, exp, fmod, pi, sin, sqrt
 
 from automax_ros.drive.errors import LARGEST, ParameterError, require
 from automax_ros.drive.scr import PHASES
+from automax_ros.drive.state import State, Stateful, check_names
 
 NEVER_NS = 1 << 62
 """An instant that does not come."""
@@ -33,13 +34,14 @@ class Rotation(enum.Enum):
 
 
 @dataclass
-class _Course:
+class _Course(Stateful):
     """A quantity on its way to a target, at a constant rate (1/s) or with a time constant (s)."""
 
     value: float
     target: float
     rate: float = 0.0
     tau_s: float = 0.0
+    _kept = ("value", "target", "rate", "tau_s")
 
     @property
     def moving(self) -> bool:
@@ -74,15 +76,18 @@ class _Course:
             self.value = self.target
 
 
-Change = Callable[[], None]
+Change = tuple[str, float, float, float]
+"""A change: ``frequency`` or ``voltage`` with target, rate and time constant; ``lose`` or ``restore`` with a phase."""
 
 
-class AcLine:
+class AcLine(Stateful):
     """A three-phase line with isolated neutral; belongs to one circuit, which lets its time pass.
 
     Phase x has the voltage ``amplitude_v cos(angle + shift[x])`` to the neutral; A's shift is 0, B's -120 degrees on
     a line that rotates A, B, C.
     """
+
+    _kept = ("start_ns", "start_angle", "omega", "amplitude_v", "next_change_ns", "_serial", "_pending")
 
     def __init__(
         self,
@@ -120,7 +125,7 @@ class AcLine:
         self._voltage = _Course(_voltage(v_ll_v), v_ll_v)
         self.missing = {_phase(phase) for phase in missing}
         self._segment_ns = segment_ns
-        self._pending: list[tuple[int, int, Change]] = []
+        self._pending: list[tuple[int, int, str, float, float, float]] = []
         self._serial = 0
         self.start_ns = 0
         self.start_angle = angle_rad
@@ -156,26 +161,26 @@ class AcLine:
 
     def step_frequency(self, at_ns: int, frequency_hz: float) -> None:
         """Let the frequency be another from an instant on; the angle stays continuous."""
-        self._schedule(at_ns, lambda: self._frequency.move(_frequency(frequency_hz)), _frequency(frequency_hz))
+        self._schedule(at_ns, ("frequency", _frequency(frequency_hz), 0.0, 0.0))
 
     def drift_frequency(self, at_ns: int, frequency_hz: float, rate_hz_s: float) -> None:
         """Let the frequency move to another at a rate above 0 (Hz/s)."""
         require("rate of the frequency in Hz/s", rate_hz_s, 0.0, above=True)
-        self._schedule(at_ns, lambda: self._frequency.move(frequency_hz, rate=rate_hz_s), _frequency(frequency_hz))
+        self._schedule(at_ns, ("frequency", _frequency(frequency_hz), rate_hz_s, 0.0))
 
     def settle_frequency(self, at_ns: int, frequency_hz: float, tau_s: float) -> None:
         """Let the frequency approach another with a time constant above 0 (s)."""
         require("time constant in s", tau_s, 0.0, above=True)
-        self._schedule(at_ns, lambda: self._frequency.move(frequency_hz, tau_s=tau_s), _frequency(frequency_hz))
+        self._schedule(at_ns, ("frequency", _frequency(frequency_hz), 0.0, tau_s))
 
     def step_voltage(self, at_ns: int, v_ll_v: float) -> None:
         """Let the line-to-line voltage (V rms) be another from an instant on."""
-        self._schedule(at_ns, lambda: self._voltage.move(v_ll_v), _voltage(v_ll_v))
+        self._schedule(at_ns, ("voltage", _voltage(v_ll_v), 0.0, 0.0))
 
     def settle_voltage(self, at_ns: int, v_ll_v: float, tau_s: float) -> None:
         """Let the line-to-line voltage (V rms) approach another with a time constant above 0 (s)."""
         require("time constant in s", tau_s, 0.0, above=True)
-        self._schedule(at_ns, lambda: self._voltage.move(v_ll_v, tau_s=tau_s), _voltage(v_ll_v))
+        self._schedule(at_ns, ("voltage", _voltage(v_ll_v), 0.0, tau_s))
 
     def generator_transient(
         self, at_ns: int, dip: float, frequency_dip_hz: float, fall_s: float, recovery_s: float
@@ -199,11 +204,11 @@ class AcLine:
 
     def lose_phase(self, at_ns: int, phase: int) -> None:
         """Open a phase (0, 1, 2) of the line at an instant; current that flows ends as the circuit decides."""
-        self._schedule(at_ns, lambda: self.missing.add(phase), _phase(phase))
+        self._schedule(at_ns, ("lose", _phase(phase), 0.0, 0.0))
 
     def restore_phase(self, at_ns: int, phase: int) -> None:
         """Close a phase (0, 1, 2) again."""
-        self._schedule(at_ns, lambda: self.missing.discard(phase), _phase(phase))
+        self._schedule(at_ns, ("restore", _phase(phase), 0.0, 0.0))
 
     def advance(self, time_ns: int) -> None:
         """Let time pass to an instant that is not beyond ``next_change_ns``, and begin a segment there."""
@@ -214,7 +219,7 @@ class AcLine:
             if course.moving:
                 course.advance(passed_s)
         while self._pending and self._pending[0][0] <= time_ns:
-            heapq.heappop(self._pending)[2]()
+            self._change(*heapq.heappop(self._pending)[2:])
         self._begin_segment()
 
     def _begin_segment(self) -> None:
@@ -232,13 +237,38 @@ class AcLine:
         self.omega = 2 * pi * (hertz.mean(time_s) if hertz.moving else hertz.value)
         self.amplitude_v = sqrt(2 / 3) * (volts.mean(time_s) if volts.moving else volts.value)
 
-    def _schedule(self, at_ns: int, change: Change, _checked: float) -> None:
+    def state(self) -> State:
+        """Return the angle, the changes to come, which phases are missing, and how voltage and frequency move."""
+        courses = {"frequency": self._frequency.state(), "voltage": self._voltage.state()}
+        return super().state() | courses | {"missing": sorted(self.missing)}
+
+    def restore(self, state: State) -> None:
+        """Take a state over.
+
+        Raises:
+            ParameterError: it is not the state of a line.
+        """
+        check_names("line", state, (*self._kept, "frequency", "voltage", "missing"))
+        super().restore({name: state[name] for name in self._kept})
+        self._frequency.restore(state["frequency"])
+        self._voltage.restore(state["voltage"])
+        self.missing = {_phase(phase) for phase in state["missing"]}
+
+    def _change(self, what: str, target: float, rate: float, tau_s: float) -> None:
+        if what == "lose":
+            self.missing.add(int(target))
+        elif what == "restore":
+            self.missing.discard(int(target))
+        else:
+            (self._frequency if what == "frequency" else self._voltage).move(target, rate, tau_s)
+
+    def _schedule(self, at_ns: int, change: Change) -> None:
         if at_ns < self.start_ns:
             raise ParameterError(
                 f"a change of the line at {at_ns} ns lies before its present segment, {self.start_ns} ns"
             )
         self._serial += 1
-        heapq.heappush(self._pending, (at_ns, self._serial, change))
+        heapq.heappush(self._pending, (at_ns, self._serial, *change))
         self.next_change_ns = min(self.next_change_ns, at_ns)
 
     def unit_wave(self, phase: int) -> tuple[float, float]:

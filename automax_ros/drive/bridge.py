@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from automax_ros.drive.errors import GateError, require
-from automax_ros.drive.network import Wiring
 from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, numbers_of
+from automax_ros.drive.state import State, Stateful, check_names
+from automax_ros.drive.wiring import Wiring
 
 REST_NS = 10
 """How long an SCR that went out stays off, gated or not, ns (decision: keeps events from piling up at one instant)."""
@@ -16,12 +17,14 @@ UNLATCHED_NS = 100_000
 """How long it stays off if it had conducted for less than ``REST_NS``, ns (decision: it did not latch)."""
 
 
-class Bridge:
+class Bridge(Stateful):
     """Twelve SCRs (S6R), or the six of bridge 1 (S6).
 
     A gate is a window of integer nanoseconds. In it an SCR with forward voltage turns on; it stays on until its current
     is zero, then needs ``turn_off_s`` before it blocks forward voltage without a gate.
     """
+
+    _kept = ("pending", "gated", "gate_end_ns", "recovering", "on_ns", "recovered_ns", "rest_ns", "open_gates")
 
     def __init__(self, *, reversing: bool = True, turn_off_s: float = 150e-6, drop_v: float = 0.0) -> None:
         """Begin with all SCRs off and sound.
@@ -153,3 +156,20 @@ class Bridge:
         self.wiring = replace(self.wiring, shorted=old | leg if shorted else old & ~leg)
         pair = MASK[number] | MASK[PARTNER[number]]
         self.recovering &= ~pair
+
+    def state(self) -> State:
+        """Return gates, latches and failures."""
+        wiring = asdict(self.wiring) | {"phase_arc_v": list(self.wiring.phase_arc_v)}
+        return super().state() | {"wiring": wiring}
+
+    def restore(self, state: State) -> None:
+        """Take a state over.
+
+        Raises:
+            ParameterError: it is not the state of a bridge.
+        """
+        check_names("bridge", state, (*self._kept, "wiring"))
+        super().restore({name: state[name] for name in self._kept})
+        wiring = state["wiring"]
+        check_names("wiring", wiring, tuple(asdict(self.wiring)))
+        self.wiring = Wiring(**wiring | {"phase_arc_v": tuple(wiring["phase_arc_v"])})

@@ -12,14 +12,17 @@ from math import cos, sin
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.conduction import Conduction, Phases
+from automax_ros.drive.conduction import Conduction
 from automax_ros.drive.errors import GateError, ParameterError
 from automax_ros.drive.events import Event, EventKind
 from automax_ros.drive.meter import Sample
 from automax_ros.drive.motor import Machine
-from automax_ros.drive.network import ARMATURE_ARC, PHASE_ARC
+from automax_ros.drive.network import Network
 from automax_ros.drive.scr import BIT, mask_of, numbers_of
+from automax_ros.drive.search import Phases
+from automax_ros.drive.state import State, check_names
 from automax_ros.drive.waves import ZERO_A, Piece
+from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC
 
 ARC_V = 1200.0
 """Voltage of an arc in an opening contactor or fuse, V (decision: above any voltage of these drives)."""
@@ -224,6 +227,52 @@ class Circuit(Conduction):
         self.bridge.wiring = replace(self.bridge.wiring, armature_closed=True, armature_arc_v=0.0)
         self._emit(EventKind.ARMATURE_CLOSED, 0.0, 0)
         self._rewire(phases)
+
+    # What can be kept
+
+    def state(self) -> State:
+        """Return all that the future depends on, with line, bridge and machine: plain data that JSON keeps exactly.
+
+        What has not been taken yet of events and of the present sample is in it too.
+        """
+        return super().state() | {
+            "line": self.line.state(),
+            "bridge": self.bridge.state(),
+            "machine": self.machine.state(),
+            "energy": self.energy.state() if self.energy else None,
+            "events": [(kind.value, *rest) for kind, *rest in self._events],
+            "conducting": self._net.mask,
+            # The order in which currents are looked at decides the last bits of an instant that several share.
+            "guards": [[net.mask, [guard[0] for guard in net.guards]] for net in self._built()],
+        }
+
+    def restore(self, state: State) -> None:
+        """Take over the state of a circuit that was made alike, and go on from there, bit for bit.
+
+        Raises:
+            ParameterError: it is not the state of such a circuit.
+        """
+        parts = ("line", "bridge", "machine", "energy", "events", "conducting", "guards")
+        check_names("circuit", state, (*self._kept, *parts))
+        if (state["energy"] is None) != (self.energy is None):
+            raise ParameterError("the state is that of a circuit with another choice of energy=")
+        super().restore({name: state[name] for name in self._kept})
+        self.line.restore(state["line"])
+        self.bridge.restore(state["bridge"])
+        self.machine.restore(state["machine"])
+        if self.energy is not None:
+            self.energy.restore(state["energy"])
+        self._events.clear()
+        self._events.extend((EventKind(kind), *rest) for kind, *rest in state["events"])
+        self._nets.clear()
+        for mask, order in state["guards"]:
+            self._network(mask).put_in_order(order)
+        self._net = self._network(state["conducting"])
+
+    def _built(self) -> list[Network]:
+        """Return the networks at hand, with the one in force, by their masks."""
+        found = {net.mask: net for net in [*self._nets.values(), self._net]}
+        return [found[mask] for mask in sorted(found)]
 
     # What comes from outside
 

@@ -15,18 +15,12 @@ from automax_ros.drive.errors import SourceShortError
 from automax_ros.drive.events import ROUTINE, EventKind
 from automax_ros.drive.meter import EnergyMeter
 from automax_ros.drive.motor import Machine
-from automax_ros.drive.network import (
-    ARMATURE_ARC,
-    ARMATURE_SHORT,
-    CROSS_FIRE,
-    LINE_SHORT,
-    PHASE_ARC,
-    Impedances,
-    Network,
-    settle,
-)
+from automax_ros.drive.network import ARMATURE_SHORT, CROSS_FIRE, LINE_SHORT, Impedances, Network
 from automax_ros.drive.scr import BIT, numbers_of, rail_of
-from automax_ros.drive.waves import ZERO_A, Piece, RawPiece, first_zero
+from automax_ros.drive.search import Phases, next_ending, next_turn_on
+from automax_ros.drive.state import Stateful
+from automax_ros.drive.waves import Piece, RawPiece
+from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC, settle
 
 EVENTS_KEPT = 10_000
 PIECES_KEPT = 64
@@ -36,13 +30,15 @@ _ALARMS = (
     (LINE_SHORT, EventKind.LINE_SHORT),
     (CROSS_FIRE, EventKind.CROSS_FIRE),
 )
-Phases = tuple[float, float, float]
-State = tuple[float, float, float, float, float]
-"""At the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
 
 
-class Conduction:
+class Conduction(Stateful):
     """Line, bridge and machine while neither gates nor line nor wiring change; ``circuit.Circuit`` is the whole."""
+
+    _kept = (
+        "now_ns", "current_a", "events_lost", "_modes", "_newest", "_emf", "_sample_ns", "_current_before", "_charge",
+        "_volt_s", "_zero_s", "_overlap_s", "_square", "_pieces",
+    )  # fmt: skip
 
     def __init__(self, line: AcLine, bridge: Bridge, machine: Machine, *, trace: bool, energy: bool) -> None:
         """Begin at the line's start without current; see ``Circuit``."""
@@ -96,7 +92,9 @@ class Conduction:
                 now_ns = start_ns + t * 1e9
                 wanted = bridge.candidates(now_ns, net.mask)
                 if wanted:
-                    when, mask = self._watch(wanted, now_ns, (theta, sine, cosine, k, a), left)
+                    when, mask = next_turn_on(
+                        net, bridge, omega, emf, wanted, now_ns, (theta, sine, cosine, k, a), left
+                    )
                     if when == 0.0:
                         self.current_a, self._modes = current, modes
                         net = self._switch(0, mask, start_ns, t, sine, cosine)
@@ -106,7 +104,7 @@ class Conduction:
                         first, on = when, mask
             ahead = None
             if net.guards:
-                when, mask, ahead = self._ending((theta, sine, cosine, k, a), modes, first)
+                when, mask, ahead = next_ending(net, omega, (theta, sine, cosine, k, a), modes, first)
                 if mask:
                     first, out, on = when, mask, 0
             if first > 0.0:
@@ -162,98 +160,6 @@ class Conduction:
             angle = self.line.angle(stop_ns)
             squares = sum(phase**2 for phase in self._phases(self._net, self.current_a, sin(angle), cos(angle)))
             self.energy.stored_j = 0.5 * (self._z.l * self.current_a**2 + self._z.ls * squares)
-
-    def _ending(
-        self, state: State, modes: Phases, limit: float
-    ) -> tuple[float, int, tuple[float, float, float] | None]:
-        """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs.
-
-        Third, if they were needed: sine and cosine of the line's angle and the armature's decay at the limit.
-        """
-        theta, sine, cosine, k, a = state
-        net, omega = self._net, self.line.omega
-        decay, decay_s = net.decay, net.decay_s
-        first, out = limit, 0
-        ahead, lowest = None, -ZERO_A
-        for mask, c, d, share, part, wa, wb, wc, bend in net.guards:
-            guard_k, guard_a = share * k + part, share * a
-            value = c * cosine + d * sine + guard_k + guard_a
-            slope = omega * (d * cosine - c * sine) - decay * guard_a
-            if guard_a < 0.0:
-                bend -= decay * decay * guard_a  # noqa: PLW2901
-            guard_b = wa * modes[0] + wb * modes[1] + wc * modes[2] if net.modes else 0.0
-            if guard_b:
-                value += guard_b
-                slope -= decay_s * guard_b
-                if guard_b < 0.0:
-                    bend -= decay_s * decay_s * guard_b  # noqa: PLW2901
-            if value < lowest:  # a loop of legs has shared its current anew: who would carry it backwards most goes out
-                lowest, first, out = value, 0.0, mask
-            if lowest < -ZERO_A:
-                continue
-            # A parabola of this bend stays below the current: positive at the end, it proves that there is no zero.
-            if value > ZERO_A or (value >= -ZERO_A and slope >= 0.0):
-                least = value if value > 0.0 else 0.0
-                if least + first * (slope - 0.5 * bend * first) > 0.0:
-                    continue
-                if not out and not guard_b:  # likewise from both ends; the interval probably needs the values there
-                    if ahead is None:
-                        angle = theta + omega * limit
-                        ahead = sin(angle), cos(angle), exp(-decay * limit)
-                    final = c * ahead[1] + d * ahead[0] + guard_k + guard_a * ahead[2]
-                    sag = 0.5 * bend * limit - (final - least) / limit
-                    if final > 0.0 and (sag <= 0.0 or 2.0 * bend * least > sag * sag):
-                        continue
-            if -ZERO_A <= value <= ZERO_A and abs(guard_k) + abs(guard_a) + abs(guard_b) + bend < 1e-9:
-                zero = 0.0  # nothing drives it any more
-            else:
-                zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, decay_s, first)
-            if zero <= first:
-                first, out = zero, mask
-        if out and out != net.guards[0][0]:
-            net.put_first(out)
-        return first, out, ahead
-
-    def _watch(self, wanted: int, now_ns: float, state: State, limit: float) -> tuple[float, int]:
-        """Return when (s from now) forward voltage first turns on SCRs of a mask, and which; inf if not before a limit.
-
-        ``state`` is the line's angle, its sine and cosine, and k and a of the armature current. No SCR with a time
-        means that nothing is known beyond it: some SCR rests until then.
-        """
-        theta, sine, cosine, k, a = state
-        net, bridge, omega, emf = self._net, self.bridge, self.line.omega, self._emf
-        decay = net.decay
-        soonest, who = inf, 0
-        most, now_on = 0.0, 0
-        for mask, c, d, constant, by_k, by_a, by_emf, bend in net.watches.get(wanted) or net.watch(wanted):
-            short = -constant - by_k * k - by_emf * emf
-            fade = by_a * a
-            value = c * cosine + d * sine + fade - short
-            if value > 0.0:
-                if mask & bridge.recovering and bridge.rest_end_ns(mask) > now_ns:
-                    rest = (bridge.rest_end_ns(mask) - now_ns) * 1e-9
-                    soonest, who = (rest, 0) if rest < soonest else (soonest, who)
-                elif value > most:
-                    most, now_on = value, mask
-                continue
-            horizon = limit if limit < soonest else soonest
-            if not mask & bridge.gated and horizon > bridge.turn_off_ns * 1e-9:
-                horizon = bridge.turn_off_ns * 1e-9
-            slope = omega * (d * cosine - c * sine) - decay * fade
-            if fade > 0.0:
-                bend += decay * decay * fade  # noqa: PLW2901
-            # As for the currents: a parabola that stays above the voltage and is negative proves that nothing happens.
-            if value + horizon * (slope + 0.5 * bend * horizon) < 0.0:
-                continue
-            horizon = min(horizon, (bridge.window_end_ns(mask, now_ns) - now_ns) * 1e-9)
-            zero = first_zero(-c, -d, short, -fade, 0.0, theta, omega, decay, 0.0, horizon)
-            if zero < soonest and mask & bridge.recovering:
-                rest = (bridge.rest_end_ns(mask) - now_ns) * 1e-9
-                if zero < rest:
-                    zero, mask = rest, 0  # noqa: PLW2901
-            if zero < soonest:
-                soonest, who = zero, mask
-        return (0.0, now_on) if now_on else (soonest, who)
 
     def _switch(self, out: int, on: int, start_ns: int, t: float, sine: float, cosine: float) -> Network:
         """Let SCRs go out (or arcs end), or turn on, at an instant; return the circuit from then on."""

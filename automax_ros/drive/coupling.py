@@ -7,18 +7,23 @@ from math import sqrt
 from automax_ros.drive.circuit import Circuit
 from automax_ros.drive.errors import ParameterError, require
 from automax_ros.drive.motor import Motor
+from automax_ros.drive.state import Stateful
 
 LONGEST_SLICE_NS = 1_000_000
 """The circuits exchange torque at least this often, ns."""
 
 
-class Coupling:
+class Coupling(Stateful):
     """Lets two circuits pass time together, in slices after which their motors exchange torque.
 
     Attributes:
         twist_rad: angle of the first motor ahead of the second's, rad; 0 on a stiff shaft.
         torque_n_m: torque that the shaft carries from the first motor to the second, N m.
+
+    Its state is the shaft's alone: the two circuits have their own.
     """
+
+    _kept = ("twist_rad", "torque_n_m")
 
     def __init__(
         self, first: Circuit, second: Circuit, *, stiffness_n_m_rad: float | None = None, damping_n_m_s: float = 0.0

@@ -8,6 +8,7 @@ from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.circuit import Circuit
 from automax_ros.drive.errors import ParameterError, require
 from automax_ros.drive.scr import FORWARD, REVERSE, direction_of, phase_of
+from automax_ros.drive.state import Stateful
 
 SIXTH = pi / 3
 _MARGIN_NS = 1000
@@ -32,7 +33,7 @@ def firing_order(bridge: int, line: AcLine) -> list[int]:
     return sorted(numbers, key=lambda number: round((natural_angle(number, line) - start) / SIXTH) % 6)
 
 
-class ConstantAlpha:
+class ConstantAlpha(Stateful):
     """Fires each SCR at an angle after its natural commutation, and the one before it again (double pulse).
 
     Attributes:
@@ -40,6 +41,8 @@ class ConstantAlpha:
         bridge: 1 or 2.
         pulse_rad: length of each of the two pulses, rad; 60 degrees keep a pair gated until the next is.
     """
+
+    _kept = ("alpha_rad", "pulse_rad", "bridge", "_order", "_position", "_natural_ns")
 
     def __init__(self, circuit: Circuit, alpha_rad: float, *, bridge: int = 1, pulse_rad: float = SIXTH) -> None:
         """Begin to fire at the circuit's present."""

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from math import inf, sqrt
 from typing import TYPE_CHECKING
 
+from automax_ros.drive.state import Stateful
 from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave
 
 if TYPE_CHECKING:
     from automax_ros.drive.ac_line import AcLine
-    from automax_ros.drive.network import Impedances, Network, Wiring
+    from automax_ros.drive.network import Impedances, Network
+    from automax_ros.drive.wiring import Wiring
 
 
 class Sample:
@@ -64,7 +66,7 @@ class Sample:
 
 
 @dataclass
-class EnergyMeter:
+class EnergyMeter(Stateful):
     """Energies since the start, J: ``source_j = loss_j + stored_j + shaft_j``.
 
     Attributes:
@@ -82,6 +84,7 @@ class EnergyMeter:
     arc_j: float = 0.0
     emf_j: float = 0.0
     stored_j: float = 0.0
+    _kept = ("source_j", "resistance_j", "drop_j", "arc_j", "emf_j", "stored_j")
 
     @property
     def loss_j(self) -> float:

@@ -8,6 +8,7 @@ from math import exp, fmod, pi, sqrt
 from typing import Protocol
 
 from automax_ros.drive.errors import LARGEST, SMALLEST, ParameterError, require
+from automax_ros.drive.state import State, Stateful, check_names
 
 SpeedLoad = Callable[[float], float]
 """A load torque (N m) that depends on the speed (rad/s), such as a fan's; positive torque brakes positive speed."""
@@ -42,9 +43,15 @@ class Machine(Protocol):
     def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
         """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
 
+    def state(self) -> State:
+        """Return all that its future depends on, besides what it was made of."""
+
+    def restore(self, state: State) -> None:
+        """Take a state over."""
+
 
 @dataclass
-class FixedLoad:
+class FixedLoad(Stateful):
     """A resistance (ohm), an inductance (H) and a constant EMF (V): a machine at a held speed, a choke, a battery."""
 
     resistance_ohm: float
@@ -52,6 +59,7 @@ class FixedLoad:
     emf_v: float = 0.0
     turns: bool = False
     step_ns: int = LONGEST_NS
+    _kept = ("emf_v",)
 
     def __post_init__(self) -> None:
         _check_armature(self.resistance_ohm, self.inductance_h)
@@ -66,7 +74,7 @@ class FixedLoad:
 
 
 @dataclass
-class Field:
+class Field(Stateful):
     """The field: flux of its current, which follows its voltage with a time constant.
 
     ``flux = (1 + s) x / (s + x)`` with x the current and flux over rated, s = ``knee`` (0.5 is a usual machine's).
@@ -83,6 +91,7 @@ class Field:
     knee: float | None = None
     current: float = 1.0
     voltage: float = 1.0
+    _kept = ("current", "voltage")
 
     def __post_init__(self) -> None:
         require("time constant of the field in s", self.tau_s, 0.0)
@@ -148,7 +157,7 @@ class MotorData:
             )
 
 
-class Motor:
+class Motor(Stateful):
     """A DC motor on its shaft: a ``Machine`` whose EMF follows the speed.
 
     The EMF is constant within an interval, at the value that the last acceleration lets expect in its middle; the
@@ -158,6 +167,10 @@ class Motor:
     """
 
     turns = True
+    _kept = (
+        "inertia_kg_m2", "speed_rad_s", "angle_rad", "acceleration", "time_s", "k_v_s", "step_ns", "_emf", "_owed_v_s",
+        "_smooth", "coupling_n_m", "torque_n_m", "shaft_j", "friction_j", "load_j",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -239,6 +252,26 @@ class Motor:
         self.time_s += duration_s
         if self.field is not None:
             self.field.advance(duration_s)
+
+    def state(self) -> State:
+        """Return speed, angle, field and energies, and the load torque where it is a number (None where a function)."""
+        field = self.field.state() if self.field else None
+        return super().state() | {"field": field, "load": None if callable(self.load) else self.load}
+
+    def restore(self, state: State) -> None:
+        """Take a state over; a load that is a function stays the motor's own.
+
+        Raises:
+            ParameterError: it is not the state of such a motor.
+        """
+        check_names("motor", state, (*self._kept, "field", "load"))
+        if (state["field"] is None) != (self.field is None) or (state["load"] is None) != callable(self.load):
+            raise ParameterError("the state is that of a motor with another field or another kind of load")
+        super().restore({name: state[name] for name in self._kept})
+        if self.field is not None:
+            self.field.restore(state["field"])
+        if state["load"] is not None:
+            self.load = state["load"]
 
     def _turn(self, time_s: float, torque: float, load: float) -> None:
         """Let constant torques (N m) act for a time; trapezoidal in speed, so that the energies add up exactly."""

@@ -14,11 +14,12 @@ current has no driving voltage, and the legs share as equal small resistances wo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import hypot, inf
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.scr import FORWARD_MASK, REVERSE_MASK, M, P
+from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC, Wiring, closed_legs, is_line_short, leg_currents
 
 TURN_ON_V = 1e-5
 """Forward voltage, beyond the drop, at which a gated SCR turns on, V (decision: above rounding, 0.1 ns of a line's
@@ -28,35 +29,6 @@ SLOWEST_DECAY = 0.01
 
 Potential = tuple[float, float, float, float, float, float]
 """A voltage: factors of cos, sin, 1, of the armature wave's k and a, and of the EMF."""
-
-
-@dataclass(frozen=True)
-class Wiring:
-    """What is closed, open or shorted besides the SCRs that conduct.
-
-    Attributes:
-        shorted: mask of legs (6 bits) that a failed SCR shorts.
-        open_phases: mask of phases that are open.
-        phase_arc_v: voltage of an arc in each phase (V), with the sign of its current; 0 without one.
-        armature_closed: whether the armature is connected.
-        armature_arc_v: voltage of an arc in the armature's contactor (V), with the sign of its current.
-    """
-
-    shorted: int = 0
-    open_phases: int = 0
-    phase_arc_v: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    armature_closed: bool = True
-    armature_arc_v: float = 0.0
-
-    @property
-    def arcing(self) -> bool:
-        """Whether a phase or the contactor is opening."""
-        return self.armature_arc_v != 0.0 or self.phase_arc_v != (0.0, 0.0, 0.0)
-
-    def with_arc(self, phase: int, arc_v: float) -> Wiring:
-        """Return the same with an arc of a voltage (V) in a phase; 0 ends it."""
-        a, b, c = (arc_v if x == phase else old for x, old in enumerate(self.phase_arc_v))
-        return replace(self, phase_arc_v=(a, b, c))
 
 
 @dataclass(frozen=True)
@@ -100,9 +72,9 @@ class Network:
     )  # fmt: skip
 
     def __init__(self, mask: int, wiring: Wiring, line: AcLine, z: Impedances) -> None:
-        """Set up the equations of the SCRs of a mask; ``settle`` has removed what cannot carry current."""
+        """Set up the equations of the SCRs of a mask; ``wiring.settle`` has removed what cannot carry current."""
         self.mask = mask
-        legs = _closed_legs(mask, wiring)
+        legs = closed_legs(mask, wiring)
         drops = {leg: direction * z.drop_v for leg, direction in legs.items()}
         self.watches: dict[int, list[Watch]] = {}
         self._drop_v, self._omega = z.drop_v, line.omega
@@ -112,7 +84,7 @@ class Network:
         self._set_potentials(legs, drops, wiring, line, z)
         self._set_guards(legs, wiring, line.omega)
         self.alarms = ARMATURE_SHORT if self.armature_short else 0
-        if any(_is_line_short(rail, legs) for rail in (P, M)):
+        if any(is_line_short(rail, legs) for rail in (P, M)):
             self.alarms |= LINE_SHORT
         if mask & FORWARD_MASK and mask & REVERSE_MASK:
             self.alarms |= CROSS_FIRE
@@ -238,7 +210,7 @@ class Network:
     def _set_guards(self, legs: dict[int, int], wiring: Wiring, omega: float) -> None:
         """Collect the currents whose zero ends the interval: of SCRs, and of arcs."""
         guards: dict[_Current, int] = {}
-        self.leg_weights = _leg_currents(legs)
+        self.leg_weights = leg_currents(legs)
         for leg, weights in self.leg_weights.items():
             if legs[leg]:
                 bit = 1 << (2 * leg + (legs[leg] < 0))
@@ -278,6 +250,11 @@ class Network:
         """Let the current of these SCRs be looked at first: what ended this circuit last time will next time too."""
         self.guards.sort(key=lambda guard: guard[0] != mask)
 
+    def put_in_order(self, masks: list[int]) -> None:
+        """Let the currents be looked at in the order of these SCRs."""
+        place = {mask: index for index, mask in enumerate(masks)}
+        self.guards.sort(key=lambda guard: place.get(guard[0], len(place)))
+
     def watch(self, wanted: int) -> list[Watch]:
         """Return, for SCRs that could begin to conduct, the voltages over them: of single ones, of pairs in series.
 
@@ -294,9 +271,6 @@ class Network:
         return found
 
 
-PHASE_ARC = 1 << 12
-"""The bit of an arc in phase A; the next two are B's and C's."""
-ARMATURE_ARC = 1 << 15
 ARMATURE_SHORT, LINE_SHORT, CROSS_FIRE = 1, 2, 4
 """Bits of ``Network.alarms``."""
 _NOTHING: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -320,70 +294,6 @@ def _response(cosine: float, sine: float, r: float, x: float) -> tuple[float, fl
     """Return the current of ``cosine cos + sine sin`` volts in r and x (ohm) once it has settled."""
     square = r * r + x * x
     return (r * cosine - x * sine) / square, (r * sine + x * cosine) / square
-
-
-def _closed_legs(mask: int, wiring: Wiring) -> dict[int, int]:
-    """Return the closed legs with their direction: +1 from phase to rail, -1 back, 0 both ways (shorted)."""
-    legs = {}
-    for leg in range(6):
-        if wiring.shorted >> leg & 1:
-            legs[leg] = 0
-        elif mask >> (2 * leg) & 3:
-            legs[leg] = 1 if mask >> (2 * leg) & 1 else -1
-    return legs
-
-
-def _is_line_short(rail: int, legs: dict[int, int]) -> bool:
-    """Whether the phases on a rail are shorted for longer than a commutation: not all conduct the same way."""
-    ways = [legs[leg] for leg in legs if leg % 2 == rail]
-    return len(ways) > 1 and abs(sum(ways)) != len(ways)
-
-
-def _leg_currents(legs: dict[int, int]) -> dict[int, tuple[float, float, float, float]]:
-    """Return each leg's current, from phase to rail, as weights of armature current and three phase currents."""
-    both = [x for x in range(3) if 2 * x in legs and 2 * x + 1 in legs]
-    weights: dict[int, tuple[float, float, float, float]] = {}
-    for leg in legs:
-        x = leg // 2
-        if x not in both:
-            weights[leg] = _weights({1 + x: 1.0})
-    if not both:
-        return weights
-    # What flows into P beside the phases that sit on both rails: the armature current less the single legs there.
-    into_p = {0: 1.0 / len(both)}
-    for leg in legs:
-        if leg % 2 == P and leg // 2 not in both:
-            into_p[1 + leg // 2] = -1.0 / len(both)
-    for x in both:
-        to_p = dict(into_p)
-        for y in both:
-            to_p[1 + y] = to_p.get(1 + y, 0.0) - 0.5 / len(both)
-        to_p[1 + x] = to_p.get(1 + x, 0.0) + 0.5
-        weights[2 * x] = _weights(to_p)
-        to_m = {index: -weight for index, weight in to_p.items()}
-        to_m[1 + x] += 1.0
-        weights[2 * x + 1] = _weights(to_m)
-    return weights
-
-
-def _weights(parts: dict[int, float]) -> tuple[float, float, float, float]:
-    return parts.get(0, 0.0), parts.get(1, 0.0), parts.get(2, 0.0), parts.get(3, 0.0)
-
-
-def settle(mask: int, wiring: Wiring) -> int:
-    """Return a mask without the SCRs that can carry no current, for want of a way round."""
-    edges: dict[int, tuple[int, int]] = {leg: (leg // 2, 3 + leg % 2) for leg in _closed_legs(mask, wiring)}
-    edges.update({10 + x: (x, 5) for x in range(3) if not wiring.open_phases >> x & 1})
-    if wiring.armature_closed:
-        edges[20] = (3, 4)
-    while True:
-        degree = [sum(node in ends for ends in edges.values()) for node in range(6)]
-        loose = [edge for edge, ends in edges.items() if any(degree[node] == 1 for node in ends)]
-        if not loose:
-            break
-        for edge in loose:
-            del edges[edge]
-    return sum((mask & 3 << (2 * leg)) for leg in range(6) if leg in edges and not wiring.shorted >> leg & 1)
 
 
 def _watch(nodes: list[Potential | None], floating: Potential | None, wanted: int) -> list[tuple[int, Potential]]:
