@@ -32,7 +32,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     live = LiveRack(rack)
     recorder: Recorder | None = None
     sync: DiskSync | None = None
-    display = StatusDisplay(rack, plan.watch, live=True)
+    display = StatusDisplay(rack, plan.watch, live=True, health=live.health)
     recording = RecordingWatch(None, display)
     told = False
 

@@ -8,27 +8,34 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from automax_ros.cli.status_line import StatusLine
+from automax_ros.cli.terminal import count_of
 from automax_ros.compile.functions import text_of
 from automax_ros.core.diagnostics import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.rack.rack import Processor, Rack
 from automax_ros.rack.settings import Watched
+from automax_ros.running.health import Health
 
 
 class StatusDisplay:
-    """Shows a rack's progress on standard output; ``live``: on the wall clock, so loads can be measured."""
+    """Shows a rack's progress on standard output; ``live``: on the wall clock, so loads can be measured.
 
-    def __init__(self, rack: Rack, watch: Sequence[Watched], *, live: bool) -> None:
+    ``health`` is what a rack on the wall clock has trouble with; each thing is a line when it first happens.
+    """
+
+    def __init__(self, rack: Rack, watch: Sequence[Watched], *, live: bool, health: Health | None = None) -> None:
         """Begin; nothing is printed before the first update is due."""
-        self._rack, self._watch, self._live = rack, watch, live
+        self._rack, self._watch, self._live, self._health = rack, watch, live, health
         self._line = StatusLine()
         self._last_rack_ns = 0
         self._last_scans = 0
         self._last_busy: dict[int, int] = {}
 
     def update(self, now_ns: int) -> None:
-        """Show the state at a rack time if it is time to."""
+        """Show news, and the state at a rack time if it is time to."""
+        for text in self._health.news() if self._health else ():
+            self.message(printable(text))
         passed = self._line.due()
         if passed:
             self._show(now_ns, passed)
@@ -81,6 +88,7 @@ class StatusDisplay:
             parts += [self._load(processor, passed_ns) for processor in self._rack.processors]
         else:
             parts.append(f"{(now_ns - self._last_rack_ns) / passed_ns:.0f}x")
+        parts += self._trouble()
         parts += self._values()
         self._last_rack_ns, self._last_scans = now_ns, scans
         self._line.show(parts)
@@ -92,6 +100,12 @@ class StatusDisplay:
         self._last_busy[processor.slot] = busy
         late = sum(self._rack.statistics[task.name].skipped for task in processor.tasks)
         return f"P{processor.slot} {100 * share:.1f} % late {late}"
+
+    def _trouble(self) -> list[str]:
+        """Return the counts of what went wrong."""
+        errors = {"run-time error": sum(task.errors.count for task in self._rack.tasks)}
+        counts = self._health.counts if self._health else errors
+        return [count_of(number, kind) for kind, number in counts.items() if number]
 
     def _values(self) -> list[str]:
         return [f"{item.label}={_shown(self._rack.value(item.name, item.element))}" for item in self._watch]

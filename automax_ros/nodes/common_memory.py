@@ -14,18 +14,19 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.context import Context
-from rclpy.event_handler import QoSPublisherMatchedInfo
+from rclpy.event_handler import QoSPublisherMatchedInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
 from automax_ros.core.types import Value
 from automax_ros.nodes.throttle import Throttle
-from automax_ros.nodes.topics import COMMAND_QOS, message_class, publisher, ros_qos
+from automax_ros.nodes.topics import COMMAND_QOS, incompatible, message_class, publisher, ros_qos
 from automax_ros.rack.config import CommonVariable, Direction
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.writers import ROS_WRITER
+from automax_ros.running.health import Health
 from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED
 from automax_ros.wire.rack_files import files_of, files_text
@@ -39,19 +40,25 @@ class CommonMemoryNode(Node):  # type: ignore[misc]
     """Serves the topics of common memory; its callbacks run between scans, on the thread that scans."""
 
     def __init__(
-        self, rack: Rack, stream: RackStream, context: Context, catch_up: Callable[[], None] = lambda: None
+        self,
+        rack: Rack,
+        stream: RackStream,
+        context: Context,
+        catch_up: Callable[[], None] = lambda: None,
+        health: Health | None = None,
     ) -> None:
         """Create publishers and subscriptions; messages flow once the stream begins.
 
-        ``catch_up`` brings rack time to the present.
+        ``catch_up`` brings rack time to the present, ``health`` counts what is refused.
         """
         super().__init__("common_memory", namespace=f"/{rack.config.namespace}", context=context)
         self._rack, self._stream, self._catch_up = rack, stream, catch_up
+        self._health = health or Health()
         self._publishers_by_name: dict[str, Publisher[Any]] = {}
         for own in stream.topics:
             if own.slot is None:
                 joined = own in (stream.snapshot_topic, stream.backplane_topic)
-                self._publishers_by_name[own.name] = publisher(self, own, self._join if joined else None)
+                self._publishers_by_name[own.name] = publisher(self, own, self._health, self._join if joined else None)
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
         self._config.publish(String(data=files_text(rack.config.name, files_of(rack))))
         for view, variable in enumerate(rack.config.variables):
@@ -72,9 +79,11 @@ class CommonMemoryNode(Node):  # type: ignore[misc]
             self._stream.send_image()
 
     def _subscribe(self, view: int, variable: CommonVariable, topic: Topic) -> None:
-        self.create_subscription(
-            message_class(topic.type_name), set_topic(topic.name), self._writer(view, variable), COMMAND_QOS
-        )
+        name = set_topic(topic.name)
+        lost = incompatible(self, f"what a writer of {name} sends is lost", self._health)
+        events = SubscriptionEventCallbacks(incompatible_qos=lost)
+        kind = message_class(topic.type_name)
+        self.create_subscription(kind, name, self._writer(view, variable), COMMAND_QOS, event_callbacks=events)
 
     def _writer(self, view: int, variable: CommonVariable) -> Callable[[Any], None]:
         """Return the callback that writes a variable."""
@@ -85,8 +94,10 @@ class CommonMemoryNode(Node):  # type: ignore[misc]
             try:
                 self._rack.write_view(view, _elements(variable, message), ROS_WRITER)
             except MemoryValueError as error:
+                refusal = f"write refused: {error}"
+                self._health.note("refused write", variable.name, lambda: refusal)
                 if throttle.passes():
-                    self.get_logger().warning(f"write refused: {error}")
+                    self.get_logger().warning(refusal)
 
         return write
 

@@ -22,6 +22,7 @@ from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.rack.rack import Rack
+from automax_ros.running.health import Health
 from automax_ros.running.pacer import START_LEAD_NS, Pacer
 from automax_ros.wire.stream import RackStream
 
@@ -40,6 +41,7 @@ class LiveRack:
     rack: Rack
     stream: RackStream = field(init=False)
     stopping: bool = False
+    health: Health = field(default_factory=Health)
     _context: Context = field(init=False)
     _executor: Any = field(init=False, default=None)
     _nodes: list[Any] = field(init=False, default_factory=list)
@@ -57,9 +59,11 @@ class LiveRack:
         self.stream = RackStream(self.rack, run_id)
         self._executor = make_executor(self._context)
         self._pacer = Pacer(self.rack.scheduler, wait=lambda seconds: self._executor.spin_once(timeout_sec=seconds))
-        self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context, self._pacer.catch_up))
+        self._nodes.append(CommonMemoryNode(self.rack, self.stream, self._context, self._pacer.catch_up, self.health))
         for processor in self.rack.processors:
-            self._nodes.append(ProcessorNode(self.rack, processor, self.stream, self._context, self._pacer.catch_up))
+            self._nodes.append(
+                ProcessorNode(self.rack, processor, self.stream, self._context, self._pacer.catch_up, self.health)
+            )
         for node in self._nodes:
             self._executor.add_node(node)
 

@@ -29,6 +29,7 @@ from automax_ros.nodes.topics import publisher
 from automax_ros.nodes.tunables import Tunable, tunables_of
 from automax_ros.rack.rack import Processor, Rack
 from automax_ros.running.error_log import LogEntry
+from automax_ros.running.health import Health
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.running.views import Write
@@ -51,13 +52,18 @@ class ProcessorNode(Node):  # type: ignore[misc]
         stream: RackStream,
         context: Context,
         catch_up: Callable[[], None] = lambda: None,
+        health: Health | None = None,
     ) -> None:
-        """Create publishers and parameters, and observe the rack; ``catch_up`` brings rack time to the present."""
+        """Create publishers and parameters, and observe the rack.
+
+        ``catch_up`` brings rack time to the present, ``health`` counts run-time errors.
+        """
         super().__init__(f"processor_{processor.slot}", namespace=f"/{rack.config.namespace}", context=context)
         self._rack, self._processor, self._stream, self._catch_up = rack, processor, stream, catch_up
+        self._health = health or Health()
         own = [topic for topic in stream.module_topics if topic.slot == processor.slot]
         self._publishers_by_topic: dict[Topic, Publisher[Any]] = {
-            topic: publisher(self, topic, self._join) for topic in own
+            topic: publisher(self, topic, self._health, self._join) for topic in own
         }
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(processor.tasks)}
@@ -78,6 +84,9 @@ class ProcessorNode(Node):  # type: ignore[misc]
         """Report errors and printed lines of the Processor's own tasks."""
         if task.slot != self._processor.slot:
             return
+        for line, code in record.errors:
+            entry = LogEntry(line, code, record.scan)
+            self._health.note("run-time error", (task, line, code), lambda: f"{task.name}: {entry.describe()}")  # noqa: B023
         if record.errors and self._error_throttles[task.name].passes():
             for line, code in record.errors[:ERRORS_SHOWN]:
                 self.get_logger().warning(f"{task.name}: {LogEntry(line, code, record.scan).describe()}")

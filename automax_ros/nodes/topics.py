@@ -9,8 +9,9 @@ from typing import Any
 from rclpy.event_handler import PublisherEventCallbacks, QoSPublisherMatchedInfo
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
 
+from automax_ros.running.health import Health
 from automax_ros.wire.qos import QosProfile
 from automax_ros.wire.stream import Topic
 
@@ -41,10 +42,23 @@ def ros_qos(profile: QosProfile) -> QoSProfile:
     )
 
 
+def incompatible(node: Node, what: str, health: Health) -> Callable[[Any], None]:
+    """Return what is told of a reader or writer with an incompatible quality of service; ``what`` says what is lost."""
+
+    def told(event: Any) -> None:
+        policy = str(qos_policy_name_from_kind(event.last_policy_kind)).lower()
+        text = f"{what}: its quality of service does not fit ({policy})"
+        node.get_logger().warning(text)
+        health.note("QoS conflict", what, lambda: text, times=event.total_count_change)
+
+    return told
+
+
 def publisher(
-    node: Node, topic: Topic, matched: Callable[[QoSPublisherMatchedInfo], None] | None = None
+    node: Node, topic: Topic, health: Health, matched: Callable[[QoSPublisherMatchedInfo], None] | None = None
 ) -> Publisher[Any]:
     """Return a node's publisher of a topic; it takes the message as CDR bytes. ``matched`` is told of each reader."""
-    events = PublisherEventCallbacks(matched=matched)
+    told = incompatible(node, f"a reader of {topic.name} gets nothing", health)
+    events = PublisherEventCallbacks(matched=matched, incompatible_qos=told)
     kind = message_class(topic.type_name)
     return node.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events)
