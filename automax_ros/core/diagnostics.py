@@ -15,7 +15,7 @@ LONGEST_EXCERPT = 240
 
 @dataclass(frozen=True, order=True)
 class Span:
-    """A stretch of one physical line of a text; lines and columns count from 1, ``end_column`` is behind the last."""
+    """A stretch of one physical line of a text; lines and columns count from 1, ``end_column`` is after the last."""
 
     line: int
     column: int
@@ -127,10 +127,10 @@ def _excerpt(span: Span, lines: list[str]) -> list[str]:
     line = printable(whole[left_out : left_out + LONGEST_EXCERPT])
     column, end_column = span.column - left_out, span.end_column - left_out
     start = min(max(column - 1, 0), len(line))
-    before, behind = "..." if left_out else "", "..." if left_out + len(line) < len(whole) else ""
-    length = max(1, min(end_column, len(line) + (1 if behind else 2)) - column)
+    before, after = "..." if left_out else "", "..." if left_out + len(line) < len(whole) else ""
+    length = max(1, min(end_column, len(line) + (1 if after else 2)) - column)
     pad = " " * len(before) + "".join("\t" if char == "\t" else " " for char in line[:start])
-    return [f"  {before}{line}{behind}", f"  {pad}{'^' * length}"]
+    return [f"  {before}{line}{after}", f"  {pad}{'^' * length}"]
 
 
 def printable(text: str) -> str:

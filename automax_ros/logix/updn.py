@@ -1,4 +1,4 @@
-"""UPDN, the up/down accumulator of the Logix controllers: as far as a position is summed up behind PMUL."""
+"""UPDN, the up/down accumulator of the Logix controllers: as far as a position is summed up after PMUL."""
 
 from __future__ import annotations
 

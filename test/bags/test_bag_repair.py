@@ -224,7 +224,7 @@ def test_a_damaged_chunk_costs_itself_only(bag: Path, tmp_path: Path) -> None:
 
 
 def test_a_lying_length_costs_one_chunk(bag: Path, tmp_path: Path) -> None:
-    """Records cannot be told apart behind it; the next compressed chunk is found again."""
+    """Records cannot be told apart after it; the next compressed chunk is found again."""
     places = chunk_places(bag / "scans_0.mcap")
     data = bytearray((bag / "scans_0.mcap").read_bytes())
     data[places[2][0] + 6] = 0x7F

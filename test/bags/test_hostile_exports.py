@@ -1,6 +1,6 @@
 """Information, tables and pictures of recordings with changed bytes: an answer or a BagError, never anything else.
 
-The files have no checksums and no compression, so that each change reaches the code behind them.
+The files have no checksums and no compression, so that each change reaches the code that reads them.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from .recordings import sample_recording
 
 
 class Breaking:
-    """A table that breaks off behind its third row."""
+    """A table that breaks off after its third row."""
 
     def __init__(self, table: Table) -> None:
         self._table = table

@@ -243,7 +243,7 @@ def literals(block):
 
 
 def instances(block, fixed):
-    """The block, behind the SHIFT block that makes its data structure, if it uses one."""
+    """The block, after the SHIFT block that makes its data structure, if it uses one."""
     if block.structure is not Access.USES:
         return Instance(block, TICK, **fixed), None
     maker = Instance(CATALOGUE[f"SHIFT_{block.name.partition('_')[2]}"], TICK, max_columns=3)

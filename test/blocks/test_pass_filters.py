@@ -68,7 +68,7 @@ def test_the_printed_functions_are_butterworth_filters(order):
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("name", [HIGH, LOW])
 def test_against_scipy(name, order, period_ns, turn, kind):
-    """``turn`` is the frequency times T. Full steps leave 16 bits behind a high-pass: the output clamps."""
+    """``turn`` is the frequency times T. Full steps leave 16 bits after a high-pass: the output clamps."""
     w = (LOWEST[order] * 1.0001 if turn == "lowest" else turn) / (period_ns / 1e9)
     inputs = np.trunc(signals(32767)[kind])
     outputs = outputs_of(filter_of(name, order, w, period_ns), inputs)

@@ -365,7 +365,7 @@ def closed_loop(block, set_point, seconds, *, gain, tau, period_s):
 
 
 def discrete_loop(kp, ki, set_point, scans, *, gain, tau, period_s):
-    """The same loop without rounding, by scipy: PI by the trapezoid rule, the plant behind a zero-order hold."""
+    """The same loop without rounding, by scipy: PI by the trapezoid rule, the plant after a zero-order hold."""
     pole = math.exp(-period_s / tau)
     half = ki * period_s / 2
     controller = np.array([kp + half, half - kp]), np.array([1.0, -1.0])

@@ -1,4 +1,4 @@
-"""The names behind `--watch`."""
+"""The names of `--watch`."""
 
 import pytest
 

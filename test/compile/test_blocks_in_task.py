@@ -171,7 +171,7 @@ def seen_by_rules(parameters: dict[str, str]) -> dict[str, Given]:
 
 @st.composite
 def with_its_structure(draw, block: Block) -> list[Programmed]:
-    """A CALL, behind the SHIFT block that makes the data structure that it uses."""
+    """A CALL, after the SHIFT block that makes the data structure that it uses."""
     call = draw(calls(block))
     if block.structure is not Access.USES:
         return [call]

@@ -58,7 +58,7 @@ def started(config: RackConfig, **tunables: Value) -> Rack:
 
 
 def sampled(rack: Rack, seconds: float, *names: str) -> list[tuple[Value, ...]]:
-    """The values behind each scan of 11 ms."""
+    """The values after each scan of 11 ms."""
     rows = []
     for _ in range(round(seconds / SCAN_S)):
         rack.run(SCAN_S)

@@ -18,7 +18,7 @@ _COMMON = re.compile(r"(\w+[%!@$]?)(?:\((\d+)\))?(:in)?$")
 
 @dataclass(frozen=True)
 class Fence:
-    """A fenced text of a page: its language and the words behind it, such as ``target=udc`` or ``rack=RUN@:in``."""
+    """A fenced text of a page: its language and the words after it, such as ``target=udc`` or ``rack=RUN@:in``."""
 
     language: str
     words: tuple[str, ...]

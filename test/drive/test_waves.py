@@ -39,7 +39,7 @@ def test_first_zero_is_the_first(wave, theta, rates, limit):
         assert not len(below)
         return
     assert 0 < found <= limit
-    # Nothing before it is below zero, it is a zero, and just behind the wave is below.
+    # Nothing before it is below zero, it is a zero, and just after the wave is below.
     assert not len(below) or found <= grid[below[0]] + 1e-12
     assert (values[grid < found - 1e-9] >= -1e-9).all()
     slope_scale = sum(map(abs, wave)) * max(OMEGA, *rates)

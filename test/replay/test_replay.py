@@ -132,7 +132,7 @@ def test_each_differing_scan_is_that_of_a_rack_with_the_other_gain(bag, tmp_path
 
 
 def history(bag: Path, task: str) -> dict[int, int]:
-    """OUT% behind each scan."""
+    """OUT% after each scan."""
     value, values = 0, {}
     for scan in scans_of(bag, task):
         for view, number in zip(scan.committed.variable, scan.committed.value, strict=True):

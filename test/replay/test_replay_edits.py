@@ -206,7 +206,7 @@ def test_a_difference_that_grows_does_not_settle(tmp_path):
 
 
 def test_a_range_that_begins_with_a_recorded_state_has_the_scan_of_that_instant(tmp_path):
-    """States come every 10 s behind a scan; a period that divides 10 s puts a scan just there."""
+    """States come every 10 s after a scan; a period that divides 10 s puts a scan just there."""
     yaml = YAML_OF_TWO.replace("tick_ms: 5.5", "tick_ms: 5.0")
     bag = recorded(tmp_path, None, yaml=yaml, seconds=10.1)
     report = replayed(bag, only=("SPEED",), from_ns=10_000_000_000, to_ns=10_004_000_000)

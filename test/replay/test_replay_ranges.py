@@ -102,7 +102,7 @@ def test_tunables_set_on_the_way_reach_an_edited_task(tuned):
 
 
 def test_a_changed_current_counts_until_the_operator_sets_the_tunable(tuned):
-    """TRIM% 4 instead of 1 up to 3.75 s, where it was set to 3; SUM% shows it one to one, OUT% behind the LAG."""
+    """TRIM% 4 instead of 1 up to 3.75 s, where it was set to 3; SUM% shows it one to one, OUT% after the LAG."""
     changed = edited(SPEED, ("CURRENT=1", "CURRENT=4"))
     report = replayed(tuned, {"SPEED": changed}, only=("SPEED",))
     (found,) = report.differences
@@ -169,7 +169,7 @@ def without_scans(first: int, last: int, task: str = "WORK"):
 
 
 def test_missing_scans_are_told_and_the_next_state_goes_on(bag, tmp_path):
-    """The next state stands behind scan 911, the first one from 10 s on."""
+    """The next state stands after scan 911, the first one from 10 s on."""
     report = replayed(rewritten(bag, tmp_path / "bag", without_scans(400, 449)))
     assert report.identical
     work = report.tasks[1]

@@ -119,7 +119,7 @@ def test_late_events_happen_once_at_their_last_instant_and_stay_on_the_grid():
 
 
 def test_late_events_happen_in_the_order_of_the_instants_they_happen_at():
-    """A that skipped stands at 20 now: B at 5 comes before it, C at 20 behind it by its priority."""
+    """A that skipped stands at 20 now: B at 5 comes before it, C at 20 after it by its priority."""
     scheduler, journal = Scheduler(), Journal()
     scheduler.every(10, 0, key("A", 5), journal.periodic("A"))
     scheduler.every(100, 5, key("B", 9), journal.periodic("B"))

@@ -115,7 +115,7 @@ def test_late_subscriber_gets_latched_facts(ros_domain_id, bag):
         player.wait_for_line(PLAYING)
         values = client.listen(Int16, "/line1/common/REF", latched=True)
         client.until(lambda: bool(values))
-        assert values[0].data in (180, 181)  # what held at 1 s, or the first one behind it
+        assert values[0].data in (180, 181)  # what held at 1 s, or the first one after it
         client.until(lambda: values[-1].data >= 182)
         with Client("second") as second:
             assert second.first(VariableTable, "/line1/variables").run_id == 77

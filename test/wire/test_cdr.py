@@ -157,7 +157,7 @@ def test_bytes_are_those_of_rclpy(name: str) -> None:
         ours, padding = encode(message), modelled(message)[1]
         ros = ros_message(message)
         theirs = serialization.serialize_message(ros)
-        # ROS leaves padding as it finds it, and reserves some bytes too many behind empty lists
+        # ROS leaves padding as it finds it, and reserves some bytes too many after empty lists
         masked = bytes(0 if index in padding else byte for index, byte in enumerate(theirs))
         assert masked[: len(ours)] == ours
         assert decode(name, theirs) == message

@@ -57,7 +57,7 @@ def test_cut_data_is_an_error_of_the_format(entries, data):
 @given(st.text("AB", max_size=9), st.lists(st.integers(0, 66), min_size=4, max_size=4))
 @repeatable(100)
 def test_wherever_they_start(name, counts):
-    """In a Scan four Values stand behind a text, so each at any place."""
+    """In a Scan four Values stand after a text, so each at any place."""
     parts = [Values(tuple(range(count)), (0,) * count, (0.5,) * count) for count in counts]
     scan = Scan(5, 1, name, 7, 0, 0, True, *parts)
     assert decoder("automax_msgs/msg/Scan")(encode(scan)) == scan

@@ -80,7 +80,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6830", "recording without the sources to replay it"),
     Problem("AMX6831", "recording that does not fit its own sources"),
     Problem("AMX6832", "no scan to replay"),
-    Problem("AMX6833", "value that the recording does not tell"),
+    Problem("AMX6833", "value that the recording does not hold"),
     Problem("AMX6834", "picture cannot be drawn"),
     Problem("AMX6840", "nothing to play"),
     # the command line: files and the tables of `automax trace` and `automax compare`

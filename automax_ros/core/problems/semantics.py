@@ -7,14 +7,14 @@ from automax_ros.core.problems.problem import Problem, Severity
 _DECLARATIONS = (
     Problem("AMX4001", "variable is not declared"),
     Problem("AMX4002", "name declared twice"),
-    Problem("AMX4003", "declaration behind SCAN_LOOP"),
+    Problem("AMX4003", "declaration after SCAN_LOOP"),
     Problem("AMX4004", "declaration inside IF or FOR"),
     Problem("AMX4006", "array with more than four dimensions"),
     Problem("AMX4007", "array too large"),
     Problem("AMX4008", "bad length of a string"),
     Problem("AMX4009", "local data of the task too large"),
     Problem("AMX4010", "the rack does not define the common", hardware="E0"),
-    Problem("AMX4011", "the rack defines the common otherwise", hardware="E0"),
+    Problem("AMX4011", "the rack defines the common differently", hardware="E0"),
     Problem("AMX4012", "variable cannot be tunable"),
     Problem("AMX4013", "tunable without CURRENT"),
     Problem("AMX4014", "CURRENT outside of the tuning limits"),
@@ -24,7 +24,7 @@ _DECLARATIONS = (
 )
 _EXPRESSIONS = (
     Problem("AMX4020", "whole array where a value is needed"),
-    Problem("AMX4021", "subscripts behind a simple variable"),
+    Problem("AMX4021", "subscripts after a simple variable"),
     Problem("AMX4022", "wrong number of subscripts"),
     Problem("AMX4023", "subscript out of range"),
     Problem("AMX4024", "division by the constant 0"),
@@ -36,7 +36,7 @@ _FLOW = (
     Problem("AMX4042", "block before SCAN_LOOP"),
     Problem("AMX4043", "SCAN_LOOP inside IF or FOR"),
     Problem("AMX4044", "END is missing"),
-    Problem("AMX4045", "statement behind END"),
+    Problem("AMX4045", "statement after END"),
     Problem("AMX4046", "END before SCAN_LOOP"),
     Problem("AMX4047", "no such line"),
     Problem("AMX4048", "jump back to SCAN_LOOP or before it"),
@@ -54,7 +54,7 @@ _EVENTS = (
     Problem("AMX4061", "scan cannot wait for a software event"),
     Problem("AMX4062", "interrupt status variable is not a simple common INTEGER"),
     Problem("AMX4063", "TIMEOUT of an event out of range"),
-    Problem("AMX4064", "EVENT behind SCAN_LOOP"),
+    Problem("AMX4064", "EVENT after SCAN_LOOP"),
 )
 _BLOCKS = (
     Problem("AMX4070", "unknown block"),
@@ -85,7 +85,7 @@ _BLOCKS = (
     Problem("AMX4096", "variable should be COMMON", Severity.WARNING),
     Problem("AMX4097", "UDC task without THERMAL_OVERLOAD", Severity.WARNING),
     Problem("AMX4098", "constant is limited at run time", Severity.WARNING),
-    Problem("AMX4099", "LOOP_TIME is no whole number of scan periods", Severity.WARNING),
+    Problem("AMX4099", "LOOP_TIME is not a whole number of scan periods", Severity.WARNING),
 )
 
 PROBLEMS: tuple[Problem, ...] = (*_DECLARATIONS, *_EXPRESSIONS, *_FLOW, *_EVENTS, *_BLOCKS)

@@ -52,7 +52,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX0057", "NEXT of another variable"),
     Problem("AMX0058", "IF and FOR nested too deep"),
     Problem("AMX0059", "ELSE not alone on its line"),
-    Problem("AMX0060", "block statement behind THEN"),
+    Problem("AMX0060", "block statement after THEN"),
     Problem("AMX0061", "TO missing"),
     Problem("AMX0062", "line number missing in a jump"),
     Problem("AMX0063", "ON without GOTO or GOSUB"),
