@@ -62,3 +62,14 @@ def is_inside(path: Path, folder: Path) -> bool:
         return path.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):
         return False
+
+
+def lies_next_to(path: Path, other: Path) -> bool:
+    """Whether a path ends in the folder in which another file stands, or below, all symbolic links followed.
+
+    Where every installed file is a link to its source, a rack file and its tasks meet there (colcon).
+    """
+    try:
+        return path.resolve().is_relative_to(other.resolve().parent)
+    except (OSError, ValueError, RuntimeError):
+        return False

@@ -36,13 +36,13 @@ class LoadResult:
 def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:
     """Read a rack file; whatever it holds becomes a configuration or diagnostics (AMX6000 to AMX6499), by place.
 
-    Task sources must lie in the file's folder, symbolic links followed, unless ``allow_outside``. They are read to see
-    that they can be, not compiled.
+    Task sources must lie in the file's folder, symbolic links followed (also the file's own), unless ``allow_outside``.
+    They are read to see that they can be, not compiled.
     """
     path = Path(path)
     findings = Findings()
     source = SourceText(str(path), _text_of(path, findings))
-    return _loaded(source, TaskReader(path.parent, allow_outside, findings), path, findings)
+    return _loaded(source, TaskReader(path, allow_outside, findings), path, findings)
 
 
 def load_stored(source: SourceText, path: Path) -> LoadResult:

@@ -8,7 +8,7 @@ from typing import TypeGuard
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.rack.config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
-from automax_ros.rack.files import FileFault, is_inside, read_bytes
+from automax_ros.rack.files import FileFault, is_inside, lies_next_to, read_bytes
 from automax_ros.rack.findings import Findings, did_you_mean, quoted
 from automax_ros.rack.names import NameFault, check_task_name
 from automax_ros.rack.scalars import integer_value, text_value
@@ -29,11 +29,11 @@ _LISTED_FILES = 1000
 class TaskReader:
     """Reads the tasks of all Processors of a rack, whose names must differ.
 
-    ``folder`` is the rack file's; sources lie in it unless ``allow_outside``. Without a folder no file is touched: the
-    sources are stored under their tasks' names, whatever the rack file calls them.
+    Sources lie in the folder of ``rack_file``, or of the file that it is a link to, unless ``allow_outside``. Without
+    a rack file none is touched: the sources are stored under their tasks' names, whatever the rack file calls them.
     """
 
-    folder: Path | None
+    rack_file: Path | None
     allow_outside: bool
     findings: Findings
     seen: dict[str, Span] = field(default_factory=dict)
@@ -86,7 +86,7 @@ class TaskReader:
 
     def _file(self, node: Node | None, key: Scalar, name: str | None, what: str) -> Path | None:
         """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1)."""
-        if self.folder is None:
+        if self.rack_file is None:
             return Path(f"{name}.BLK") if name is not None else None
         if node is None:
             return self._usable(f"{name}.BLK", key.span) if name is not None else None
@@ -100,9 +100,9 @@ class TaskReader:
             message = f"{other} ({suffix}) are not supported yet" if other else "a task's source is a .BLK file"
             self.findings.add("AMX6304", f"{quoted(text)}: {message}", span)
             return None
-        assert self.folder is not None
-        path = self.folder / text
-        if not self.allow_outside and not _stays_inside(text, path, self.folder):
+        assert self.rack_file is not None
+        path = self.rack_file.parent / text
+        if not self.allow_outside and not _stays_inside(text, path, self.rack_file):
             message = f"{quoted(text)} lies outside the rack file's folder"
             hint = "put the source beside the rack file, or allow it with --allow-outside"
             self.findings.add("AMX6305", message, span, hint)
@@ -120,10 +120,12 @@ class TaskReader:
         return True
 
 
-def _stays_inside(text: str, path: Path, folder: Path) -> bool:
+def _stays_inside(text: str, path: Path, rack_file: Path) -> bool:
     windows = PureWindowsPath(text)
     absolute = PurePosixPath(text).is_absolute() or bool(windows.drive or windows.root)
-    return not absolute and ".." not in windows.parts and is_inside(path, folder)
+    if absolute or ".." in windows.parts:
+        return False
+    return is_inside(path, rack_file.parent) or lies_next_to(path, rack_file)
 
 
 def _is_file_name(node: Node) -> TypeGuard[Scalar]:

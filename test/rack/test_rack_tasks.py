@@ -82,6 +82,21 @@ def test_symbolic_link_inside_the_folder_is_fine(tmp_path):
     assert good(tmp_path, rack("LINE: {file: sub/ONE.BLK, priority: 4}")).processors[0].tasks[0].name == "LINE"
 
 
+def test_tasks_next_to_the_file_that_the_rack_file_links_to_are_fine(tmp_path):
+    """As `colcon build --symlink-install` installs a rack: each file by itself is a link to its source."""
+    source, installed, elsewhere = tmp_path / "source", tmp_path / "installed", tmp_path / "elsewhere"
+    for folder in (source, installed, elsewhere):
+        folder.mkdir()
+    write(source, rack("LINE: {priority: 4}"))
+    for file in source.iterdir():
+        (installed / file.name).symlink_to(file)
+    assert [task.name for task in load(installed / "rack.yaml").config.processors[0].tasks] == ["LINE"]
+    (elsewhere / "LINE.BLK").write_text("10 END\n")
+    (installed / "LINE.BLK").unlink()
+    (installed / "LINE.BLK").symlink_to(elsewhere / "LINE.BLK")
+    assert [item.code for item in load(installed / "rack.yaml").diagnostics] == ["AMX6305"]
+
+
 def test_rack_file_may_be_named_relative_to_the_working_folder(tmp_path, monkeypatch):
     write(tmp_path, rack("LINE: {priority: 4}"))
     monkeypatch.chdir(tmp_path)
