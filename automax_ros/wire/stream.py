@@ -18,10 +18,9 @@ from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import Write
 from automax_ros.wire.cdr import encoder
-from automax_ros.wire.messages import NAMES
+from automax_ros.wire.messages import NAMES, CommonWrite, Scan
 from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
 from automax_ros.wire.rack_messages import Message, RackMessages, message_maker, value_type_name
-from automax_ros.wire.scan_encoding import scan_encoder, write_encoder
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
 """Time between two images of memory, with full latches and the tasks' states, in the stream, ns (decision: replay may
@@ -92,7 +91,7 @@ class RackStream:
             task: _TaskStream(self.scans_topics[task.slot], self.states_topics[task.slot]) for task in rack.tasks
         }
         self._encoders = {name: encoder(name) for name in NAMES.values() if name.startswith("automax_msgs/")}
-        self._encode_scan, self._encode_write = scan_encoder(), write_encoder()
+        self._encode_scan, self._encode_write = encoder(NAMES[Scan]), encoder(NAMES[CommonWrite])
         self._next_image_ns = SNAPSHOT_PERIOD_NS
         self._begun = False
 

@@ -1,4 +1,4 @@
-"""Three sequences decoded at once: the same as one by one, wherever they start, and no other errors."""
+"""Sequences of equal length read at once: the same as one by one, wherever they start, and no other errors."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.wire.cdr import HEADER, CdrError, _sequence_decoder, decoder, encode
+from automax_ros.wire.cdr import HEADER, CdrError, decoder, encode
+from automax_ros.wire.cdr_parts import MOST_TOGETHER, read_numbers, together
 from automax_ros.wire.messages import Scan, Values
-from automax_ros.wire.triples import triple_decoder
 
-GENERAL = [_sequence_decoder("H", 2), _sequence_decoder("I", 4), _sequence_decoder("d", 8)]
 ENTRIES = st.tuples(st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1), st.floats(allow_nan=False))
 
 
 def one_by_one(data: bytes, position: int) -> tuple[int, list[object]]:
     fields: list[object] = []
-    for step in GENERAL:
-        position = step(data, position, fields)
+    for code, size in (("H", 2), ("I", 4), ("d", 8)):
+        values, position = read_numbers(data, position, code, size)
+        fields.append(values)
     return position, fields
 
 
@@ -28,9 +28,13 @@ def test_equal_lengths_decode_as_one_by_one(entries, offset):
     data = encode(Values(*(tuple(column) for column in zip(*entries, strict=True)))) if entries else encode(Values())
     shifted = bytes(offset * 8) + data
     start = len(HEADER) + offset * 8
-    fields: list[object] = []
-    position = triple_decoder(["H", "I", "d"], GENERAL)(shifted, start, fields)
-    assert (position, fields) == one_by_one(shifted, start)
+    end, fields = one_by_one(shifted, start)
+    count, numbers, position = together("HId")(shifted, start)
+    if 0 < len(entries) <= MOST_TOGETHER:
+        assert (count, position) == (len(entries), end)
+        assert list(numbers) == [number for values in fields for number in (count, *values)]
+    else:
+        assert (count, numbers, position) == (0, (), start)
     assert decoder("automax_msgs/msg/Values")(data)[:3] == tuple(fields)
 
 
