@@ -131,7 +131,10 @@ def variables_of(bag: Path, table: VariableTable) -> dict[str, Variable]:
     try:
         return checked_table(table)
     except ValueError as error:
-        raise BagError("AMX6813", bag, f"the table of variables is wrong: {error}") from error
+        raise BagError("AMX6813", bag, f"the table of variables is wrong: {error}", _WRONG_TABLE_HINT) from error
+
+
+_WRONG_TABLE_HINT = "no rack has sent it so; what it numbers cannot be told apart"
 
 
 def strings_of(variables: dict[str, Variable]) -> frozenset[int]:

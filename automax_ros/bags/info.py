@@ -13,10 +13,11 @@ from mcap.records import Attachment
 
 from automax_ros.bags.common_log import CommonLog, variables_of
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.opening import size_of
+from automax_ros.bags.mcap_file import TRUNCATED_HINT, McapFile, RawMessage
+from automax_ros.bags.opening import NO_BAG_HINT, size_of
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.series import Progress
+from automax_ros.bags.unpacking import DAMAGED_HINT
 from automax_ros.core.decimal_text import seconds_text
 from automax_ros.wire.cdr import CdrError, decoder
 from automax_ros.wire.definitions import message_types
@@ -190,6 +191,9 @@ def _in_order(path: Path) -> tuple[int, str]:
 
 
 def _with_repair(error: BagError) -> BagError:
+    """Point to the repair what it mends: not what is beyond the limits, nor what has a hint of its own."""
+    if error.code == "AMX6814" or error.hint not in ("", TRUNCATED_HINT, DAMAGED_HINT, NO_BAG_HINT):
+        return error
     return BagError(error.code, error.place, error.message, REPAIR_HINT)
 
 

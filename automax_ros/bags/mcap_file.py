@@ -27,7 +27,7 @@ from automax_ros.bags.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Unpacker
 
 _FIRST_PRIVATE_OPCODE = 0x80
 """From here on opcodes belong to others; readers pass over what they do not know."""
-_TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
+TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
 
 _Record = TypeVar("_Record")
 
@@ -129,7 +129,7 @@ class McapFile:
         data = file.read(length)
         self._position += len(data)
         if len(data) < length:
-            raise BagError("AMX6812", self.path, f"ends early, at byte {self._position}", _TRUNCATED_HINT)
+            raise BagError("AMX6812", self.path, f"ends early, at byte {self._position}", TRUNCATED_HINT)
         self._crc = zlib.crc32(data, self._crc)
         return data
 

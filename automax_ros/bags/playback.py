@@ -14,8 +14,9 @@ from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.opening import size_of
 from automax_ros.bags.reader import BagReader, FileOrder
 from automax_ros.bags.recorded_qos import recorded_qos
+from automax_ros.bags.schemas import is_known
 from automax_ros.wire.cdr import CdrError, decode, encode
-from automax_ros.wire.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
+from automax_ros.wire.definitions import message_types
 from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.qos import QosProfile
 
@@ -215,19 +216,9 @@ def _new_topic(channel: Channel, schema: Schema | None) -> PlayTopic:
         topic.fault = f"its messages are in {channel.message_encoding[:40]!r}, not in CDR"
     elif schema is None or len(type_name) > _MAX_TOPIC:
         topic.fault = "its type is not told"
-    elif type_name in message_types() and not _is_ours(schema):
+    elif type_name in message_types() and not is_known(schema):
         topic.fault = f"{type_name} was recorded with another definition"
     return topic
-
-
-def _is_ours(schema: Schema) -> bool:
-    """Whether a bag's definition of a type that we know is ours."""
-    if schema.encoding != "ros2msg" or len(schema.data) > MAX_SCHEMA_BYTES:
-        return False
-    try:
-        return same_layout(schema.name, parse_schema(schema.name, schema.data.decode()))
-    except (DefinitionError, UnicodeDecodeError):
-        return False
 
 
 def _take_table(found: Survey, path: Path, record: RawMessage) -> None:

@@ -15,9 +15,9 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE
 from automax_ros.bags.opening import no_recording, opened, size_of
+from automax_ros.bags.schemas import require_known
 from automax_ros.core.diagnostics import printable
 from automax_ros.wire.cdr import CdrError, Message, decoder
-from automax_ros.wire.definitions import MAX_SCHEMA_BYTES, DefinitionError, message_types, parse_schema, same_layout
 
 MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read, in bytes (decision: a bound on memory for untrusted recordings)."""
@@ -177,7 +177,7 @@ class _ChannelReader:
         self._decode: Callable[[bytes], Message] | None = None
         if wanted:
             _check_encoding(file, channel)
-            _check_schema(file, channel.topic, schema)
+            require_known(file, channel.topic, schema)
             self._decode = decoder(self.type_name)
 
     def decoded(self, record: RawMessage) -> Message:
@@ -190,6 +190,7 @@ class _ChannelReader:
                 "AMX6816",
                 self._file,
                 f"the message on {self.topic[:247]} at {record.log_time} ns is malformed: {error}",
+                "`automax bag repair` leaves such messages out",
             ) from error
 
 
@@ -204,31 +205,6 @@ def _check_encoding(file: Path, channel: Channel) -> None:
             "AMX6811",
             file,
             f"the messages of {channel.topic[:247]} are in {channel.message_encoding[:40]!r}, not in CDR",
-        )
-
-
-def _check_schema(file: Path, topic: str, schema: Schema | None) -> None:
-    """Make sure that the messages of a channel are those that our decoder expects."""
-    name = schema.name[:247] if schema else ""
-    if schema is None or name not in message_types():
-        raise BagError("AMX6815", file, f"topic {topic[:247]} has messages of type {name!r}, which is not known here")
-    if schema.encoding != "ros2msg" or len(schema.data) > MAX_SCHEMA_BYTES:
-        raise BagError(
-            "AMX6815",
-            file,
-            f"the definition of {name} is in {schema.encoding[:40]!r} or too long",
-            "record where the package automax_msgs is installed, so that its .msg files are stored",
-        )
-    try:
-        same = same_layout(name, parse_schema(name, schema.data.decode()))
-    except (DefinitionError, UnicodeDecodeError) as error:
-        raise BagError("AMX6813", file, f"the definition of {name} cannot be read: {error}") from error
-    if not same:
-        raise BagError(
-            "AMX6815",
-            file,
-            f"{name} was recorded with another definition",
-            "use the version of automax_ros that made the recording",
         )
 
 

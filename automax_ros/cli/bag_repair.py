@@ -49,7 +49,7 @@ def _text(report: RepairReport) -> str:
     bag = printable(str(report.bag))
     lines = []
     if report.sound:
-        lines.append(f"{bag} is sound: {_contents(report)}")
+        lines.append(f"{bag}: nothing to repair: {_contents(report)}")
     else:
         lines += [line for file in report.files for line in _file_lines(file)]
         lines += [f"{bag}: {printable(text)}" for text in report.problems]
@@ -77,7 +77,7 @@ def _file_lines(file: FileReport) -> list[str]:
     lines.append(
         f"{name}: {file.lost_bytes} of {count_of(file.size, 'byte')} belong to no whole record, "
         f"{count_of(file.lost_chunks, 'chunk')} cut or damaged; "
-        f"{count_of(file.dropped_messages, 'message')} dropped as half-present or without definition, "
+        f"{count_of(file.dropped_messages, 'message')} dropped as half-present, malformed or without definition, "
         f"{file.dropped_scans} of them {'a scan' if file.dropped_scans == 1 else 'scans'}"
     )
     if not file.usable:

@@ -13,6 +13,7 @@ from mcap.reader import make_reader
 from replay.reexecution import Reexecution
 
 from automax_ros.bags.errors import BagError, RecordingError
+from automax_ros.bags.info import bag_info
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.bags.repair.contents import SCAN, WRITE
@@ -21,10 +22,11 @@ from automax_ros.bags.repair.rewriting import Found, kept
 from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import CommonWrite, Int16, Scan, String, Values
-from automax_ros.wire.qos import VALUE
+from automax_ros.wire.messages import NAMES, CommonWrite, Int16, Scan, String, Values
+from automax_ros.wire.qos import LATCHED, VALUE
 
 from .others import assert_mcap_reads, rosbags_messages
+from .recordings import TABLE, image_of, record, write_of
 from .test_bag_split import files, recorded
 
 
@@ -358,3 +360,56 @@ def test_progress_is_told(split: Path, tmp_path: Path) -> None:
     repair(split, tmp_path / "copy", shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+
+
+def malformed(bag: Path) -> Path:
+    """A recording with right checksums in which a scan and a value are cut short."""
+    table, image = ("/line1/variables", TABLE), ("/line1/backplane/snapshot", image_of(0, 0, {(0, 0): 0}))
+    with BagWriter(bag) as writer:
+        for topic, message in (table, image):
+            writer.write(writer.channel(topic, NAMES[type(message)], LATCHED), 0, encode(message))
+        scans = writer.channel("/line1/scans", NAMES[Scan], VALUE)
+        value = writer.channel("/line1/common/REF", NAMES[Int16], VALUE)
+        for number in range(10):
+            stamp = (number + 1) * 5_500_000
+            payload = encode(Scan(stamp, 1, "SPEED", number))
+            writer.write(scans, stamp, payload[:-6] if number == 4 else payload)
+            writer.write(value, stamp, encode(Int16(number))[: 5 if number == 7 else None])
+    return bag
+
+
+def test_repair_and_info_agree_on_malformed_messages(tmp_path: Path) -> None:
+    bag = malformed(tmp_path / "bag")
+    (problem,) = bag_info(bag, check=True).problems
+    assert "bag repair" in problem.hint
+    report = repair(bag)
+    assert not report.sound
+    assert report.files[0].damage[0].startswith("malformed messages: 2, the first on /line1/scans at 27500000 ns")
+    assert (report.files[0].dropped_messages, report.files[0].dropped_scans) == (2, 1)
+    repaired = tmp_path / "bag_repaired"
+    assert len(messages(repaired)) == 2 + 18
+    assert repair(repaired).sound
+    assert bag_info(repaired, check=True).problems == []
+
+
+def test_what_repair_leaves_alone_info_does_not_send_there(tmp_path: Path) -> None:
+    writes = [("/line1/backplane", write_of(number, number, {(0, 0): number})) for number in (1, 2, 5)]
+    bag = record(tmp_path / "bag", [("/line1/variables", TABLE), *writes])
+    (problem,) = bag_info(bag, check=True).problems
+    assert problem.code == "AMX6823"
+    assert "repair" not in problem.hint
+    assert repair(bag).sound
+
+
+def test_a_repaired_bag_of_many_topics_can_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("reader", "repair.repairing"):  # the real limit takes 20,000 topics
+        monkeypatch.setattr(f"automax_ros.bags.{module}.MAX_METADATA_BYTES", 1 << 15)
+    bag = tmp_path / "bag"
+    with BagWriter(bag) as writer:
+        for number in range(150):
+            writer.write(writer.channel(f"/line1/common/NUMBER_{number}", NAMES[Int16], VALUE), 1, encode(Int16(1)))
+    (bag / "metadata.yaml").unlink()
+    report = repair(bag)
+    assert "of 150 topics" in report.problems[-1]
+    assert bag_info(tmp_path / "bag_repaired").problems == []
+    assert len(messages(tmp_path / "bag_repaired")) == 150

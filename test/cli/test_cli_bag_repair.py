@@ -30,7 +30,7 @@ def test_a_sound_recording(automax, bag):
     before = sorted(automax.folder.iterdir())
     result = automax("bag", "repair", "bag")
     assert (result.code, result.err) == (0, "")
-    assert result.out.startswith("bag is sound: ")
+    assert result.out.startswith("bag: nothing to repair: ")
     assert "320 scans" in result.out
     assert "to 3.500000 s of rack time" in result.out
     assert sorted(automax.folder.iterdir()) == before
@@ -52,7 +52,7 @@ def test_what_was_lost_is_told(automax, bag):
     assert "274 scans, to 2.992000 s of rack time" in result.out
     assert result.out.splitlines()[-1] == "repaired: bag_repaired"
     again = automax("bag", "repair", "bag_repaired")
-    assert again.out.startswith("bag_repaired is sound: ")
+    assert again.out.startswith("bag_repaired: nothing to repair: ")
     assert automax("bag", "info", "bag_repaired").code == 0
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +12,8 @@ import yaml
 from mcap.records import Channel, Schema
 
 from automax_ros.bags.metadata import FileSummary, TopicSummary
-from automax_ros.wire.cdr import CdrError, decode
+from automax_ros.bags.schemas import is_known
+from automax_ros.wire.cdr import CdrError, decode, decoder
 
 SCAN, WRITE, TABLE = (f"automax_msgs/msg/{name}" for name in ("Scan", "CommonWrite", "VariableTable"))
 _MAX_QOS_TEXT = 1 << 14
@@ -35,12 +37,27 @@ class FileContents:
     counts: dict[int, int] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
+    _decoders: dict[int, Callable[[bytes], object] | None] = field(default_factory=dict)
 
     def type_of(self, channel: int) -> str:
         """Return the name of a channel's messages, empty if nothing is known of them."""
         known = self.channels.get(channel)
         schema = self.schemas.get(known.schema_id) if known else None
         return schema.name if schema else ""
+
+    def fault(self, channel: int, payload: bytes) -> str:
+        """Return why a message is malformed; empty where it is not, or its type is not known here."""
+        if channel not in self._decoders:
+            known = self.channels.get(channel)
+            schema = self.schemas.get(known.schema_id) if known and known.message_encoding == "cdr" else None
+            self._decoders[channel] = decoder(schema.name) if schema and is_known(schema) else None
+        decode_message = self._decoders[channel]
+        try:
+            if decode_message is not None:
+                decode_message(payload)
+        except CdrError as error:
+            return str(error)
+        return ""
 
     def count(self, channel: int, log_time: int, stamp: int, payload: bytes) -> None:
         """Count a message."""
@@ -81,6 +98,7 @@ def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
     return list(found.values())
 
 
+@functools.lru_cache(maxsize=64)
 def _qos(text: str) -> list[dict[str, object]]:
     """Return the profiles that a channel tells in YAML; what is not of their form is left out."""
     profiles: Any = None

@@ -16,9 +16,9 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError, RecordingError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, yaml_text
+from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary, yaml_text
 from automax_ros.bags.opening import NO_BAG_HINT, no_recording
-from automax_ros.bags.reader import BagReader, read_information
+from automax_ros.bags.reader import MAX_METADATA_BYTES, BagReader, read_information
 from automax_ros.bags.repair.contents import FileContents, topics_of
 from automax_ros.bags.repair.provenance import Provenance
 from automax_ros.bags.repair.rewriting import Definitions, Rewriting
@@ -187,14 +187,22 @@ def _examined(path: Path, provenance: Provenance) -> FileReport:
     """Read a file to its end; a damaged one is looked at again piece by piece."""
     file = McapFile(path)
     contents = FileContents(path.name, channels=file.channels, schemas=file.schemas)
+    malformed = 0
+    first = ""
     try:
         for record in file.records():
             if isinstance(record, RawMessage):
                 contents.count(record.channel.id, record.log_time, record.publish_time, record.data)
+                if fault := contents.fault(record.channel.id, record.data):
+                    malformed += 1
+                    first = first or f"on {record.channel.topic[:247]} at {record.log_time} ns: {fault}"
             else:
                 provenance.take(record)
     except BagError as error:
         return FileReport(path.name, _size(path), False, FileContents(path.name), [_told(error)])
+    if malformed:
+        text = f"malformed messages: {malformed}, the first {first}"
+        return FileReport(path.name, _size(path), False, FileContents(path.name), [text])
     return FileReport(path.name, _size(path), True, contents)
 
 
@@ -323,9 +331,19 @@ def _write_metadata(target: Path, kept: list[FileReport], report: RepairReport, 
     custom = provenance.custom_data(next((item.rack for item in contents if item.rack), ""))
     if not report.sound:
         custom["repaired"] = "automax bag repair"
-    metadata = BagMetadata([item.summary() for item in contents], topics_of(contents), custom)
-    text = yaml_text({"rosbag2_bagfile_information": metadata.information()})
+    files, topics = [item.summary() for item in contents], topics_of(contents)
+    text = _metadata_text(files, topics, custom)
+    listed = len(topics)
+    while len(text.encode()) > MAX_METADATA_BYTES and listed:
+        listed = listed * MAX_METADATA_BYTES // (2 * len(text.encode()))
+        text = _metadata_text(files, topics[:listed], custom)
+    if listed < len(topics):
+        report.problems.append(f"{METADATA_FILE} lists {listed} of {len(topics)} topics: more of it nobody would read")
     (target / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
+
+
+def _metadata_text(files: list[FileSummary], topics: list[TopicSummary], custom: dict[str, str]) -> str:
+    return yaml_text({"rosbag2_bagfile_information": BagMetadata(files, topics, custom).information()})
 
 
 def _refused(target: Path, error: OSError) -> RecordingError:

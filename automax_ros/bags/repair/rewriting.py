@@ -164,7 +164,7 @@ class Rewriting:
                 index.setdefault(message.channel, []).extend((message.log_time, start - RECORD_HEAD.size))
         keep = kept(found, self.contents.type_of, cut=piece.cut) if last or piece.cut else len(found)
         self._drop(found[keep:])
-        whole = keep == len(found) and end == len(piece.data) and all(map(self._definitions.usable, index))
+        whole = keep == len(found) and end == len(piece.data) and all(map(self._is_usable, found))
         if piece.packed is None or not whole:
             self._end_loose()
             self._add(found[:keep], self._loose)
@@ -179,12 +179,15 @@ class Rewriting:
             self._count(found)
 
     def _add(self, messages: Sequence[Found], chunk: ChunkBuilder) -> None:
-        known = [message for message in messages if self._definitions.usable(message.channel)]
-        self._drop([message for message in messages if not self._definitions.usable(message.channel)])
+        known = [message for message in messages if self._is_usable(message)]
+        self._drop([message for message in messages if not self._is_usable(message)])
         self._define({message.channel for message in known})
         for message in known:
             chunk.add_message(message.channel, message.sequence, message.log_time, message.stamp, message.payload)
         self._count(known)
+
+    def _is_usable(self, message: Found) -> bool:
+        return self._definitions.usable(message.channel) and not self.contents.fault(message.channel, message.payload)
 
     def _define(self, channels: Iterable[int], inner: frozenset[tuple[type, int]] = frozenset()) -> None:
         """Write the definitions of channels that no record has told of yet; ``inner`` stand in the chunk itself."""
