@@ -10,7 +10,6 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Processor
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText, render_all
-from automax_ros.core.types import DataType
 from automax_ros.language.checks.checker import check
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.running.memory import CommonMemory
@@ -50,8 +49,3 @@ def _run_ns(action: Callable[[int], object], count: int) -> float:
     taken = time.perf_counter_ns() - began
     gc.enable()
     return taken / count
-
-
-def zero_text(kind: DataType) -> str:
-    """Return a literal of a type."""
-    return {DataType.BOOLEAN: "FALSE", DataType.REAL: "1.0"}.get(kind, "0")

@@ -20,7 +20,6 @@ from message_code import Interfaces, generate
 from message_libraries import BuildError, build_libraries, check_tools
 
 NAME = "automax_msgs"
-KINDS = {".py", ".so", ".msg", ".idl", ".json", ".xml"}  # files that matter at run time
 TOOLS = Path(__file__).resolve().parent
 SOURCE = TOOLS.parent / "msg_defs"
 PREFIX = Path(sys.prefix)

@@ -8,7 +8,6 @@ from functools import cached_property
 
 from automax_ros.core.problems import PROBLEMS, Severity
 
-TAB_STOP = 8
 LONGEST_EXCERPT = 240
 """Most characters of a source line that are shown: a line of a megabyte must not be printed with every finding."""
 

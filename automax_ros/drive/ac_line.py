@@ -1,7 +1,7 @@
 """The three-phase line: voltage and frequency that move, rotation, source impedance, missing phases.
 
 In every segment the phase voltages are sinusoids of constant amplitude and frequency, so the circuit's solution is
-closed. A line at rest is one segment. While frequency or voltage moves, segments are short (``segment_ns``, 0.5 ms)
+closed. A line at rest is one segment. While frequency or voltage moves, segments are short (``SEGMENT_NS``)
 and carry its mean over the segment: the angle at the end of each is exact and continuous; within one it is off by at
 most pi rate segment^2 / 4 (6e-6 rad at 28 Hz/s), and a voltage that settles with tau by segment / (2 tau) of its
 remaining way.
@@ -19,8 +19,8 @@ from automax_ros.drive.errors import LARGEST, ParameterError, require
 from automax_ros.drive.scr import PHASES
 from automax_ros.drive.state import State, Stateful, check_names
 
-NEVER_NS = 1 << 62
-"""An instant that does not come."""
+SEGMENT_NS = 500_000
+"""Longest segment while the line moves, ns."""
 REBASE_NS = 1_000_000_000
 """The angle is counted from an instant at most this long ago, so that days pass without loss of digits."""
 LOWEST_HZ, HIGHEST_HZ = 48.0, 62.0
@@ -99,7 +99,6 @@ class AcLine(Stateful):
         rotation: Rotation = Rotation.ABC,
         missing: Iterable[int] = (),
         angle_rad: float = 0.0,
-        segment_ns: int = 500_000,
     ) -> None:
         """Begin at 0 ns.
 
@@ -111,7 +110,6 @@ class AcLine(Stateful):
             rotation: the order of the phases.
             missing: phases (0, 1, 2) that are not there from the start.
             angle_rad: the angle at 0 ns, rad: phase A's maximum is where the angle is 0.
-            segment_ns: length of a segment while the line moves, ns.
 
         Raises:
             ParameterError: a value outside its range.
@@ -124,7 +122,6 @@ class AcLine(Stateful):
         self._frequency = _Course(_frequency(frequency_hz), frequency_hz)
         self._voltage = _Course(_voltage(v_ll_v), v_ll_v)
         self.missing = {_phase(phase) for phase in missing}
-        self._segment_ns = segment_ns
         self._pending: list[tuple[int, int, str, float, float, float]] = []
         self._serial = 0
         self.start_ns = 0
@@ -227,7 +224,7 @@ class AcLine(Stateful):
         length_ns = REBASE_NS
         if moving:
             longest_s = min(course.longest_s() for course in moving)
-            length_ns = min(self._segment_ns, max(1, ceil(longest_s * 1e9)))
+            length_ns = min(SEGMENT_NS, max(1, ceil(longest_s * 1e9)))
         end_ns = self.start_ns + length_ns
         if self._pending:
             end_ns = min(end_ns, self._pending[0][0])

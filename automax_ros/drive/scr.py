@@ -16,7 +16,6 @@ from functools import lru_cache
 from automax_ros.drive.errors import GateError
 
 PHASES = "ABC"
-RAILS = "PM"
 P, M = 0, 1
 
 FORWARD = (1, 2, 3, 4, 5, 6)

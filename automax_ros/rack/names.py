@@ -17,7 +17,6 @@ from automax_ros.core.types import (
     type_of_name,
 )
 
-RACK_NAME_LIMIT = 8
 PREDEFINED = ("AUTORUNSTATUS@", "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in range(5)))
 """Commons that the rack itself writes (2.4.6)."""
 

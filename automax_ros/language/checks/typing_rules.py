@@ -22,7 +22,6 @@ from automax_ros.language.syntax.tree import (
     Variable,
 )
 
-ARITHMETIC = frozenset({"+", "-", "*", "/", "**"})
 RELATIONAL = frozenset({"=", "<>", "<", ">", "<=", ">="})
 LOGICAL = frozenset({"AND", "OR", "XOR"})
 

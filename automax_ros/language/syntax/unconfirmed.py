@@ -17,6 +17,3 @@ UNCONFIRMED_FUNCTIONS: dict[str, str] = {
     name: f"{name}: the name and its arguments" for name, function in FUNCTIONS.items() if function.unconfirmed
 }
 """Functions, with what is not confirmed of them."""
-
-UNCONFIRMED: dict[str, str] = {**UNCONFIRMED_STATEMENTS, **UNCONFIRMED_FUNCTIONS}
-"""All of them."""
