@@ -16,7 +16,7 @@ from automax_ros.blocks.describe import (
     template,
     time_rows,
 )
-from automax_ros.blocks.examples import EXAMPLES, table_of
+from automax_ros.blocks.examples import EXAMPLES, Example, table_of
 from automax_ros.blocks.families import FAMILIES, Family
 from automax_ros.core.problems import PROBLEMS
 
@@ -24,12 +24,12 @@ TARGET = Path(__file__).resolve().parent.parent / "docs" / "blocks"
 INDEX = "README.md"
 
 
-def pages() -> dict[str, str]:
+def pages(families: Sequence[Family] = FAMILIES, examples: Sequence[Example] = EXAMPLES) -> dict[str, str]:
     """Return the text of every page by its file name."""
-    return {INDEX: index(), **{f"{family.name}.md": page(family) for family in FAMILIES}}
+    return {INDEX: index(families), **{f"{family.name}.md": page(family, examples) for family in families}}
 
 
-def index() -> str:
+def index(families: Sequence[Family]) -> str:
     """Return the page that lists all blocks."""
     lines = [
         "# The control blocks",
@@ -38,7 +38,7 @@ def index() -> str:
         "with a name prints the same of one block, `automax blocks --template > TEMPLATE.BLK` writes a CALL of each to",
         "paste. Sections are those of J-3676-5.",
     ]
-    for family in FAMILIES:
+    for family in families:
         lines += ["", f"## [{family.title}]({family.name}.md)", "", family.about, ""]
         links = [f"[{block.name}]({family.name}.md#{block.name.lower()})" for block in family.blocks]
         rows = [[link, block.section, block.function] for link, block in zip(links, family.blocks, strict=True)]
@@ -46,11 +46,11 @@ def index() -> str:
     return "\n".join(lines) + "\n"
 
 
-def page(family: Family) -> str:
+def page(family: Family, examples: Sequence[Example]) -> str:
     """Return the page of a family."""
     lines = [f"# {family.title}", "", family.about]
     for block in family.blocks:
-        lines += ["", *described(block)]
+        lines += ["", *described(block), *example_of(block, examples)]
     return "\n".join(lines) + "\n"
 
 
@@ -78,12 +78,11 @@ def described(block: Block) -> Iterator[str]:
     yield ""
     yield from markdown_table(["Processor", "execution time, microseconds"], [list(row) for row in time_rows(block)])
     yield from ("", "```", *template(block).splitlines(), "```")
-    yield from example_of(block)
 
 
-def example_of(block: Block) -> Iterator[str]:
+def example_of(block: Block, examples: Sequence[Example]) -> Iterator[str]:
     """Yield the lines of a block's example."""
-    for example in EXAMPLES:
+    for example in examples:
         if example.block == block.name:
             fixed = ", ".join(f"{name}={text_of(value)}" for name, value in example.fixed.items())
             about = " ".join(part for part in (example.about, f"With {fixed}." if fixed else "") if part)

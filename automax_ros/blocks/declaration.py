@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from math import floor
 from typing import Any, Protocol
 
-from automax_ros.blocks.transfer import Transfer
+from automax_ros.blocks.dynamics import Dynamics
 from automax_ros.core.numbers import clamp16, clamp32, round_count, sign_extended, truncated_quotient
 from automax_ros.core.types import DataType, Value
 
@@ -233,13 +233,15 @@ class Relation:
     """A rule between parameters that are each within their limits.
 
     Where ``holds`` is not met the last values that met it stay in force (36, 44.1). ``first(period_s, values)`` gives
-    what is in force as long as there are none. No parameter of a relation may be 0.
+    what is in force as long as there are none. No parameter of a relation may be 0. ``ratio`` are the bounds of the
+    larger of two parameters to the smaller, where that is the rule.
     """
 
     parameters: tuple[str, ...]
     holds: Callable[[Mapping[str, float]], bool]
     first: Callable[[float, Mapping[str, float]], Mapping[str, float]]
     text: str
+    ratio: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -250,8 +252,8 @@ class Coefficients:
     ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that is not programmed,
     such as WM, is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits is limited and
     logs AMX7004. A literal beyond them is an error of the task, unless ``limits_literals``: then it is limited and
-    logged too. ``transfer(period_s, values)`` is the block's transfer function, None where it is not one of the
-    manual's dynamic blocks. ``executed_every`` names a literal that tells the time between executions in s.
+    logged too. ``dynamics`` is what they make of the block. ``executed_every`` names a literal that tells the time
+    between executions in s.
     """
 
     parameters: tuple[str, ...]
@@ -259,10 +261,15 @@ class Coefficients:
     limits: tuple[Limit, ...]
     defaults: Callable[[float], Mapping[str, float]]
     compute: Callable[[float, Mapping[str, float]], tuple[float, ...]]
+    dynamics: Dynamics
     relation: Relation | None = None
     limits_literals: bool = False
-    transfer: Callable[[float, Mapping[str, float]], Transfer] | None = None
     executed_every: str = ""
+
+    @property
+    def period_name(self) -> str:
+        """What the time between executions is called: T, the scan period, or the parameter that tells it."""
+        return self.executed_every or "T"
 
 
 class Access(enum.Enum):
@@ -313,10 +320,11 @@ Step = Callable[..., tuple[Any, ...]]
 class Block:
     """A control block. ``function`` is its equation in one or a few lines, ``notes`` what a user must know besides.
 
-    ``step`` is None for SCAN_LOOP alone, which the task itself carries out. ``logs`` are the problems whose number
-    the step function returns. ``structure`` tells what the block does with a data structure: the states of the block
-    that makes it are the structure's, and the step functions of those that use it take them too, to read, or to write
-    a buffer in place.
+    ``step`` is None for the block that ``begins_scan`` (SCAN_LOOP) alone: the task itself carries it out. ``logs``
+    are the problems whose number the step function returns. ``structure`` tells what the block does with a data
+    structure: the states of the block that makes it are the structure's, and the step functions of those that use it
+    take them too, to read, or to write a buffer in place. ``expected_on`` are Processors whose every task should call
+    the block, for the reason ``expected_since``.
     """
 
     name: str
@@ -334,6 +342,9 @@ class Block:
     structure: Access | None = None
     runs_on: frozenset[Processor] = EVERYWHERE
     notes: tuple[str, ...] = ()
+    begins_scan: bool = False
+    expected_on: frozenset[Processor] = frozenset()
+    expected_since: str = ""
 
     @property
     def parameters(self) -> tuple[Input | Output, ...]:

@@ -16,6 +16,7 @@ from automax_ros.blocks.coefficients import (
     times_c,
 )
 from automax_ros.blocks.declaration import Block, Coefficients, Form, Input, Limit, Output, Relation, State, Time, Times
+from automax_ros.blocks.dynamics import Dynamics, Integrator, corners_at
 from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
@@ -31,6 +32,7 @@ _LAG_LIMITS = (
 )
 """The limits of LAG and of DIFF_LAG. The high limit of WLG with a defaulted WM is 0.71 C (decision): the .071 C of 41.2
 is a misprint, its own 256.055/TICKS needs 0.71."""
+_IN_FEEDBACK = "the integrator in the feedback path"
 _RANGE_NOTE = "With Kx = WLG / C below 0.125 {what} is limited to +-8191, below 0.25 to +-16383 (section 51)."
 
 
@@ -43,6 +45,10 @@ def lag_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[floa
 def lag_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
     """Return LAG's transfer function."""
     return mapped((1.0,), (1.0 / values["WLG"], 1.0), mapping_constant(values["WM"], period_s), period_s)
+
+
+def _lag_rate(values: Mapping[str, float]) -> float:
+    return values["WLG"]
 
 
 def lag_step(
@@ -77,7 +83,13 @@ LAG = Block(
         limits=_LAG_LIMITS,
         defaults=mapping_default,
         compute=lag_coefficients,
-        transfer=lag_transfer,
+        dynamics=Dynamics(
+            transfer=lag_transfer,
+            laplace="1 / (1 + s/{WLG:.6g})".format_map,
+            equation="y = gain (x + x1) + feedback y1".format_map,
+            corners=corners_at("WLG"),
+            integrator=Integrator("y1", _lag_rate, "WLG / C", what="OUTPUT"),
+        ),
     ),
     times=Times(Time(26.52), Time(118.0), Time(41.0), Time(18.56)),
     notes=(_RANGE_NOTE.format(what="OUTPUT"),),
@@ -131,11 +143,17 @@ DIFF_LAG = Block(
         limits=_LAG_LIMITS,
         defaults=mapping_default,
         compute=lag_coefficients,
-        transfer=diff_lag_transfer,
+        dynamics=Dynamics(
+            transfer=diff_lag_transfer,
+            laplace="(s/{WLG:.6g}) / (1 + s/{WLG:.6g})".format_map,
+            equation="y = x - i,  i = gain (x + x1) + feedback i1".format_map,
+            corners=corners_at("WLG"),
+            integrator=Integrator("integrator", _lag_rate, "WLG / C", what=_IN_FEEDBACK, in_feedback=True),
+        ),
     ),
     times=Times(Time(33.04), Time(154.0), Time(41.50), Time(23.12)),
     notes=(
-        _RANGE_NOTE.format(what="the integrator in the feedback path"),
+        _RANGE_NOTE.format(what=_IN_FEEDBACK),
         "An INPUT beyond that range leaves its excess in OUTPUT: 32767 settles at 32767 - 8191 = 24576.",
     ),
     step=diff_lag_step,
@@ -237,8 +255,14 @@ LEAD_LAG = Block(
             holds=_ratio_holds,
             first=_nearest_ratio,
             text="WLD and WLG must be 2:1 to 20:1 apart, either way",
+            ratio=(LEAST_RATIO, GREATEST_RATIO),
         ),
-        transfer=lead_lag_transfer,
+        dynamics=Dynamics(
+            transfer=lead_lag_transfer,
+            laplace="(1 + s/{WLD:.6g}) / (1 + s/{WLG:.6g})".format_map,
+            equation="y = b0 x + b1 x1 + feedback y1".format_map,
+            corners=corners_at("WLD", "WLG"),
+        ),
     ),
     times=Times(Time(68.60), Time(284.0), Time(39.70), Time(48.04)),
     notes=(

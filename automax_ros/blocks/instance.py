@@ -1,9 +1,10 @@
-"""One block run by its step function as it stands: for tests, documentation, and comparison with compiled code."""
+"""One block run outside a task, by its step function as it stands: whoever needs a block alone runs it here."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from typing import Any
 
 from automax_ros.blocks.channels import MOST_CHANNELS, programmed_channels
 from automax_ros.blocks.coefficients import evaluate_noting, limited
@@ -32,8 +33,9 @@ class Instance:
     """A block with its states.
 
     ``outputs`` and ``state`` are the values of its output variables and hidden states after the last scan, ``error`` is
-    the number of the last problem that the last scan logged, 0 for none. Writing into ``outputs`` stands for a write of
-    the variable by another: a block that holds an output sees it. A table is any sequence of numbers. The name of a
+    the number of the last problem that the last scan logged, 0 for none; ``coefficients`` are those it was run with.
+    ``results`` names what the step function returns: outputs, then states. Writing into ``outputs`` stands for a write
+    of the variable by another: a block that holds an output sees it. A table is any sequence of numbers. The name of a
     data structure is not given: READ and WRITE blocks get the instance of the SHIFT block that makes theirs.
     """
 
@@ -54,6 +56,7 @@ class Instance:
         self.block = block
         self.period_s = period_ns / NS_PER_S
         self._step = block.step
+        self.results = (*(item.variable for item in block.outputs), *(item.name for item in block.states))
         self._wanted = tuple(inspect.signature(block.step).parameters)
         self._inputs = {item.variable: item for item in block.inputs}
         self._channels = int(literals.pop("channels", MOST_CHANNELS)) if block.structure is Access.MAKES else 0
@@ -65,7 +68,7 @@ class Instance:
         self._structure = {} if structure is None else structure.state
         self.error = 0
         self._given: dict[str, float] | None = None
-        self._coefficients: dict[str, float] = {}
+        self.coefficients: dict[str, float] = {}
         self._kept: tuple[float, ...] = ()
         self._limited = 0
 
@@ -80,20 +83,54 @@ class Instance:
         Raises:
             InstanceError: no input of that name, a required one missing, a literal-only one or one given as a literal.
         """
+        self._keep(self._step(*self._arguments(inputs)))
+        return dict(self.outputs)
+
+    def drive(self, name: str, signal: Iterable[Value], **inputs: Given) -> Generator[tuple[Any, ...], None, None]:
+        """Run the block once for each value of one input, the others standing still, and yield the ``results``.
+
+        Far faster than ``scan``; ``outputs``, ``state`` and ``error`` follow at the end.
+
+        Raises:
+            InstanceError: as for ``scan``.
+        """
+        arguments = self._arguments({**inputs, name: 0})
+        place = self._wanted.index(name)
+        held = {*self.state, *(item.variable for item in self.block.outputs if item.holds)}
+        returning = [
+            (self._wanted.index(item), position)
+            for position, item in enumerate(self.results)
+            if item in held and item in self._wanted
+        ]
+        step, result = self._step, None
+        try:
+            for value in signal:
+                arguments[place] = value
+                result = step(*arguments)
+                for argument, position in returning:
+                    arguments[argument] = result[position]
+                yield result
+        finally:
+            if result is not None:
+                self._keep(result)
+
+    def _arguments(self, inputs: Mapping[str, Given]) -> list[object]:
+        """Return what the step function takes in a scan with these inputs, in its order."""
         values = self._values(inputs)
         self.error = self._update_coefficients({**self._literals, **inputs})
-        values.update(self._coefficients)
+        values.update(self.coefficients)
         values.update(self._facts)
         values.update(self._facts_of(inputs))
         values.update(self._structure)
         values.update(self.state)
         values.update((item.variable, self.outputs[item.variable]) for item in self.block.outputs if item.holds)
-        result = self._step(**{name: values[name] for name in self._wanted})
+        return [values[name] for name in self._wanted]
+
+    def _keep(self, result: tuple[Any, ...]) -> None:
         self.outputs.update(zip(self.outputs, result, strict=False))
         self.state.update(zip(self.state, result[len(self.outputs) :], strict=False))
         if self.block.logs and result[-1]:
             self.error = int(result[-1])
-        return dict(self.outputs)
 
     def _initial(self, state: State) -> Value | list[Value]:
         size = 0 if state.size is None else state.size({**self._literals, **self._facts})
@@ -171,7 +208,7 @@ class Instance:
         results, self._kept, moved = evaluate_noting(self.block, self.period_s, given, self._kept)
         newly_out = moved & ~self._limited
         self._given, self._limited = given, moved
-        self._coefficients = dict(zip(declared.names, results, strict=True))
+        self.coefficients = dict(zip(declared.names, results, strict=True))
         return COEFFICIENT_LIMITED if newly_out else 0
 
 

@@ -16,6 +16,7 @@ from automax_ros.blocks.coefficients import (
     times_c,
 )
 from automax_ros.blocks.declaration import Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.dynamics import Dynamics, Integrator, corners_at
 from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
@@ -103,7 +104,13 @@ INTEGRATE = Block(
         ),
         defaults=mapping_default,
         compute=integrate_coefficients,
-        transfer=integrate_transfer,
+        dynamics=Dynamics(
+            transfer=integrate_transfer,
+            laplace="{KI:.6g} / s".format_map,
+            equation="y = gain (x + x1) + y1".format_map,
+            corners=lambda values: [("unity gain, KI", values["KI"])],
+            integrator=Integrator("y1", lambda values: values["KI"], "KI / C"),
+        ),
     ),
     times=Times(Time(39.14), Time(193.0), Time(58.60), Time(27.40)),
     notes=(
@@ -217,7 +224,13 @@ PROP_INT = Block(
         ),
         defaults=mapping_default,
         compute=prop_int_coefficients,
-        transfer=prop_int_transfer,
+        dynamics=Dynamics(
+            transfer=prop_int_transfer,
+            laplace="{KP:.6g} (s + {WLD:.6g}) / s".format_map,
+            equation="y = i + proportional x,  i = integral (x + x1) + i1".format_map,
+            corners=corners_at("WLD"),
+            integrator=Integrator("integrator", lambda values: values["KP"] * values["WLD"], "KP x WLD / C"),
+        ),
     ),
     times=Times(Time(40.32), Time(193.0), Time(70.85), Time(28.24)),
     notes=(

@@ -28,6 +28,7 @@ from automax_ros.blocks.declaration import (
     Time,
     Times,
 )
+from automax_ros.blocks.dynamics import Dynamics
 from automax_ros.blocks.transfer import Polynomial, Transfer, bilinear, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
@@ -40,6 +41,19 @@ def notch_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
     """Return NOTCH's transfer function, mapped at its own WN (decision: it has no WM)."""
     wn, q = values["WN"], values["Q_FACTOR"]
     return mapped((1.0, 0.0, wn * wn), (1.0, wn / q, wn * wn), mapping_constant(wn, period_s), period_s)
+
+
+def notch_laplace(values: Mapping[str, float]) -> str:
+    """Return the Laplace function of a notch of second order with its numbers."""
+    wn, q = values["WN"], values["Q_FACTOR"]
+    return f"(s**2 + {wn:.6g}**2) / (s**2 + {wn / q:.6g} s + {wn:.6g}**2)"
+
+
+def notch_corners(values: Mapping[str, float], narrowing: float = 1.0) -> list[tuple[str, float]]:
+    """Return WN and where a notch takes 3 dB, WN (sqrt(1 + u**2) -+ u) with u = 1 / (2 Q narrowing), in rad/s."""
+    wn, u = values["WN"], 0.5 / values["Q_FACTOR"] / narrowing
+    middle = math.sqrt(1.0 + u * u)
+    return [("-3 dB below WN", wn * (middle - u)), ("WN", wn), ("-3 dB above WN", wn * (middle + u))]
 
 
 def notch_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float, float]:
@@ -107,7 +121,14 @@ NOTCH = Block(
         limits=(_Q_LIMIT, Limit("WN", constant(0.01), per_period(2.0 * math.pi / 10.0), "0.01", "2 pi / (10 T)")),
         defaults=no_defaults,
         compute=notch_coefficients,
-        transfer=notch_transfer,
+        dynamics=Dynamics(
+            transfer=notch_transfer,
+            laplace=notch_laplace,
+            equation="y = x + e,  e = band (x - x2) + d1 e1 + d2 e2".format_map,
+            corners=notch_corners,
+            time_constants=False,
+            exact_at="WN",
+        ),
     ),
     times=Times(Time(85.16), Time(393.0), None, Time(59.60)),
     runs_on=NOT_ON_UDC,
@@ -135,6 +156,20 @@ def _squared(polynomial: Polynomial) -> Polynomial:
         2.0 * second * third,
         third * third,
     )
+
+
+def _notchn_laplace(values: Mapping[str, float]) -> str:
+    text = notch_laplace(values)
+    return f"({text})**2" if values["ORDER"] == 4.0 else text
+
+
+def _notchn_equation(values: Mapping[str, float]) -> str:
+    return f"y = gain (x + b1 x1 + x2) + a1 y1 + a2 y2{', twice' if values['ORDER'] == 4.0 else ''}"
+
+
+def _notchn_corners(values: Mapping[str, float]) -> list[tuple[str, float]]:
+    """Return the corners of one or of two equal stages, which take 3 dB together."""
+    return notch_corners(values, math.sqrt(math.sqrt(2.0) - 1.0) if values["ORDER"] == 4.0 else 1.0)
 
 
 def notchn_coefficients(period_s: float, values: Mapping[str, float]) -> tuple[float, float, float, float]:
@@ -241,7 +276,14 @@ NOTCHN = Block(
         ),
         defaults=order_default(2),
         compute=notchn_coefficients,
-        transfer=notchn_transfer,
+        dynamics=Dynamics(
+            transfer=notchn_transfer,
+            laplace=_notchn_laplace,
+            equation=_notchn_equation,
+            corners=_notchn_corners,
+            time_constants=False,
+            exact_at="WN",
+        ),
     ),
     times=Times(None, None, Time(64.25, o=20.0), None),
     runs_on=UDC_ONLY,

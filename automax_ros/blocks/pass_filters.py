@@ -8,6 +8,7 @@ from math import floor
 
 from automax_ros.blocks.coefficients import LARGEST_HISTORY, by_order, mapping_constant, order_default, per_period
 from automax_ros.blocks.declaration import UDC_ONLY, Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.dynamics import Dynamics, corners_at
 from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType
@@ -135,6 +136,30 @@ def _limit(frequency: str) -> Limit:
     )
 
 
+def _dynamics(frequency: str, transfer: Callable[[float, Mapping[str, float]], Transfer], numerator: str) -> Dynamics:
+    """Return the dynamics of a filter whose Laplace function has a power of ``numerator`` above."""
+
+    def laplace(values: Mapping[str, float]) -> str:
+        order = int(values["ORDER"])
+        power = "" if order == 1 else f"**{order}"
+        w = values[frequency]
+        below = {
+            1: f"s + {w:.6g}",
+            2: f"s**2 + {math.sqrt(2.0) * w:.6g} s + {w:.6g}**2",
+            3: f"s**3 + {2.0 * w:.6g} s**2 + {2.0 * w * w:.6g} s + {w:.6g}**3",
+        }
+        return f"{numerator.format(w=w)}{power} / ({below[order]})"
+
+    return Dynamics(
+        transfer=transfer, laplace=laplace, equation=_equation, corners=corners_at(frequency), exact_at=frequency
+    )
+
+
+def _equation(values: Mapping[str, float]) -> str:
+    places = range(1, int(values["ORDER"]) + 1)
+    return "y = gain (x" + "".join(f" + b{n} x{n}" for n in places) + ")" + "".join(f" + a{n} y{n}" for n in places)
+
+
 _NAMES = ("gain", "b1", "b2", "b3", "a1", "a2", "a3")
 _STATES = (
     *(State(f"x{number}", DataType.INTEGER, 0) for number in (1, 2, 3)),
@@ -158,7 +183,7 @@ HIGH_PASS_FILTER = Block(
         limits=(_limit("WLD"),),
         defaults=order_default(1),
         compute=_coefficients(high_pass_transfer, -1.0),
-        transfer=high_pass_transfer,
+        dynamics=_dynamics("WLD", high_pass_transfer, "s"),
     ),
     times=Times(None, None, Time(39.25, o=4.0), None),
     runs_on=UDC_ONLY,
@@ -183,7 +208,7 @@ LOW_PASS_FILTER = Block(
         limits=(_limit("WLG"),),
         defaults=order_default(1),
         compute=_coefficients(low_pass_transfer, 1.0),
-        transfer=low_pass_transfer,
+        dynamics=_dynamics("WLG", low_pass_transfer, "{w:.6g}"),
     ),
     times=Times(None, None, Time(39.25, o=4.0), None),
     runs_on=UDC_ONLY,

@@ -18,9 +18,10 @@ from automax_ros.blocks.declaration import (
     Time,
     Times,
 )
+from automax_ros.blocks.dynamics import Dynamics, Integrator
 from automax_ros.blocks.transfer import Transfer
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, REAL_LIMIT
-from automax_ros.core.types import DataType
+from automax_ros.core.types import DataType, Value
 
 
 def _gains(values: Mapping[str, float]) -> tuple[float, float, float]:
@@ -47,6 +48,47 @@ def pid_transfer(_period_s: float, values: Mapping[str, float]) -> Transfer:
         period_s=values["LOOP_TIME"],
         mapping=None,
     )
+
+
+def _laplace(values: Mapping[str, float]) -> str:
+    proportional = f"{values['KP']:.6g}"
+    terms = [f"{values[name]:.6g}{power}" for name, power in (("KI", "/s"), ("KD", " s")) if values[name]]
+    if values["ISA"]:
+        return f"{proportional} ({' + '.join(['1', *terms])})" if terms else proportional
+    return " + ".join([proportional, *terms] if values["KP"] else terms) or "0"
+
+
+def _corners(values: Mapping[str, float]) -> list[tuple[str, float]]:
+    """Return where the P term takes over from the I term, and the D term from it, as far as the gains are not 0."""
+    proportional, integral, derivative = _gains(values)
+    corners = []
+    if integral > 0.0 and proportional > 0.0:
+        corners.append(("KI" if values["ISA"] else "KI/KP", integral / proportional))
+    elif integral > 0.0:
+        corners.append(("unity gain, KI", integral))
+    if derivative > 0.0 and proportional > 0.0:
+        corners.append(("1/KD" if values["ISA"] else "KP/KD", proportional / derivative))
+    return corners
+
+
+def _carrier(inputs: Mapping[str, Value]) -> tuple[str, int]:
+    """Return what carries ERROR: INPUT, but FEEDBACK where the D term takes that, as this is the same for all terms."""
+    if inputs["DERIVATIVE"]:
+        return "FEEDBACK", 1 if inputs["ACTION"] else -1
+    return "INPUT", -1 if inputs["ACTION"] else 1
+
+
+def _remarks(inputs: Mapping[str, Value]) -> list[str]:
+    found = ["from ERROR to OUTPUT: INPUT moves, FEEDBACK is 0"]
+    if inputs.get("DERIVATIVE") is True:
+        found = [
+            "from ERROR to OUTPUT; DERIVATIVE is TRUE, so the D term sees only FEEDBACK: FEEDBACK moves, INPUT is 0"
+        ]
+    if inputs.get("ACTION") is True:
+        found.append("ACTION is TRUE: ERROR is FEEDBACK - INPUT, so INPUT acts with the sign turned")
+    if inputs.get("DEAD_BAND"):
+        found.append(f"an |ERROR| below DEAD_BAND = {inputs['DEAD_BAND']} leaves the integrator: not linear")
+    return found
 
 
 def pid_step(
@@ -212,7 +254,18 @@ PID = Block(
         ),
         defaults=lambda _period_s: {"ISA": 0.0, "KD": 0.0},
         compute=pid_coefficients,
-        transfer=pid_transfer,
+        dynamics=Dynamics(
+            transfer=pid_transfer,
+            laplace=_laplace,
+            equation="y = i + p_gain e + d_gain (d - d1),  i = i_gain (e + e1) + i1".format_map,
+            corners=_corners,
+            steps="trapezoids for the I term, differences for D",
+            integrator=Integrator("integrator"),
+            signals=("INPUT", "FEEDBACK"),
+            carrier=_carrier,
+            stopped_by=(("MANUAL", "OUTPUT is INITIAL_VALUE + FEED_FORWARD"),),
+            remarks=_remarks,
+        ),
         executed_every="LOOP_TIME",
     ),
     times=Times(Time(124.0), Time(515.0), None, Time(86.80)),

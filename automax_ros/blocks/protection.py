@@ -20,6 +20,8 @@ from automax_ros.blocks.declaration import (
     Time,
     Times,
 )
+from automax_ros.blocks.dynamics import Dynamics
+from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.types import DataType
 
@@ -99,14 +101,28 @@ TACHLOSS_OVERSPEED = Block(
 )
 
 
+def thermal_lag(values: Mapping[str, float]) -> float:
+    """Return the frequency wlg of the filter in rad/s (36.1)."""
+    bar, threshold = values["LIM_BAR"], values["THRESHOLD"]
+    return math.log((bar**2 - 100.0**2) / (bar**2 - threshold**2)) / values["TRIP_TIME"]
+
+
+def thermal_transfer(period_s: float, values: Mapping[str, float]) -> Transfer:
+    """Return the transfer function from the scaled square of the current to CALC_RISE; it maps with C = 2/T."""
+    return mapped((1.0,), (1.0 / thermal_lag(values), 1.0), 2.0 / period_s, period_s)
+
+
+def _laplace(values: Mapping[str, float]) -> str:
+    return f"1 / (1 + s/{thermal_lag(values):.6g}) of I_FDBK**2, in counts of CALC_RISE"
+
+
 def thermal_coefficients(_period_s: float, values: Mapping[str, float]) -> tuple[float, float, float, float]:
     """Return scale of the squared current, gain of the inputs and of the last rise, and the rise that trips (36.1).
 
     The filter maps with C = 2/T, plain bilinear, so that TRIP_TIME holds (decision).
     """
     bar, threshold = values["LIM_BAR"], values["THRESHOLD"]
-    lag = math.log((bar**2 - 100.0**2) / (bar**2 - threshold**2)) / values["TRIP_TIME"]
-    kx = lag * _period_s / 2.0
+    kx = thermal_lag(values) * _period_s / 2.0
     scale = 1.0 / ((FULL_SCALE / bar) ** 2 * 10.0)
     return scale, kx / (1.0 + kx), (1.0 - kx) / (1.0 + kx), threshold**2 / 10.0
 
@@ -188,6 +204,16 @@ THERMAL_OVERLOAD = Block(
             first=lambda _period_s, _values: {"LIM_BAR": LIM_BAR, "THRESHOLD": THRESHOLD},
             text="LIM_BAR must be above THRESHOLD",
         ),
+        dynamics=Dynamics(
+            transfer=thermal_transfer,
+            laplace=_laplace,
+            equation="y = gain (x + x1) + feedback y1,  x = scale I_FDBK**2; OVERLOAD above trip".format_map,
+            corners=lambda values: [("wlg", thermal_lag(values))],
+            exact_at="",
+            signals=("I_FDBK",),
+            output="OVERLOAD",
+            not_measured="it squares its input and has no frequency response",
+        ),
         limits_literals=True,
     ),
     times=Times(None, None, Time(46.10), None),
@@ -199,5 +225,7 @@ THERMAL_OVERLOAD = Block(
         "OVERLOAD ends when the rise is back at 1000, its value at 100 % of current.",
         "Every UDC task needs this block unless hardware protects the motor.",
     ),
+    expected_on=UDC_ONLY,
+    expected_since="it protects the motor, unless a hardware device does (36)",
     step=thermal_overload_step,
 )

@@ -43,6 +43,7 @@ SCAN_LOOP = Block(
         "Statements before it run once, when the task is put into RUN.",
     ),
     step=None,
+    begins_scan=True,
 )
 
 END_TIMES = Times(
@@ -54,4 +55,4 @@ END_TIMES = Times(
 """Execution times of the END statement: commit of the latched variables (tables 4 to 6)."""
 
 REMARK_TIMES = Times(Time(9.88), Time(40.0), Time(2.37), Time(6.92))
-"""Execution times of each ``!`` remark behind SCAN_LOOP; REM takes none (53, tables 4 to 6)."""
+"""Execution times of each ``!`` remark after SCAN_LOOP; REM takes none (53, tables 4 to 6)."""

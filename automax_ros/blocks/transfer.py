@@ -26,6 +26,11 @@ class Transfer:
     period_s: float
     mapping: float | None
 
+    @property
+    def integrates(self) -> bool:
+        """Whether it has a pole at s = 0: a constant signal goes on moving the output."""
+        return self.denominator[-1] == 0.0
+
     def laplace_response(self, rad_s: float) -> complex:
         """Return the Laplace function's value at an angular frequency; not at a pole."""
         s = complex(0.0, rad_s)

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from automax_ros.blocks.declaration import Block
+from automax_ros.blocks.dynamics import Dynamics
 from automax_ros.cli.csv_table import cell_value
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.decimal_text import real_text
@@ -33,10 +34,6 @@ from automax_ros.language.syntax.walk import bodies, statements_in_order
 from automax_ros.rack.findings import did_you_mean, quoted
 from automax_ros.running.views import MemoryValueError, ViewSpec, fitting
 
-SIGNALS = ("INPUT", "FEEDBACK")
-"""The inputs that carry the signal through a block."""
-HOLDING = {"RESET": "OUTPUT stays where it is", "MANUAL": "OUTPUT is INITIAL_VALUE + FEED_FORWARD"}
-"""The inputs that, while TRUE, let nothing through, and what OUTPUT does then."""
 _LABEL = re.compile(r"0*([0-9]{1,6})(?:\.0*([1-9][0-9]{0,2}))?")
 _LEADING_ZEROS = re.compile(r"(?<=[(,])0+(?=[0-9])")
 
@@ -88,6 +85,12 @@ class DynamicCall:
     def block(self) -> Block:
         """The block."""
         return self.bound.block
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """What the block is as a function of frequency."""
+        assert self.block.coefficients is not None
+        return self.block.coefficients.dynamics
 
     @property
     def title(self) -> str:
@@ -156,7 +159,7 @@ def require_running(call: DynamicCall) -> None:
     Raises:
         UsageError: RESET or MANUAL is TRUE.
     """
-    for name, what in HOLDING.items():
+    for name, what in call.dynamics.stopped_by:
         given = call.parameters.get(name)
         if given is not None and given.value is True:
             raise UsageError(f"{call.title}: {name} is TRUE, {what}")
@@ -169,9 +172,9 @@ def _refuse(name: str, calls: Sequence[DynamicCall]) -> None:
             if not item.variable or _plain(item.variable) != name:
                 continue
             where = f"{item.keyword} of {call.label} {call.block.name}"
-            if item.keyword in SIGNALS:
+            if item.keyword in call.dynamics.signals:
                 raise UsageError(f"--set {name}: it carries the signal, {where}", _free_text(_free([call])))
-            if item.keyword in HOLDING:
+            if item.keyword in dict(call.dynamics.stopped_by):
                 require_running(call)
             raise UsageError(f"--set {name}: it is {where}, no coefficient", _free_text(_free(calls)))
 
@@ -185,7 +188,7 @@ def _free_text(free: Collection[str]) -> str | None:
 
 
 def _settable(call: DynamicCall, *, driven: bool) -> list[Parameter]:
-    names = call.coefficients if not driven else [name for name in call.parameters if name not in SIGNALS]
+    names = call.coefficients if not driven else [name for name in call.parameters if name not in call.dynamics.signals]
     return [call.parameters[name] for name in names]
 
 
@@ -261,8 +264,9 @@ def _listed(bound: Mapping[str, tuple[BoundCall, str]]) -> str:
 
 
 def _output(bound: BoundCall) -> str:
-    """Return the text of the variable that gets the block's OUTPUT; THERMAL_OVERLOAD's is OVERLOAD."""
-    wanted = next((item.name for item in bound.block.outputs if item.name == "OUTPUT"), bound.block.outputs[0].name)
+    """Return the text of the variable that gets the block's output."""
+    assert bound.block.coefficients is not None
+    wanted = bound.block.coefficients.dynamics.output
     return print_expression(bound.arguments[wanted]) if wanted in bound.arguments else "-"
 
 

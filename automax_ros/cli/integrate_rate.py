@@ -5,23 +5,31 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from automax_ros.blocks.tuning import (
-    RATE_FACTOR,
-    IntegratorRange,
-    Verdict,
-    range_of,
-    rate_gain,
-    rate_limits,
-    verdict_of,
-)
+from automax_ros.blocks.coefficients import TWO_TO_MINUS_18
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
 from automax_ros.core.ticks import MAX_TICK_NS, MAX_TICKS, MIN_TICK_NS, NS_PER_S
+from automax_ros.tuning.tuning import IntegratorRange, Verdict, range_of, verdict_of
 
+RATE_FACTOR = (math.pi / 20.0) / math.tan(math.pi / 20.0)
+"""KI x / y of section 42.3: 0.99176; the manual prints 0.99179."""
 _DIGITS = 7
 """Digits of the constant to write: a REAL has no more."""
 _SLOWEST, _FASTEST = 1e-9, 1e9
 _SHORTEST_S, _LONGEST_S = MIN_TICK_NS / NS_PER_S, MAX_TICKS * MAX_TICK_NS / NS_PER_S
+
+
+def rate_gain(counts_per_s: float, input_counts: float) -> float:
+    """Return the KI of an INTEGRATE that gains ``counts_per_s`` at a constant INPUT, with WM not programmed (42.3).
+
+    KI = Kx C with Kx = y T / (2 x) and C = (pi / 10 T) / tan(pi / 20): T drops out.
+    """
+    return RATE_FACTOR * counts_per_s / input_counts
+
+
+def rate_limits(period_s: float) -> tuple[float, float]:
+    """Return the limits of INTEGRATE's KI with WM not programmed (42.2): 2**-18 C and 0.9 pi / T."""
+    return TWO_TO_MINUS_18 * 2.0 * RATE_FACTOR / period_s, 0.9 * math.pi / period_s
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.blocks.declaration import Block
-from automax_ros.blocks.tuning import Tuning
 from automax_ros.cli.dynamic_calls import (
-    SIGNALS,
     DynamicCall,
     Source,
     add_call_arguments,
@@ -34,6 +32,7 @@ from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.types import DataType, Value
 from automax_ros.language.program import Program
 from automax_ros.tuning.step_response import MOST_SCANS, default_scans
+from automax_ros.tuning.tuning import Tuning
 
 _PICTURES = (".png", ".svg", ".pdf")
 _POINTS, _POINTS_DRAWN, _MOST_POINTS = 12, 30, 500
@@ -125,7 +124,7 @@ def _driving(call: DynamicCall) -> tuple[dict[str, Value], list[str]]:
     parameters: dict[str, Value] = {}
     assumed: list[str] = []
     for name, given in call.parameters.items():
-        if name in SIGNALS:
+        if name in call.dynamics.signals:
             continue
         value = given.value
         if given.source is Source.UNKNOWN:
@@ -144,11 +143,8 @@ def _default(block: Block, name: str) -> Value:
 
 
 def _require_known(call: DynamicCall, tuning: Tuning) -> None:
-    if call.block.name == "THERMAL_OVERLOAD":
-        raise UsageError(
-            f"{call.title}: it squares its input and has no frequency response",
-            "`automax tune-info` tells its time constant",
-        )
+    if call.dynamics.not_measured:
+        raise UsageError(f"{call.title}: {call.dynamics.not_measured}", "`automax tune-info` tells its time constant")
     if tuning.missing:
         names = [call.parameters[name].variable for name in tuning.missing]
         what = " and ".join(f"{name} = {call.parameters[name].variable}" for name in tuning.missing)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.blocks.transfer import Transfer
-from automax_ros.blocks.tuning import Tuning
 from automax_ros.cli.dynamic_calls import DynamicCall
 from automax_ros.core.types import Value
 from automax_ros.tuning.frequency import (
@@ -21,6 +20,7 @@ from automax_ros.tuning.frequency import (
     phases,
 )
 from automax_ros.tuning.step_response import StepResponse, laplace_step, respond
+from automax_ros.tuning.tuning import Tuning
 
 _SAME = 1e-3
 """Frequencies nearer to each other than this share count as one."""
@@ -116,8 +116,9 @@ def measured_response(
 def marked_frequencies(tuning: Tuning) -> list[tuple[str, float]]:
     """Return names and frequencies of the corners below Nyquist and of a mapping frequency of its own."""
     found = [(corner.name, corner.rad_s) for corner in tuning.corners if corner.discrete is not None]
-    if "WM" in tuning.values:
-        found.append(("WM", tuning.values["WM"]))
+    own = tuning.declared.dynamics.exact_at
+    if own in tuning.values and own not in (corner.name for corner in tuning.corners):
+        found.append((own, tuning.values[own]))
     return sorted(found, key=lambda pair: pair[1])
 
 
@@ -172,21 +173,4 @@ def _remarks(tuning: Tuning, parameters: Mapping[str, Value], assumed: Sequence[
         limited = ", ".join(f"{name} = {tuning.values[name]:.7g}" for name in tuning.moved)
         found.append(f"beyond its limits, so in force is {limited}")
     found += [f"{name} is TRUE" for name in ("HOLD_PLUS", "HOLD_MINUS") if parameters.get(name) is True]
-    if tuning.block.name == "PID":
-        found += _pid_remarks(parameters)
-    return found
-
-
-def _pid_remarks(parameters: Mapping[str, Value]) -> list[str]:
-    found = []
-    if parameters.get("DERIVATIVE") is True:
-        found.append(
-            "from ERROR to OUTPUT; DERIVATIVE is TRUE, so the D term sees only FEEDBACK: FEEDBACK moves, INPUT is 0"
-        )
-    else:
-        found.append("from ERROR to OUTPUT: INPUT moves, FEEDBACK is 0")
-    if parameters.get("ACTION") is True:
-        found.append("ACTION is TRUE: ERROR is FEEDBACK - INPUT, so INPUT acts with the sign turned")
-    if parameters.get("DEAD_BAND"):
-        found.append(f"an |ERROR| below DEAD_BAND = {parameters['DEAD_BAND']} leaves the integrator: not linear")
-    return found
+    return found + tuning.declared.dynamics.remarks(parameters)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.cli.response_data import BlockResponse, Point, followed
-from automax_ros.cli.transfer_text import laplace_text
 from automax_ros.cli.usage import UsageError
 from automax_ros.tuning.frequency import decibels, logarithmic
 
@@ -60,8 +59,7 @@ def figure_of(response: BlockResponse) -> Any:
     _draw_step(time, response)
     _draw_bode(gain, phase, response)
     tuning = response.tuning
-    period = f"{'LOOP_TIME' if tuning.block.name == 'PID' else 'T'} = {tuning.period_s * 1e3:g} ms"
-    title = f"{response.path.name}  {response.call.title}     {laplace_text(tuning)}     {period}"
+    title = f"{response.path.name}  {response.call.title}     {tuning.laplace}     {tuning.period_text}"
     figure.suptitle(title, fontsize=11)
     if response.remarks:
         lines = [line for remark in response.remarks for line in textwrap.wrap(remark, 150)]

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from automax_ros.cli.response_data import BlockResponse, Point
-from automax_ros.cli.transfer_text import fixed, laplace_text, number
 from automax_ros.cli.tune_info_text import frequency_text
 from automax_ros.tuning.driven import STANDING
 from automax_ros.tuning.frequency import Measured, decibels
 from automax_ros.tuning.step_response import SETTLED
+from automax_ros.tuning.transfer_text import fixed, number
 
 COLUMNS = (
     "response", "t_s", "rad_s", "hz", "mark", "amplitude", "measured", "discrete", "laplace",
@@ -35,9 +35,8 @@ def notes(response: BlockResponse) -> str:
 
 def _heading(response: BlockResponse) -> str:
     tuning = response.tuning
-    lines = [f"{response.path} {response.call.title}: {laplace_text(tuning)}"]
-    period = "LOOP_TIME" if tuning.block.name == "PID" else "T"
-    lines.append(f"  {period} = {tuning.period_s * 1e3:g} ms, Nyquist {frequency_text(tuning.nyquist_rad_s)}")
+    lines = [f"{response.path} {response.call.title}: {tuning.laplace}"]
+    lines.append(f"  {tuning.period_text}, Nyquist {frequency_text(tuning.nyquist_rad_s)}")
     lines += [f"  {remark}" for remark in response.remarks]
     return "\n".join(lines) + "\n"
 
@@ -175,7 +174,7 @@ def record(response: BlockResponse) -> dict[str, object]:
         "output": response.call.output,
         "period_s": tuning.period_s,
         "nyquist_rad_s": tuning.nyquist_rad_s,
-        "laplace": laplace_text(tuning),
+        "laplace": tuning.laplace,
         "remarks": list(response.remarks),
         "marks": [{"name": name, "rad_s": rad_s} for name, rad_s in response.marks],
         "step": {

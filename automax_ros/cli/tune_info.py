@@ -17,7 +17,6 @@ import sys
 from pathlib import Path
 
 from automax_ros.blocks.declaration import Processor
-from automax_ros.blocks.tuning import Tuning, tuning
 from automax_ros.cli.dynamic_calls import DynamicCall, add_call_arguments, dynamic_calls
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
 from automax_ros.cli.terminal import print_diagnostics
@@ -25,6 +24,7 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.ticks import MAX_TICKS, NS_PER_S, UDC_MAX_TICKS
 from automax_ros.language.program import Program
+from automax_ros.tuning.tuning import Tuning, tuning
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

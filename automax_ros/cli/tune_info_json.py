@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from automax_ros.blocks.tuning import Corner, LimitNow, Tuning
 from automax_ros.cli.dynamic_calls import DynamicCall, Source
-from automax_ros.cli.transfer_text import laplace_text
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.language.program import Program
 from automax_ros.tuning.frequency import decibels
+from automax_ros.tuning.tuning import Corner, LimitNow, Tuning
 
 Found = Sequence[tuple[DynamicCall, Tuning]]
 
@@ -47,7 +46,7 @@ def block_record(call: DynamicCall, tuning: Tuning) -> dict[str, object]:
         "laplace": None
         if transfer is None
         else {
-            "text": laplace_text(tuning),
+            "text": tuning.laplace,
             "numerator": list(transfer.numerator),
             "denominator": list(transfer.denominator),
         },

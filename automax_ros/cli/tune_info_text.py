@@ -7,12 +7,12 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from automax_ros.blocks.coefficients import default_wm
-from automax_ros.blocks.tuning import Corner, LimitNow, Tuning, Verdict
 from automax_ros.cli.dynamic_calls import DynamicCall, Parameter, Source, value_text
-from automax_ros.cli.transfer_text import digits_for, discrete_text, equation_text, gain_text, laplace_text, number
+from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.language.program import Program
+from automax_ros.tuning.transfer_text import digits_for, discrete_text, gain_text, number
+from automax_ros.tuning.tuning import Corner, LimitNow, Tuning, Verdict
 
 _LABEL = 12
 _WIDTH = 106
@@ -57,8 +57,14 @@ def frequency_text(rad_s: float) -> str:
 
 def _block(call: DynamicCall, tuning: Tuning, program: Program) -> str:
     lines = [f"{call.title}   (section {call.block.section})"]
-    rows = [*_inside(call), *_values(call, tuning), *_functions(tuning, call), *_corners(tuning), *_range(tuning)]
-    rows += [*_limits(call, tuning), *_ratio(tuning), *_loop_time(call, tuning, program)]
+    rows = [
+        *_inside(call, tuning),
+        *_values(call, tuning),
+        *_functions(tuning, call),
+        *_corners(tuning),
+        *_range(tuning),
+    ]
+    rows += [*_limits(call, tuning), *_ratio(tuning), *_period(tuning, program)]
     last = ""
     for label, text in rows:
         lines.append(f"  {(label if label != last else '').ljust(_LABEL)}{text}".rstrip())
@@ -69,9 +75,10 @@ def _block(call: DynamicCall, tuning: Tuning, program: Program) -> str:
 Rows = Iterator[tuple[str, str]]
 
 
-def _inside(call: DynamicCall) -> Rows:
+def _inside(call: DynamicCall, tuning: Tuning) -> Rows:
     if call.inside:
-        every = "every LOOP_TIME" if call.block.name == "PID" else "in every scan"
+        own_period = tuning.declared.executed_every
+        every = f"every {own_period}" if own_period else "in every scan"
         article = "an" if call.inside == "IF" else "a"
         yield "inside", f"! {article} {call.inside}: all holds only where the CALL runs once {every}"
 
@@ -96,20 +103,21 @@ def _functions(tuning: Tuning, call: DynamicCall) -> Rows:
     if transfer is None:
         return
     digits = digits_for(tuning)
-    yield "Laplace", laplace_text(tuning)
+    yield "Laplace", tuning.laplace
     above, below = discrete_text(transfer, digits)
     if len(above) + len(below) > _WIDTH - 8:
         yield "discrete", f"({above})"
         yield "discrete", f"/ ({below})"
     else:
         yield "discrete", above if below == "1" else f"({above}) / ({below})"
-    yield "as run", equation_text(tuning)
+    yield "as run", tuning.equation
     for line in textwrap.wrap(_coefficients(tuning, digits), _WIDTH):
         yield "as run", line.replace(_JOINED, " ")
     if transfer.mapping is not None:
         yield "mapping", f"C = {number(transfer.mapping, 7)}/s, {_exact_at(tuning, call)}"
-    elif call.block.name == "PID":
-        yield "mapping", f"steps of LOOP_TIME = {tuning.period_s:.7g} s: trapezoids for the I term, differences for D"
+    else:
+        period = f"{tuning.declared.period_name} = {tuning.period_s:.7g} s"
+        yield "mapping", f"steps of {period}: {tuning.declared.dynamics.steps}"
 
 
 def _coefficients(tuning: Tuning, digits: int) -> str:
@@ -125,19 +133,19 @@ def _coefficients(tuning: Tuning, digits: int) -> str:
 
 def _exact_at(tuning: Tuning, call: DynamicCall) -> str:
     """Return where the discrete function is the Laplace function itself."""
-    if "WM" in tuning.values:
-        wm = tuning.values["WM"]
-        source = "" if "WM" in call.parameters else ", the default: 1/20 of the scan frequency"
-        assert "WM" in call.parameters or wm == default_wm(tuning.scan_s)
-        return f"exact at WM = {frequency_text(wm)}{source}"
-    own = next((name for name in ("WN", "WLD", "WLG") if name in tuning.values), None)
-    return "2 / T: plain bilinear" if own is None else f"exact at {own} itself"
+    own = tuning.declared.dynamics.exact_at
+    if not own:
+        return "2 / T: plain bilinear"
+    if own in (corner.name for corner in tuning.corners):
+        return f"exact at {own} itself"
+    source = "" if own in call.parameters else ", the default: 1/20 of the scan frequency"
+    return f"exact at {own} = {frequency_text(tuning.values[own])}{source}"
 
 
 def _corners(tuning: Tuning) -> Rows:
     width = max((len(corner.name) for corner in tuning.corners), default=0)
     for corner in tuning.corners:
-        time = "" if "WN" in tuning.values else f", 1/w = {number(corner.time_constant_s, 4)} s"
+        time = f", 1/w = {number(corner.time_constant_s, 4)} s" if tuning.declared.dynamics.time_constants else ""
         yield "corner", f"{corner.name.ljust(width)}  {frequency_text(corner.rad_s)}{time}"
         if corner.discrete is None:
             yield "corner", f"{' ' * width}  ! above the Nyquist frequency"
@@ -153,15 +161,17 @@ def _moved(corner: Corner) -> str:
 
 
 def _range(tuning: Tuning) -> Rows:
-    found = tuning.integrator
-    if found is None:
+    found, declared = tuning.integrator, tuning.declared.dynamics.integrator
+    if found is None or declared is None:
         return
-    what = {"DIFF_LAG": "the integrator in the feedback path", "LAG": "OUTPUT"}.get(tuning.block.name, "the integrator")
-    yield "range", f"Kx = {found.formula} = {number(found.kx)}: {what} goes to +-{found.counts} (section 51)"
+    yield "range", f"Kx = {found.formula} = {number(found.kx)}: {declared.what} goes to +-{found.counts} (section 51)"
     if found.near_edge is not None:
         yield "range", f"! Kx is within 10 % of {found.near_edge:g}, where the range changes"
-    if tuning.block.name == "DIFF_LAG" and found.counts < 32767:
-        yield "range", f"an INPUT of 32767 settles at 32767 - {found.counts} = {32767 - found.counts}, not at 0"
+    if declared.in_feedback and found.counts < INT16_MAX:
+        yield (
+            "range",
+            f"an INPUT of {INT16_MAX} settles at {INT16_MAX} - {found.counts} = {INT16_MAX - found.counts}, not at 0",
+        )
 
 
 def _limits(call: DynamicCall, tuning: Tuning) -> Rows:
@@ -213,17 +223,18 @@ def _ratio(tuning: Tuning) -> Rows:
     hints = {
         Verdict.NEAR_LOW: f"  ! within 10 % of {found.low:g}:1",
         Verdict.NEAR_HIGH: f"  ! within 10 % of {found.high:g}:1",
-        Verdict.BELOW: "  ! beyond: WLD is moved at first, and AMX7004 is logged",
-        Verdict.ABOVE: "  ! beyond: WLD is moved at first, and AMX7004 is logged",
+        Verdict.BELOW: f"  ! beyond: {found.parameters[0]} is moved at first, and AMX7004 is logged",
+        Verdict.ABOVE: f"  ! beyond: {found.parameters[0]} is moved at first, and AMX7004 is logged",
     }
-    yield (
-        "ratio",
-        f"{number(found.value, 5)}:1 of WLD and WLG, {found.low:g}:1 .. {found.high:g}:1{hints.get(found.verdict, '')}",
-    )
+    names = " and ".join(found.parameters)
+    hint = hints.get(found.verdict, "")
+    yield "ratio", f"{number(found.value, 5)}:1 of {names}, {found.low:g}:1 .. {found.high:g}:1{hint}"
 
 
-def _loop_time(call: DynamicCall, tuning: Tuning, program: Program) -> Rows:
-    if call.block.name != "PID":
+def _period(tuning: Tuning, program: Program) -> Rows:
+    """Yield the time between executions of a block that is told it."""
+    name = tuning.declared.executed_every
+    if not name:
         return
     scans = tuning.period_s / tuning.scan_s
     every = round(scans)
@@ -232,4 +243,4 @@ def _loop_time(call: DynamicCall, tuning: Tuning, program: Program) -> Rows:
         text += "  ! no whole number of scans"
     elif every > 1:
         text += f": the CALL must run in one scan of {every} only"
-    yield "LOOP_TIME", text
+    yield name, text

@@ -356,7 +356,7 @@ def _instances(program: Program) -> dict[object, BlockInstance]:
 def _calls(statements: tuple[Statement, ...]) -> list[Call]:
     found: list[Call] = []
     for statement in statements:
-        if isinstance(statement, Call) and statement.block != "SCAN_LOOP":
+        if isinstance(statement, Call):
             found.append(statement)
         elif isinstance(statement, If):
             found += _calls(statement.then) + _calls(statement.otherwise)

@@ -10,9 +10,8 @@ import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Time, Times
-from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES
+from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES, SCAN_LOOP
 from automax_ros.core.ticks import NS_PER_US
 from automax_ros.core.types import DataType
 from automax_ros.language.program import BoundCall, Program, Symbol
@@ -62,7 +61,7 @@ class CostModel:
 
     def scan_loop_ns(self, program: Program) -> int:
         """Return the time of SCAN_LOOP, the latch included."""
-        time = self._time(CATALOGUE["SCAN_LOOP"].times)
+        time = self._time(SCAN_LOOP.times)
         return 0 if time is None else _to_ns(_sum(time, _commons(program.symbols.values())))
 
     def end_ns(self, program: Program) -> int:

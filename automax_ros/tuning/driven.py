@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
+import math
 from collections.abc import Iterable, Mapping
+from contextlib import closing
+from itertools import repeat
 
-from automax_ros.blocks.coefficients import evaluate
-from automax_ros.blocks.declaration import Block
+from automax_ros.blocks.declaration import Block, Form
+from automax_ros.blocks.dynamics import Integrator
+from automax_ros.blocks.instance import Instance
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType, Value
 
-_NS_PER_S = 1e9
 _ANY_CHANGE = INT16_MAX - INT16_MIN
 STANDING = "MAX_CHANGE 0"
 """What a block is told to have run into that may not move at all."""
@@ -21,66 +23,53 @@ MOST_SCANS_TO_REST = 1 << 16
 class DrivenBlock:
     """A block that one signal of whole counts drives, from rest: where it comes to stand while the signal is 0.
 
-    The signal is INPUT. Of a PID it is ERROR: INPUT carries it and FEEDBACK is 0; where the D term takes FEEDBACK
-    (DERIVATIVE), FEEDBACK carries it and INPUT is 0, which is the same for all three terms.
+    The block's declaration tells which input carries the signal; the others that could are 0. ``integrator`` is the
+    one inside the block, None where it has none.
     """
 
     def __init__(self, block: Block, period_ns: int, parameters: Mapping[str, Value]) -> None:
         """Take the scan period and the values of all inputs but the signal, by keyword; others have their defaults.
 
-        ``block`` is one with a transfer function.
+        ``block`` is one whose dynamics can be measured.
         """
-        assert block.step is not None
         assert block.coefficients is not None
-        values: dict[str, Value] = {
-            item.variable: item.type.zero if item.default is None else item.default
+        dynamics = block.coefficients.dynamics
+        inputs: dict[str, Value] = {
+            item.name: item.type.zero if item.default is None else item.default
             for item in block.inputs
             if isinstance(item.type, DataType)
         }
-        values.update((name.lower(), value) for name, value in parameters.items())
-        given = {
-            name: float(parameters[name])
-            for name in block.coefficients.parameters
-            if isinstance(parameters.get(name), (int, float))
-        }
-        coefficients, _ = evaluate(block, period_ns / _NS_PER_S, given)
-        values.update(zip(block.coefficients.names, coefficients, strict=True))
-        values.update((state.name, state.initial) for state in block.states)
-        self._step = block.step
-        names = list(inspect.signature(block.step).parameters)
-        self._start = [values[name] for name in names]
-        carrier, self._sign = _carrier(block, values)
-        self._place = names.index(carrier)
-        self._start[self._place] = 0
-        outputs = [item.name for item in block.outputs]
-        self._output = outputs.index("OUTPUT")
-        self._states = [(names.index(state.name), len(outputs) + number) for number, state in enumerate(block.states)]
-        self._bounds = _bounds(block, values)
-        inner = next((n for n, state in enumerate(block.states) if state.name in ("integrator", "y1")), None)
-        self._inner = None if self._bounds.inner is None or inner is None else len(outputs) + inner
-        self._start, self._rest = self._at_rest()
+        inputs.update(parameters)
+        carrier, self._sign = dynamics.carrier(inputs)
+        self._carrier = carrier.lower()
+        fixed, self._standing = _divided(block, carrier, parameters)
+        self._instance = Instance(block, period_ns, **fixed)
+        self._output = self._instance.results.index(dynamics.output.lower())
+        self._rest = self._come_to_rest()
+        self._start = dict(self._instance.state)
+        inner = self.integrator = dynamics.integrator
+        self._bounds = _bounds(inner, inputs, self._instance.coefficients)
+        self._inner = None if inner is None else self._instance.results.index(inner.state)
         self.begin()
 
     def begin(self) -> None:
         """Put the block to rest and forget what it ran into."""
-        self._arguments = list(self._start)
+        self._instance.state = dict(self._start)
         self._last = self._rest
         self._touched: set[str] = set()
 
-    def _at_rest(self) -> tuple[list[Value], int]:
-        """Return the arguments with the states, and OUTPUT, at which a signal of 0 leaves the block."""
-        arguments = list(self._start)
-        output = 0
-        for _ in range(MOST_SCANS_TO_REST):
-            result = self._step(*arguments)
-            before = [arguments[argument] for argument, _ in self._states]
-            after = [result[position] for _, position in self._states]
-            for (argument, _), value in zip(self._states, after, strict=True):
-                arguments[argument] = value
-            output = result[self._output]
-            if after == before:
-                break
-        return arguments, output
+    def _come_to_rest(self) -> int:
+        """Leave the states, and return the output, at which a signal of 0 leaves the block."""
+        block, output = self._instance.block, 0
+        states = slice(len(block.outputs), len(block.outputs) + len(block.states))
+        before = tuple(state.initial for state in block.states)
+        with closing(self._instance.drive(self._carrier, repeat(0, MOST_SCANS_TO_REST), **self._standing)) as results:
+            for result in results:
+                output = result[self._output]
+                if result[states] == before:
+                    break
+                before = result[states]
+        return output
 
     @property
     def room(self) -> int:
@@ -89,7 +78,7 @@ class DrivenBlock:
 
     @property
     def rest(self) -> int:
-        """OUTPUT while the signal is 0: of a PID FEED_FORWARD, within its limits."""
+        """The output while the signal is 0: what is added to it, within the limits."""
         return self._rest
 
     @property
@@ -114,15 +103,11 @@ class DrivenBlock:
 
     def run(self, signal: Iterable[int]) -> list[int]:
         """Run one scan for each value of the signal and return OUTPUT after each."""
-        step, arguments, states = self._step, self._arguments, self._states
-        place, sign, output, inner = self._place, self._sign, self._output, self._inner
+        output, inner = self._output, self._inner
         found: list[int] = []
         least = most = 0.0
-        for counts in signal:
-            arguments[place] = sign * counts
-            result = step(*arguments)
-            for argument, position in states:
-                arguments[argument] = result[position]
+        driving = signal if self._sign == 1 else (-counts for counts in signal)
+        for result in self._instance.drive(self._carrier, driving, **self._standing):
             found.append(result[output])
             if inner is not None:
                 held = result[inner]
@@ -156,37 +141,40 @@ class DrivenBlock:
 class _Bounds:
     """What limits a block: its output, and its integrator where it has one that is limited."""
 
-    def __init__(self, values: Mapping[str, Value]) -> None:
-        self.high = int(values.get("limit_plus", INT16_MAX))
-        self.low = int(values.get("limit_minus", INT16_MIN))
+    def __init__(self, inputs: Mapping[str, Value]) -> None:
+        self.high = int(inputs.get("LIMIT_PLUS", INT16_MAX))
+        self.low = int(inputs.get("LIMIT_MINUS", INT16_MIN))
         self.high_name = f"LIMIT_PLUS {self.high}" if self.high < INT16_MAX else "16 bits"
         self.low_name = f"LIMIT_MINUS {self.low}" if self.low > -INT16_MAX else "16 bits"
         self.inner: tuple[float, float] | None = None
         self.inner_names = ("", "")
-        self.most_change = max(0, int(values.get("max_change", _ANY_CHANGE)))
+        self.most_change = max(0, int(inputs.get("MAX_CHANGE", _ANY_CHANGE)))
 
 
-def _bounds(block: Block, values: Mapping[str, Value]) -> _Bounds:
-    bounds = _Bounds(values)
-    if "span" in values:
-        span = float(values["span"])
-        bounds.inner = (max(-span, float(bounds.low)), min(span, float(bounds.high)))
-        name = f"the integrator's range +-{span:.0f} (section 51)"
-        short = span < INT16_MAX
-        bounds.inner_names = (
-            name if short and bounds.low < -span else bounds.low_name,
-            name if short and bounds.high > span else bounds.high_name,
-        )
-    elif block.name == "PID":
-        bounds.inner = (float(bounds.low), float(bounds.high))
-        bounds.inner_names = (bounds.low_name, bounds.high_name)
+def _bounds(integrator: Integrator | None, inputs: Mapping[str, Value], coefficients: Mapping[str, float]) -> _Bounds:
+    bounds = _Bounds(inputs)
+    if integrator is None:
+        return bounds
+    span = coefficients["span"] if integrator.rate is not None else math.inf
+    bounds.inner = (max(-span, float(bounds.low)), min(span, float(bounds.high)))
+    name = f"the integrator's range +-{span:.0f} (section 51)"
+    short = span < INT16_MAX
+    bounds.inner_names = (
+        name if short and bounds.low < -span else bounds.low_name,
+        name if short and bounds.high > span else bounds.high_name,
+    )
     return bounds
 
 
-def _carrier(block: Block, values: Mapping[str, Value]) -> tuple[str, int]:
-    """Return the input that carries the signal, and its sign."""
-    if block.name != "PID":
-        return "input", 1
-    if values["derivative"]:
-        return "feedback", 1 if values["action"] else -1
-    return "input", -1 if values["action"] else 1
+def _divided(block: Block, carrier: str, parameters: Mapping[str, Value]) -> tuple[dict[str, Value], dict[str, Value]]:
+    """Return the literals of a block and its other inputs, in lower case; signals that do not move are 0."""
+    fixed: dict[str, Value] = {}
+    standing: dict[str, Value] = {}
+    for item in block.inputs:
+        if item.name == carrier or not isinstance(item.type, DataType):
+            continue
+        if item.name in parameters:
+            (fixed if item.form is Form.LITERAL else standing)[item.variable] = parameters[item.name]
+        elif item.required:
+            standing[item.variable] = item.type.zero
+    return fixed, standing

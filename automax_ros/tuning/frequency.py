@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import chain, repeat
 
 from automax_ros.blocks.declaration import Block
+from automax_ros.blocks.dynamics import Integrator
 from automax_ros.blocks.transfer import Transfer
 from automax_ros.core.types import Value
 from automax_ros.tuning.driven import DrivenBlock
@@ -20,7 +21,6 @@ UNRELIABLE_DB = 0.5
 MOST_SCANS = 3_000_000
 """Scans for one frequency, transient and window together; a slower one is not measured."""
 MOST_SCANS_IN_ALL = 8_000_000
-INTEGRATORS = ("INTEGRATE", "PROP_INT", "PID")
 _WINDOW = 1000
 """Least scans in the window: so many different phases that the roundings average out."""
 _SHARE = 0.9
@@ -70,7 +70,6 @@ class Sweep:
 
         ``transfer`` is the block's own, for the length of transients and for amplitudes.
         """
-        self._block = block
         self._driven = DrivenBlock(block, period_ns, parameters)
         self._transfer = transfer
         self._amplitude = amplitude
@@ -119,13 +118,13 @@ class Sweep:
         most = float(NORMAL_AMPLITUDE)
         gain = abs(self._transfer.discrete_response(rad_s))
         if gain > 0.0:
-            most = min(most, _SHARE * self._driven.room / (gain + start_offset(self._block, self._transfer)))
+            most = min(most, _SHARE * self._driven.room / (gain + start_offset(self._transfer)))
             change = 2.0 * math.sin(rad_s * self._transfer.period_s / 2.0)
             most = min(most, _SHARE * self._driven.most_change / (gain * change))
-        inner = self._driven.inner_room
-        inner_gain = integrator_gain(self._block, self._transfer, rad_s)
-        if inner is not None and inner_gain > 0.0:
-            most = min(most, _SHARE * inner / inner_gain)
+        integrator, inner = self._driven.integrator, self._driven.inner_room
+        if integrator is not None and inner is not None:
+            inner_gain = integrator_gain(integrator, self._transfer, rad_s)
+            most = min(most, _SHARE * inner / inner_gain) if inner_gain > 0.0 else most
         return max(1, int(most))
 
 
@@ -135,24 +134,24 @@ def _before(wave: list[int], scans: int) -> Iterator[int]:
     return chain(wave[len(wave) - rest :], chain.from_iterable(repeat(wave, whole)))
 
 
-def integrator_gain(block: Block, transfer: Transfer, rad_s: float) -> float:
+def integrator_gain(integrator: Integrator, transfer: Transfer, rad_s: float) -> float:
     """Return the greatest gain to the integrator inside a block, for a cosine that starts at rest."""
     response = transfer.discrete_response(rad_s)
-    if block.name == "DIFF_LAG":
+    if integrator.in_feedback:
         return abs(1.0 - response)
-    if block.name not in INTEGRATORS:
+    if not transfer.integrates:
         return abs(response)
     kx = integral_gain(transfer)
-    return kx / math.tan(rad_s * transfer.period_s / 2.0) + start_offset(block, transfer)
+    return kx / math.tan(rad_s * transfer.period_s / 2.0) + start_offset(transfer)
 
 
-def start_offset(block: Block, transfer: Transfer) -> float:
+def start_offset(transfer: Transfer) -> float:
     """Return how far a start from rest shifts a sine, as a gain: an integrator's first trapezoid lacks a half."""
-    return integral_gain(transfer) if block.name in INTEGRATORS else 0.0
+    return integral_gain(transfer) if transfer.integrates else 0.0
 
 
 def integral_gain(transfer: Transfer) -> float:
-    """Return the gain of INPUT + INPUT(n-1) in the integrator of INTEGRATE, PROP_INT or PID."""
+    """Return the gain of INPUT + INPUT(n-1) in the integrator of a function that integrates."""
     rate = transfer.numerator[-1]
     return rate / transfer.mapping if transfer.mapping is not None else rate * transfer.period_s / 2.0
 

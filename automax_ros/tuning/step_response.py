@@ -10,7 +10,7 @@ from automax_ros.blocks.declaration import Block
 from automax_ros.blocks.transfer import Polynomial, Transfer
 from automax_ros.core.types import Value
 from automax_ros.tuning.driven import DrivenBlock
-from automax_ros.tuning.frequency import INTEGRATORS, NORMAL_AMPLITUDE, integral_gain, roots
+from automax_ros.tuning.frequency import NORMAL_AMPLITUDE, integral_gain, roots
 
 MOST_SCANS = 500_000
 """Longest step response, in executions of the block."""
@@ -82,7 +82,7 @@ def respond(
     driven = DrivenBlock(block, period_ns, parameters)
     unit = filtered(transfer.b, transfer.a, [1.0] * scans)
     if counts is None:
-        counts = _fitting_step(block, transfer, driven, unit)
+        counts = _fitting_step(transfer, driven, unit)
     driven.begin()
     outputs = driven.run([counts] * scans)
     gain = _gain_at_0(transfer)
@@ -191,7 +191,7 @@ def _duration_s(transfer: Transfer) -> float:
     return 4.0 * (proportional or 1.0) / rate if rate > 0.0 else 0.0
 
 
-def _fitting_step(block: Block, transfer: Transfer, driven: DrivenBlock, unit: Sequence[float]) -> int:
+def _fitting_step(transfer: Transfer, driven: DrivenBlock, unit: Sequence[float]) -> int:
     """Return the largest round step, at most 1 PN, with which neither output nor integrator reaches a limit."""
     most = float(NORMAL_AMPLITUDE)
     peak = max(abs(value) for value in unit)
@@ -202,7 +202,7 @@ def _fitting_step(block: Block, transfer: Transfer, driven: DrivenBlock, unit: S
     inner = driven.inner_room
     if inner is not None:
         reach = 1.0
-        if block.name in INTEGRATORS:
+        if transfer.integrates:
             reach = integral_gain(transfer) * 2.0 * len(unit)
         most = min(most, _SHARE * inner / reach) if reach > 0.0 else most
     return NORMAL_AMPLITUDE if most >= NORMAL_AMPLITUDE else _round_below(max(1.0, most))

@@ -113,7 +113,7 @@ def names_of(block):
     inputs = {
         item.variable
         for item in block.inputs
-        if (item.name not in evaluated or (item.one_of and block.coefficients.transfer))
+        if (item.name not in evaluated or item.one_of)
         and (item.type is Special.TABLE or isinstance(item.type, DataType))
     }
     states = {state.name for state in block.states}

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.tuning import tuning
 from automax_ros.tuning import frequency
 from automax_ros.tuning.driven import DrivenBlock
 from automax_ros.tuning.frequency import (
@@ -28,6 +27,7 @@ from automax_ros.tuning.frequency import (
     whole_periods,
 )
 from automax_ros.tuning.step_response import default_scans, filtered, laplace_step, respond
+from automax_ros.tuning.tuning import tuning
 
 SQUARE_ROOT = math.sqrt(2.0)
 

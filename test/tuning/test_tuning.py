@@ -9,13 +9,10 @@ from hypothesis import strategies as st
 from scipy import optimize, signal
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.tuning import (
-    RATE_FACTOR,
+from automax_ros.cli.integrate_rate import RATE_FACTOR, rate_gain, rate_limits
+from automax_ros.tuning.tuning import (
     Verdict,
     range_of,
-    rate_gain,
-    rate_limits,
-    transfer_of,
     tuning,
     verdict_of,
 )
@@ -148,7 +145,7 @@ def test_variable_beyond_its_limits_is_shown_with_the_limit_in_force():
     assert [item.verdict for item in found.limits] == [Verdict.WITHIN, Verdict.ABOVE]
     block = run("LAG", 22_000_000)
     block.scan(input=0, wlg=500.0)
-    assert found.coefficients == block._coefficients
+    assert found.coefficients == block.coefficients
 
 
 @pytest.mark.parametrize(
@@ -292,7 +289,7 @@ def test_discrete_function_is_scipys_bilinear_one(name, share, wm_share, ticks):
     }[name]
     if wm is not None:
         given["WM"] = wm
-    found = transfer_of(CATALOGUE[name], period, tuning(CATALOGUE[name], period, given).values)
+    found = tuning(CATALOGUE[name], period, given).transfer
     b, a = signal.bilinear(numerator, denominator, fs=c / 2)
     at = [share * math.pi / period for share in (0.001, 0.1, 0.5, 0.9)]
     _, expected = signal.freqz(b, a, worN=[w * period for w in at])

@@ -25,7 +25,6 @@ from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProble
 from automax_ros.language.syntax.tree import Call, Declaration, Module, Read, Statement
 
 AUTOMAX = Processor.AUTOMAX
-THERMAL_OVERLOAD = "THERMAL_OVERLOAD"
 _TOO_LARGE, _TOO_MANY = "AMX0001", "AMX0002"
 _NOT_READ = (_TOO_LARGE, _TOO_MANY)
 """Findings of the parser after which the tree is not the whole task."""
@@ -99,20 +98,21 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     check_reads(context, reads)
     check_flow(context, layout)
     check_sharing(context, layout)
-    _check_protection(context, layout)
+    _check_expected_blocks(context, layout)
     return layout
 
 
-def _check_protection(context: Context, layout: TaskLayout) -> None:
-    """Warn of a UDC task without THERMAL_OVERLOAD, which section 36 requires unless hardware protects the motor."""
+def _check_expected_blocks(context: Context, layout: TaskLayout) -> None:
+    """Warn of a task without a block that its Processor expects: on a UDC that which protects the motor (36)."""
     loop = layout.scan_loop
-    if context.target is not Processor.UDC or loop is None or THERMAL_OVERLOAD not in context.catalogue:
+    expected = [block for block in context.catalogue.values() if context.target in block.expected_on]
+    if loop is None or not expected:
         return
     calls = {statement.block for statement, _, _ in layout.numbered() if isinstance(statement, Call)}
-    if THERMAL_OVERLOAD not in calls and THERMAL_OVERLOAD not in context.broken.words:
-        context.line = layout.scan_loop_line
-        hint = "it protects the motor, unless a hardware device does (36)"
-        context.report("AMX4097", "the task has no THERMAL_OVERLOAD block", loop.span, hint)
+    context.line = layout.scan_loop_line
+    for block in expected:
+        if block.name not in calls and not context.is_broken([block]):
+            context.report("AMX4097", f"the task has no {block.name} block", loop.span, block.expected_since)
 
 
 def _program(context: Context, layout: TaskLayout, name: str, source: SourceText) -> Program:

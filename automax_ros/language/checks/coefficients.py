@@ -6,9 +6,9 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from automax_ros.blocks.bounds import loose_bounds, range_within
 from automax_ros.blocks.coefficients import is_within
 from automax_ros.blocks.declaration import Block, Limit
-from automax_ros.blocks.tuning import loose_bounds, range_within
 from automax_ros.language.checks.context import Context
 from automax_ros.language.syntax.tree import BooleanLiteral, Element, Expression, IntegerLiteral, RealLiteral, Variable
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from automax_ros.blocks.declaration import Block, Processor
@@ -76,6 +76,10 @@ class Context:
     def period_s(self) -> float | None:
         """The scan period T in seconds, None as long as TICKS is not known to be good."""
         return None if self.ticks is None else self.ticks * self.tick_ns / 1e9
+
+    def is_broken(self, blocks: Iterable[Block]) -> bool:
+        """Return whether a line that could not be read mentions one of some blocks."""
+        return any(block.name in self.broken.words for block in blocks)
 
     def is_input_point(self, name: str) -> bool:
         """Return whether the rack defines a common as an input, which nothing but the rack writes."""

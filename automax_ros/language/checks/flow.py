@@ -35,7 +35,7 @@ class Region(enum.Enum):
     """The part of a task in which a line lies."""
 
     STARTUP = "before SCAN_LOOP"
-    LOOP = "SCAN_LOOP"
+    LOOP = "the beginning of the scan"
     SCAN = "the scan"
 
 

@@ -10,8 +10,6 @@ from automax_ros.language.checks.context import Context
 from automax_ros.language.syntax.tree import Call, End, Label, Module, Remark, Statement
 from automax_ros.language.syntax.walk import bodies, statements_in_order
 
-SCAN_LOOP = "SCAN_LOOP"
-
 
 @dataclass(frozen=True)
 class TaskLayout:
@@ -35,7 +33,7 @@ def find_layout(context: Context, module: Module) -> TaskLayout:
     loops = [
         (statement, line)
         for statement, line in statements_in_order(module.statements)
-        if isinstance(statement, Call) and statement.block == SCAN_LOOP
+        if isinstance(statement, Call) and (block := context.catalogue.get(statement.block)) and block.begins_scan
     ]
     _check_scan_loops(context, module, loops)
     layout = _split(module, loops)
@@ -59,7 +57,7 @@ def _contains(statement: Statement, wanted: Call) -> bool:
 
 def _check_scan_loops(context: Context, module: Module, loops: list[tuple[Call, int | None]]) -> None:
     if not loops:
-        if SCAN_LOOP not in context.broken.words:
+        if not context.is_broken(block for block in context.catalogue.values() if block.begins_scan):
             context.line = None
             context.report(
                 "AMX4040",

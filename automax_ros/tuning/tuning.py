@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
 
-from automax_ros.blocks.coefficients import TWO_TO_MINUS_18, evaluate, integrator_range, is_within, limited
-from automax_ros.blocks.declaration import Block, Bound, Coefficients, Limit
-from automax_ros.blocks.filters import GREATEST_RATIO, LEAST_RATIO
-from automax_ros.blocks.transfer import Transfer, mapped
+from automax_ros.blocks.bounds import Ends, bound_now, loose_bounds, range_within
+from automax_ros.blocks.coefficients import evaluate, integrator_range, is_within, limited
+from automax_ros.blocks.declaration import Block, Coefficients, Relation
+from automax_ros.blocks.dynamics import Integrator
+from automax_ros.blocks.transfer import Transfer
 
 NEAR = 0.1
 """A coefficient is close to a limit within this share of the limit, at most of the room between the two (decision)."""
 RANGE_EDGES = (0.125, 0.25)
 """The coefficients Kx at which the range of an integrator changes (section 51)."""
-Ends = tuple[float, float]
 
 
 class Verdict(enum.Enum):
@@ -93,8 +92,9 @@ class IntegratorRange:
 
 @dataclass(frozen=True)
 class Ratio:
-    """LEAD_LAG's ratio of the larger to the smaller of WLD and WLG (44.1)."""
+    """The ratio of the larger to the smaller of two parameters that a rule bounds (44.1)."""
 
+    parameters: tuple[str, ...]
     value: float
     low: float
     high: float
@@ -123,6 +123,27 @@ class Tuning:
     ratio: Ratio | None
 
     @property
+    def declared(self) -> Coefficients:
+        """What the block declares of its coefficients."""
+        assert self.block.coefficients is not None
+        return self.block.coefficients
+
+    @property
+    def laplace(self) -> str:
+        """The Laplace function with its numbers, such as ``1 / (1 + s/10)``; nothing may be missing."""
+        return self.declared.dynamics.laplace(self.values)
+
+    @property
+    def equation(self) -> str:
+        """What the block executes, in the terms of its coefficients; nothing may be missing."""
+        return self.declared.dynamics.equation(self.values)
+
+    @property
+    def period_text(self) -> str:
+        """The time between executions, such as ``T = 22 ms``."""
+        return f"{self.declared.period_name} = {self.period_s * 1e3:g} ms"
+
+    @property
     def nyquist_rad_s(self) -> float:
         """Half the frequency of its executions, in rad/s."""
         return math.pi / self.period_s
@@ -145,11 +166,11 @@ def tuning(block: Block, scan_s: float, given: Mapping[str, float | None]) -> Tu
         period = every.get(declared.executed_every, scan_s)
         return Tuning(block, scan_s, period, every, (), missing, limits, None, {}, (), None, None)
     values, moved = limited(declared, scan_s, known)
-    ratio = _ratio(block, values)
+    ratio = _ratio(declared.relation, values)
     if declared.relation is not None and not declared.relation.holds(values):
         values.update(declared.relation.first(scan_s, values))
         moved = [*moved, *declared.relation.parameters]
-    transfer = transfer_of(block, scan_s, values)
+    transfer = declared.dynamics.transfer(scan_s, values)
     results, _ = evaluate(block, scan_s, known)
     return Tuning(
         block=block,
@@ -161,36 +182,10 @@ def tuning(block: Block, scan_s: float, given: Mapping[str, float | None]) -> Tu
         limits=limits,
         transfer=transfer,
         coefficients=dict(zip(declared.names, results, strict=True)),
-        corners=_corners(block, values, transfer),
-        integrator=_integrator(block, values, transfer),
+        corners=tuple(_corner(name, rad_s, transfer) for name, rad_s in declared.dynamics.corners(values)),
+        integrator=_integrator(declared.dynamics.integrator, values, transfer),
         ratio=ratio,
     )
-
-
-def transfer_of(block: Block, scan_s: float, values: Mapping[str, float]) -> Transfer:
-    """Return the transfer function of a block with coefficients, from parameters in force.
-
-    That of THERMAL_OVERLOAD leads from the scaled square of the current to CALL_RISE; it maps with C = 2/T.
-    """
-    declared = block.coefficients
-    assert declared is not None
-    if declared.transfer is not None:
-        return declared.transfer(scan_s, values)
-    gain = dict(zip(declared.names, declared.compute(scan_s, values), strict=True))["gain"]
-    lag = gain / (1.0 - gain) * 2.0 / scan_s
-    return mapped((1.0,), (1.0 / lag, 1.0), 2.0 / scan_s, scan_s)
-
-
-def rate_gain(counts_per_s: float, input_counts: float) -> float:
-    """Return the KI of an INTEGRATE that gains ``counts_per_s`` at a constant INPUT, with WM not programmed (42.3).
-
-    KI = Kx C with Kx = y T / (2 x) and C = (pi / 10 T) / tan(pi / 20): T drops out.
-    """
-    return RATE_FACTOR * counts_per_s / input_counts
-
-
-RATE_FACTOR = (math.pi / 20.0) / math.tan(math.pi / 20.0)
-"""KI x / y of section 42.3: 0.99176; the manual prints 0.99179."""
 
 
 def verdict_of(value: float, low: float | None, high: float | None) -> Verdict:
@@ -208,32 +203,6 @@ def verdict_of(value: float, low: float | None, high: float | None) -> Verdict:
     return Verdict.UNKNOWN if low is None or high is None else Verdict.WITHIN
 
 
-def loose_bounds(
-    limit: Limit, period_s: float, values: Mapping[str, float], ranges: Mapping[str, tuple[float, float]]
-) -> tuple[float | None, float | None]:
-    """Return what no value of a parameter may pass, whatever those parameters are that only ``ranges`` tells of.
-
-    A bound that reads one of these is taken at both ends of its range, and the loosest counts; every bound goes one way
-    as a parameter rises. One that reads a parameter of which nothing is known is None.
-    """
-    open_ones = [name for name in limit.uses if name not in values and name in ranges]
-    corners = [
-        {**values, **dict(zip(open_ones, ends, strict=True))} for ends in product(*(ranges[name] for name in open_ones))
-    ]
-    lows = [_bound(limit.low, period_s, corner) for corner in corners]
-    highs = [_bound(limit.high, period_s, corner) for corner in corners]
-    low = min((value for value in lows if value is not None), default=None)
-    return low, max((value for value in highs if value is not None), default=None)
-
-
-def range_within(limit: Limit, period_s: float, values: Mapping[str, float], low: float, high: float) -> Ends | None:
-    """Return the values in force of a parameter that moves between ``low`` and ``high``, None where none are known."""
-    least, most = loose_bounds(limit, period_s, values, {})
-    if least is None or most is None:
-        return None
-    return min(max(low, least), most), min(max(high, least), most)
-
-
 def _limits(
     declared: Coefficients, scan_s: float, known: Mapping[str, float], given: Mapping[str, float | None]
 ) -> tuple[LimitNow, ...]:
@@ -241,7 +210,7 @@ def _limits(
     in_force = dict(known)
     ranges: dict[str, Ends] = {}
     for limit in declared.limits:
-        low, high = _bound(limit.low, scan_s, in_force), _bound(limit.high, scan_s, in_force)
+        low, high = bound_now(limit.low, scan_s, in_force), bound_now(limit.high, scan_s, in_force)
         crossed = low is not None and high is not None and low > high
         if crossed:
             low = high
@@ -270,81 +239,26 @@ def _limits(
     return tuple(rows)
 
 
-def _bound(bound: Bound, scan_s: float, values: Mapping[str, float]) -> float | None:
-    """Return a limit as a number, None where it needs a parameter that is not known, or has no meaning."""
-    try:
-        return bound(scan_s, values)
-    except (KeyError, ArithmeticError, ValueError):
+def _ratio(relation: Relation | None, values: Mapping[str, float]) -> Ratio | None:
+    if relation is None or relation.ratio is None:
         return None
+    related = [values[name] for name in relation.parameters]
+    value = max(related) / min(related)
+    return Ratio(relation.parameters, value, *relation.ratio, verdict_of(value, *relation.ratio))
 
 
-def _ratio(block: Block, values: Mapping[str, float]) -> Ratio | None:
-    if block.name != "LEAD_LAG":
+def _integrator(
+    integrator: Integrator | None, values: Mapping[str, float], transfer: Transfer
+) -> IntegratorRange | None:
+    if integrator is None or integrator.rate is None or transfer.mapping is None:
         return None
-    value = max(values["WLD"], values["WLG"]) / min(values["WLD"], values["WLG"])
-    return Ratio(value, LEAST_RATIO, GREATEST_RATIO, verdict_of(value, LEAST_RATIO, GREATEST_RATIO))
-
-
-_KX: dict[str, tuple[str, Callable[[Mapping[str, float]], float]]] = {
-    "LAG": ("WLG / C", lambda values: values["WLG"]),
-    "DIFF_LAG": ("WLG / C", lambda values: values["WLG"]),
-    "INTEGRATE": ("KI / C", lambda values: values["KI"]),
-    "PROP_INT": ("KP x WLD / C", lambda values: values["KP"] * values["WLD"]),
-}
-"""The coefficient of the integrators that section 51 limits."""
-
-
-def _integrator(block: Block, values: Mapping[str, float], transfer: Transfer) -> IntegratorRange | None:
-    if block.name not in _KX or transfer.mapping is None:
-        return None
-    formula, frequency = _KX[block.name]
-    return range_of(frequency(values) / transfer.mapping, formula)
+    return range_of(integrator.rate(values) / transfer.mapping, integrator.formula)
 
 
 def range_of(kx: float, formula: str) -> IntegratorRange:
     """Return the range of an integrator by its coefficient, and whether an edge of section 51 is close."""
     near = next((edge for edge in RANGE_EDGES if abs(kx - edge) <= NEAR * edge), None)
     return IntegratorRange(kx, formula, int(integrator_range(kx)), near)
-
-
-def _corners(block: Block, values: Mapping[str, float], transfer: Transfer) -> tuple[Corner, ...]:
-    return tuple(_corner(name, rad_s, transfer) for name, rad_s in _bends(block, values, transfer))
-
-
-def _bends(block: Block, values: Mapping[str, float], transfer: Transfer) -> list[tuple[str, float]]:
-    """Return the names and frequencies of a block's corners, in rad/s."""
-    if block.name == "INTEGRATE":
-        return [("unity gain, KI", values["KI"])]
-    if block.name == "PID":
-        return _pid_bends(transfer, isa=bool(values["ISA"]))
-    if "WN" in values:
-        low, high = _notch_edges(values)
-        return [("-3 dB below WN", low), ("WN", values["WN"]), ("-3 dB above WN", high)]
-    if block.name == "THERMAL_OVERLOAD":
-        return [("wlg", transfer.denominator[1] / transfer.denominator[0])]
-    return [(name, values[name]) for name in ("WLD", "WLG") if name in values]
-
-
-def _notch_edges(values: Mapping[str, float]) -> tuple[float, float]:
-    """Return where a notch of one or two equal stages takes 3 dB: WN (sqrt(1 + u**2) -+ u)."""
-    width = 0.5 / values["Q_FACTOR"]
-    if values.get("ORDER") == 4.0:
-        width /= math.sqrt(math.sqrt(2.0) - 1.0)
-    middle = math.sqrt(1.0 + width * width)
-    return values["WN"] * (middle - width), values["WN"] * (middle + width)
-
-
-def _pid_bends(transfer: Transfer, *, isa: bool) -> list[tuple[str, float]]:
-    """Return where the P term takes over from the I term, and the D term from it, as far as the gains are not 0."""
-    derivative, proportional, integral = transfer.numerator
-    bends = []
-    if integral > 0.0 and proportional > 0.0:
-        bends.append(("KI" if isa else "KI/KP", integral / proportional))
-    elif integral > 0.0:
-        bends.append(("unity gain, KI", integral))
-    if derivative > 0.0 and proportional > 0.0:
-        bends.append(("1/KD" if isa else "KP/KD", proportional / derivative))
-    return bends
 
 
 def _corner(name: str, rad_s: float, transfer: Transfer) -> Corner:
@@ -357,8 +271,3 @@ def _corner(name: str, rad_s: float, transfer: Transfer) -> Corner:
         discrete=transfer.discrete_response(rad_s) if below_nyquist else None,
         mapped_rad_s=None if c is None else 2.0 / transfer.period_s * math.atan(rad_s / c),
     )
-
-
-def rate_limits(period_s: float) -> tuple[float, float]:
-    """Return the limits of INTEGRATE's KI with WM not programmed (42.2): 2**-18 C and 0.9 pi / T."""
-    return TWO_TO_MINUS_18 * 2.0 * RATE_FACTOR / period_s, 0.9 * math.pi / period_s
