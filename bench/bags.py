@@ -119,14 +119,14 @@ def print_share_of_a_rack(folder: Path) -> None:
     assert config is not None
     scans = scans_per_second(Rack(config)) * SECONDS
     plain = min(run_seconds(None) for _ in range(REPEATS))
-    print(f"example rack, {SECONDS} simulated s: {plain / SECONDS * 1e3:.2f} ms a second without recording")
+    print(f"example rack, {SECONDS} simulated s: {plain / SECONDS * 1e3:.2f} ms per second without recording")
     for compression in COMPRESSIONS:
         bags = [folder / f"rack_{compression}_{number}" for number in range(REPEATS)]
         taken = min(run_seconds(bag, compression) for bag in bags)
         size = sum(path.stat().st_size for path in bags[0].iterdir())
         print(
-            f"  {compression:6}{taken / SECONDS * 1e3:6.2f} ms a second {scans / taken:10,.0f} scans/s"
-            f"{size / scans:7.0f} bytes a scan{size / taken / 1e6:7.1f} MB/s"
+            f"  {compression:6}{taken / SECONDS * 1e3:6.2f} ms per second {scans / taken:10,.0f} scans/s"
+            f"{size / scans:7.0f} bytes per scan{size / taken / 1e6:7.1f} MB/s"
             f"   recording takes {100 * (taken - plain) / taken:.0f} % of the time, wanted: under 20 %;"
             f" in real time {(taken - plain) / SECONDS * 100:.2f} % of a core"
         )

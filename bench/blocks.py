@@ -1,9 +1,9 @@
-"""Time of each block in a compiled scan, beside the 7010 Processor's (J-3676-5, Table 4). Prints ratios, fails on none.
+"""Time of each block in a compiled scan, over the 7010 Processor's (J-3676-5, Table 4). Prints ratios, fails on none.
 
 Each block is programmed with every parameter: inputs are variables that change from scan to scan where the block allows
 it, all outputs are wired. Coefficients of dynamic blocks are literals, which cost nothing in a scan. The cost of the
 empty scan is taken off. A table of its own tells, as information, what a REAL coefficient costs that changes in every
-scan, so that all coefficients of the block are computed anew.
+scan, so that all coefficients of the block are computed again.
 """
 
 from __future__ import annotations
@@ -252,7 +252,7 @@ def main() -> None:
     report_changing()
     whole = program_ns()
     each = whole / PROGRAM_BLOCKS
-    print(f"\nprogram of {PROGRAM_BLOCKS} blocks: {whole:.0f} ns a scan, {each:.1f} ns a block; wanted: at most 80")
+    print(f"\nprogram of {PROGRAM_BLOCKS} blocks: {whole:.0f} ns per scan, {each:.1f} ns per block; wanted: at most 80")
 
 
 def report_changing() -> None:

@@ -1,4 +1,4 @@
-"""Simulated seconds per wall second of line, bridge and motor with a trivial controller, beside a fixed-step RK4."""
+"""Simulated seconds per wall second of line, bridge and motor with a trivial controller, and of a fixed-step RK4."""
 
 from __future__ import annotations
 

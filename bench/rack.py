@@ -42,15 +42,15 @@ def main() -> None:
         raise SystemExit(f"{CONFIG} has errors: automax check {CONFIG}")
     began = time.perf_counter()
     rate = scans_per_second(Rack(config))
-    print(f"example rack: {rate:.0f} scans a second, compiled in {time.perf_counter() - began:.2f} s")
+    print(f"example rack: {rate:.0f} scans per second, compiled in {time.perf_counter() - began:.2f} s")
     plain = min(run(config, None) for _ in range(REPEATS))
     with tempfile.TemporaryDirectory() as temporary:
         recorded = min(run(config, Path(temporary) / f"bag{number}") for number in range(REPEATS))
         size = sum(item.stat().st_size for item in (Path(temporary) / "bag0").iterdir())
     for word, taken, wanted in (("without recording", plain, 200), ("with recording", recorded, 60)):
         pace, scan_us = SECONDS / taken, taken / SECONDS / rate * 1e6
-        print(f"{word:18} {pace:7.0f} x real time, {scan_us:6.1f} us a scan; wanted: at least {wanted}")
-    print(f"bag: {size / 1e6:.2f} MB, {size / SECONDS / rate:.0f} bytes a scan")
+        print(f"{word:18} {pace:7.0f} x real time, {scan_us:6.1f} us per scan; wanted: at least {wanted}")
+    print(f"bag: {size / 1e6:.2f} MB, {size / SECONDS / rate:.0f} bytes per scan")
 
 
 if __name__ == "__main__":

@@ -82,7 +82,7 @@ def print_replay(what: str, bag: Path, rate: float, new: Mapping[str, SourceText
         best = min(best, time.perf_counter() - began)
     result = "identical" if report.identical else f"{sum(task.different for task in report.tasks)} scans differ"
     print(
-        f"{what:34}{rate:6.0f} scans a second{report.scans / best:10,.0f} replayed a second"
+        f"{what:34}{rate:6.0f} scans per second{report.scans / best:10,.0f} replayed per second"
         f"{SECONDS / best:7.1f} x real time, wanted {WANTED}; {result}"
     )
 

@@ -1,4 +1,4 @@
-"""Compares texts with golden files; AUTOMAX_UPDATE_GOLDEN=1 writes them anew, but never in continuous integration."""
+"""Compares texts with golden files; AUTOMAX_UPDATE_GOLDEN=1 writes them again, but never in continuous integration."""
 
 import os
 from pathlib import Path

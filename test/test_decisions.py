@@ -25,7 +25,7 @@ def test_the_page_is_current(collector):
 
 
 def test_every_mention_of_a_decision_is_a_mark_that_is_collected(collector):
-    """A mark of another form would be lost without a word."""
+    """A mark of another form would be lost silently."""
     collected = Counter(item.file for item in collector.decisions())
     mentions = Counter[str]()
     for path in [*collector.PACKAGE.rglob("*.py"), *collector.PACKAGE.rglob("*.md")]:

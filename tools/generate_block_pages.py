@@ -127,7 +127,7 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[s
 
 
 def main() -> None:
-    """Write the pages and remove those of families that are no more."""
+    """Write the pages and remove those of families that are gone."""
     TARGET.mkdir(parents=True, exist_ok=True)
     texts = pages()
     for path in TARGET.glob("*.md"):

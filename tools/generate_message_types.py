@@ -1,7 +1,7 @@
 """Writes automax_ros/wire/message_types.json: the definition and hash of every message type that a recording holds.
 
 python tools/generate_message_types.py, after a change in msg_defs/. The definitions of the standard types come from the
-ROS 2 installed beside this interpreter (or AMENT_PREFIX_PATH), the type hashes (RIHS01) from rosbags.
+ROS 2 installed with this interpreter (or AMENT_PREFIX_PATH), the type hashes (RIHS01) from rosbags.
 """
 
 import json

@@ -20,7 +20,7 @@ def seconds_text(time_ns: int) -> str:
 def real_text(value: float) -> str:
     """Return the shortest text that gives the same single-precision value, as Python writes it: ``0.1``, ``2.0``.
 
-    A number that is no single is written as it is.
+    A number that is not a single is written as it is.
     """
     for digits in range(_FEWEST, _MOST + 1):
         candidate = float(f"{value:.{digits}g}")

@@ -122,7 +122,7 @@ class Circuit(Conduction):
             self._run(stop)
 
     def sample(self) -> Sample:
-        """Return the integrals since the last call (or the start), and begin anew."""
+        """Return the integrals since the last call (or the start), and begin again."""
         volt_s = self._volt_s + self._z.r * self._charge + self._z.l * (self.current_a - self._current_before)
         duration_s = (self.now_ns - self._sample_ns) * 1e-9
         sample = Sample(duration_s, self._charge, volt_s, self._zero_s, self._overlap_s, self._square, self._pieces)

@@ -37,7 +37,7 @@ class Coupling(Stateful):
             damping_n_m_s: torque per difference of speeds, N m s/rad, of an elastic coupling.
 
         Raises:
-            ParameterError: a machine is no Motor, or a value is outside its range.
+            ParameterError: a machine is not a Motor, or a value is outside its range.
         """
         self.first, self.second = first, second
         self._one, self._two = _motor(first), _motor(second)

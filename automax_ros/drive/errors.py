@@ -35,7 +35,7 @@ def require(name: str, value: float, low: float, high: float = math.inf, *, abov
     """Return a parameter that lies in low..high; ``above`` excludes low itself.
 
     Raises:
-        ParameterError: it does not, or is no finite number.
+        ParameterError: it does not, or is not a finite number.
     """
     if math.isfinite(value) and (value > low if above else value >= low) and value <= high:
         return value

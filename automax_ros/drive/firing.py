@@ -67,7 +67,7 @@ class ConstantAlpha(Stateful):
         """Let time pass to an instant (ns), firing on the way."""
         circuit, line = self.circuit, self.circuit.line
         while True:
-            # Looked for anew each time while it lies ahead: alpha and the line may have moved.
+            # Looked for again each time while it lies ahead: alpha and the line may have moved.
             number = self._order[self._position]
             on_ns = line.instant_of(natural_angle(number, line) + self.alpha_rad, self._natural_ns - _MARGIN_NS)
             on_ns = max(on_ns, circuit.now_ns)

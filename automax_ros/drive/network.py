@@ -5,7 +5,7 @@ armature obeys ``(L d/dt + R) i + E = v_P - v_M``. Whatever set of legs is close
 
 * one mode of the armature current with L + n Ls, R + n Rs, where n is 1/p + 1/m for p and m phases on the rails (2 for
   two SCRs, 1.5 while one commutates), or 0 where a phase on both rails shorts the armature;
-* modes of the currents that flow between the phases of one rail beside their equal share of the armature current: Ls,
+* modes of the currents that flow between the phases of one rail, less their equal share of the armature current: Ls,
   Rs.
 
 Each is solved in closed form (``waves``). SCRs are ideal but for a constant drop; where legs alone make a loop its

@@ -36,7 +36,7 @@ def next_ending(
             slope -= decay_s * guard_b
             if guard_b < 0.0:
                 bend -= decay_s * decay_s * guard_b  # noqa: PLW2901
-        if value < lowest:  # a loop of legs has shared its current anew: who would carry it backwards most goes out
+        if value < lowest:  # a loop of legs has shared its current again: who would carry it backwards most goes out
             lowest, first, out = value, 0.0, mask
         if lowest < -ZERO_A:
             continue

@@ -170,7 +170,7 @@ def _simulated(case: BridgeCase) -> SteadyState:
         before, mean = mean, sum(means) / 6
         least = max(1.0, abs(mean))
         if abs(mean - before) <= SETTLED * least:
-            # A pair that stays on for good repeats too, but that is no bridge at work.
+            # A pair that stays on for good repeats too, but that is not a bridge at work.
             if max(means) - min(means) > 1e-4 * least or len(ends) < 6:
                 break
             return _describe(case, windows, start_current_a)

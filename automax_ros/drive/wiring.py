@@ -83,7 +83,7 @@ def leg_currents(legs: dict[int, int]) -> dict[int, tuple[float, float, float, f
             weights[leg] = _weights({1 + x: 1.0})
     if not both:
         return weights
-    # What flows into P beside the phases that sit on both rails: the armature current less the single legs there.
+    # What flows into P apart from the phases that sit on both rails: the armature current less the single legs there.
     into_p = {0: 1.0 / len(both)}
     for leg in legs:
         if leg % 2 == P and leg // 2 not in both:

@@ -14,17 +14,17 @@ def require_dint(member: str, value: object) -> None:
     """Refuse what a DINT member cannot hold: it is a whole number in 32 bits, two's complement.
 
     Raises:
-        ValueError: ``value`` is no int or lies beyond 32 bits; the message names the member.
+        ValueError: ``value`` is not an int or lies beyond 32 bits; the message names the member.
     """
     if not isinstance(value, int) or not INT32_MIN <= value <= INT32_MAX:
         raise ValueError(f"{member} is a DINT, a whole number from {INT32_MIN} to {INT32_MAX}, not {value!r}")
 
 
 def require_real(member: str, value: object) -> None:
-    """Refuse what is no number for a REAL member; a number that is too large is Infinity there.
+    """Refuse what is not a number for a REAL member; a number that is too large is Infinity there.
 
     Raises:
-        ValueError: ``value`` is no number; the message names the member.
+        ValueError: ``value`` is not a number; the message names the member.
     """
     if not isinstance(value, (int, float)):
         raise ValueError(f"{member} is a REAL, a number, not {value!r}")

@@ -115,7 +115,7 @@ class PulseMultiplier:
         """Execute the instruction once, if EnableIn is set.
 
         Raises:
-            ValueError: In, InitialValue, WordSize or Multiplier is no DINT; nothing was executed.
+            ValueError: In, InitialValue, WordSize or Multiplier is not a DINT; nothing was executed.
         """
         self._require_dints()
         self.EnableOut = bool(self.EnableIn)

@@ -49,7 +49,7 @@ class UpDownAccumulator:
         """Execute the instruction once, if EnableIn is set; without it Out and the accumulator stay.
 
         Raises:
-            ValueError: InitialValue, InPlus or InMinus is no number; nothing was executed.
+            ValueError: InitialValue, InPlus or InMinus is not a number; nothing was executed.
         """
         require_real("InitialValue", self.InitialValue)
         require_real("InPlus", self.InPlus)

@@ -91,7 +91,7 @@ def lie_inside_record(data: bytearray, chance: random.Random) -> bytearray:
 def within_chunk(
     change: Callable[[bytearray, random.Random], bytearray],
 ) -> Callable[[bytearray, random.Random], bytearray]:
-    """Change what a chunk holds and compress it anew, with a right checksum or none."""
+    """Change what a chunk holds and compress it again, with a right checksum or none."""
 
     def changed(data: bytearray, chance: random.Random) -> bytearray:
         begin, end = chance.choice(chunk_places(bytes(data)))
@@ -197,7 +197,7 @@ YAML_BOMBS = (
 
 
 def mutants(bag: Path, count: int, seed: int) -> Iterator[tuple[str, bytes, bytes]]:
-    """Return so many changed recordings: what was done, the data file, metadata.yaml."""
+    """Return this many changed recordings: what was done, the data file, metadata.yaml."""
     data = (bag / "scans_0.mcap").read_bytes()
     text = (bag / "metadata.yaml").read_bytes()
     yield from ((f"yaml bomb {number}", data, new) for number, new in enumerate(YAML_BOMBS))

@@ -44,7 +44,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def assert_survived(sound: Path, work: Path, count: int, seed: int) -> None:
-    """Let all commands read so many mutants in a process of their own."""
+    """Let all commands read this many mutants in a process of their own."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "test")])}
     driver = [sys.executable, str(Path(__file__).with_name("hostile_driver.py"))]
     ended = subprocess.run(

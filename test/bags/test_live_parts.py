@@ -161,7 +161,7 @@ def test_topics_of_the_table_are_those_of_the_rack(tmp_path: Path) -> None:
 
 
 def test_topics_outside_of_the_rack_are_left_alone() -> None:
-    """A table comes from the network: it cannot make the recorder listen elsewhere, or to what is no type."""
+    """A table comes from the network: it cannot make the recorder listen elsewhere, or to what is not a type."""
     variables = [
         Variable(0, "A%", VariableType.INTEGER, direction=Direction.OUT, topic="/cmd_vel"),
         Variable(1, "B%", VariableType.INTEGER, direction=Direction.OUT, topic="/line1/common/B"),

@@ -60,7 +60,7 @@ class Wire:
         self.rack.run(seconds / 2)
 
     def join(self) -> int:
-        """Send the image and the states anew; return where they begin among the messages."""
+        """Send the image and the states again; return where they begin among the messages."""
         start = len(self.sent)
         self.stream.send_image()
         for processor in self.rack.processors:

@@ -15,7 +15,7 @@ from automax_ros.core.numbers import stored_real
 from .support import TICK, mapping_constant, run
 
 STEP = 1e-6
-"""How far beside a limit is still and no more inside, relative: some 16 times the resolution of a REAL."""
+"""How far off a limit is still inside, and how far is outside, relative: some 16 times the resolution of a REAL."""
 LIMITED = 7004
 TICKS = 4
 PI = math.pi
@@ -318,7 +318,7 @@ def test_a_tunable_moves_between_its_low_and_high(low, high, kp):
 
 
 def test_a_bad_constant_causes_no_second_error():
-    """What WLD's low limit is beside a KP that cannot be nobody knows; the high one holds all the same."""
+    """With an impossible KP nobody knows WLD's low limit; the high one holds all the same."""
     (found,) = prop_int("KP=500.0, WLD=-5.0")
     assert "KP = 500" in found.message
     assert [item.message[:3] for item in prop_int("KP=500.0, WLD=1000000.0")] == ["KP ", "WLD"]

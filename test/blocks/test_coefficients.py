@@ -55,7 +55,7 @@ def test_each_limit_at_its_edges_from_both_sides(block, limit, period):
 
 
 def test_the_real_nearest_to_a_limit_counts_as_the_limit():
-    """0.01 as a REAL is 0.0099999998: neither a CALL that writes WM=0.01 nor one beside a variable KI is at fault."""
+    """0.01 as a REAL is 0.0099999998: neither a CALL that writes WM=0.01 nor one with a variable KI is at fault."""
     stored = stored_real(0.01)[0]
     assert stored < 0.01
     assert evaluate(CATALOGUE["INTEGRATE"], 0.0055, {"KI": 1.0, "WM": stored})[1] is False

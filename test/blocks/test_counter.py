@@ -82,7 +82,7 @@ def test_the_count_stops_at_32_bits_and_logs(preset, plus, minus, after_one_back
 
 
 def test_plus_less_minus_is_added_in_one_step():
-    """At the top 5 in and 5 out are no move, hence no overflow."""
+    """At the top 5 in and 5 out do not move it, hence no overflow."""
     block = run("COUNTER")
     block.scan(reset=True, preset=LARGEST)
     block.scan(input_plus=5, input_minus=5)

@@ -180,7 +180,7 @@ def test_before_its_first_scan_all_is_zero():
 
 
 def test_small_integral_terms_are_not_lost():
-    """An error of 1 with KI = 1 at 10 ms is 0.01 count a scan: 1 count in 100 scans, 1000 counts in 100,000."""
+    """An error of 1 with KI = 1 at 10 ms is 0.01 count per scan: 1 count in 100 scans, 1000 counts in 100,000."""
     block = pid(kp=0.0, ki=1.0)
     outputs = [block.scan(input=1, feedback=0)["output"] for _ in range(10_000)]
     assert outputs[48:52] == [0, 0, 1, 1]

@@ -49,7 +49,7 @@ def test_a_rate_of_minus_32768_counts_as_32768_and_rate_clamps():
 
 
 def test_scale_makes_the_rates_counts_per_second():
-    """The manual's example: 100 scans a second, 500 counts/s move 5 counts a scan."""
+    """The manual's example: 100 scans per second, 500 counts/s move 5 counts per scan."""
     block = run("RAMP", accel_rate=500, scale=100)
     assert scans(block, 3, input=1000) == [5, 10, 15]
     assert block.scan(input=1000)["rate"] == 500

@@ -189,7 +189,7 @@ def test_a_limit_lowered_in_motion_is_reached_at_the_jerk_rate():
 
 
 def test_scale_makes_rates_and_jerk_counts_per_second():
-    """As in the manual's example: 100 scans a second, 500 counts/s move 5 counts a scan."""
+    """As in the manual's example: 100 scans per second, 500 counts/s move 5 counts per scan."""
     block = run("S_CURVE", scale=100, accel_rate=500, jerk_rate=250)
     outputs, speeds = moves(block, 5, input=1000)
     assert speeds == [250, 500, 500, 500, 500]

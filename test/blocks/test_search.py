@@ -180,7 +180,7 @@ def test_a_common_table_is_read_in_the_present_state_of_memory(scan):
 
 @pytest.mark.parametrize(("value", "reads"), [(20, [10, 20]), (99, [10, 20, 30, 40])])
 def test_a_record_of_the_scan_has_what_was_read_up_to_the_match(value, reads):
-    """A replay never guesses: common memory read beside the latch is part of the record."""
+    """A replay never guesses: common memory read past the latch is part of the record."""
     text = """10 COMMON T%(3), REF%
 20 LOCAL OUT%
 30 CALL SCAN_LOOP(TICKS=4)

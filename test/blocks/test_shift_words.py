@@ -48,7 +48,7 @@ class Columns:
 
 
 class Shifter:
-    """A SHIFT block beside its model; ``shown`` are its data outputs."""
+    """A SHIFT block and its model; ``shown`` are its data outputs."""
 
     def __init__(self, name, columns, channels=1, **literals):
         self.block = run(name, max_columns=columns, channels=channels, **literals)

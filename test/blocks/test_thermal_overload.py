@@ -209,11 +209,11 @@ OUT_OF_RANGE = [
 ]
 
 
-@pytest.mark.parametrize(("name", "given", "limit", "beside"), OUT_OF_RANGE)
+@pytest.mark.parametrize(("name", "given", "limit", "others"), OUT_OF_RANGE)
 @pytest.mark.parametrize("literal", [True, False])
-def test_parameters_out_of_range_are_limited_and_logged_once(name, given, limit, beside, literal):
-    limited = run("THERMAL_OVERLOAD", 10 * MS, **beside, **({name: given} if literal else {}))
-    right = run("THERMAL_OVERLOAD", 10 * MS, **beside, **{name: limit})
+def test_parameters_out_of_range_are_limited_and_logged_once(name, given, limit, others, literal):
+    limited = run("THERMAL_OVERLOAD", 10 * MS, **others, **({name: given} if literal else {}))
+    right = run("THERMAL_OVERLOAD", 10 * MS, **others, **{name: limit})
     errors = []
     for _ in range(400):
         shown = limited.scan(i_fdbk=9000, **({} if literal else {name: given}))
@@ -227,8 +227,8 @@ def test_parameters_out_of_range_are_limited_and_logged_once(name, given, limit,
     ("name", "low", "high"), [("lim_bar", 115, 400), ("threshold", 110, 124), ("trip_time", 10, 120)]
 )
 def test_both_ends_of_a_range_are_legal(name, low, high):
-    beside = {"threshold": 110} if name == "lim_bar" else {}
-    assert logged_by(run("THERMAL_OVERLOAD", 10 * MS, **beside), [{name: low}, {name: high}]) == [0, 0]
+    others = {"threshold": 110} if name == "lim_bar" else {}
+    assert logged_by(run("THERMAL_OVERLOAD", 10 * MS, **others), [{name: low}, {name: high}]) == [0, 0]
 
 
 def test_leaving_the_range_again_is_logged_again():

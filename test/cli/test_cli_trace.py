@@ -102,7 +102,7 @@ def test_header_may_be_in_lower_case_with_blanks_brackets_and_a_byte_order_mark(
     ],
 )
 def test_cells_of_every_type(automax, column, cell, shown):
-    """COUNT! gains STEPS% = 3 in the scan and SCALED is computed anew; the others are left alone."""
+    """COUNT! gains STEPS% = 3 in the scan and SCALED is computed again; the others are left alone."""
     assert columns_of(automax.trace(f"{column}\n{cell}\n").out)[column] == [shown]
 
 

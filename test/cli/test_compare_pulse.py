@@ -160,7 +160,7 @@ def test_output_has_both_outputs_and_totals_of_every_scan(automax):
 
 
 def test_trace_and_compare_fit_together(automax):
-    """The output of a trace has columns that are no feedback, and times."""
+    """The output of a trace has columns that are not feedback, and times."""
     task = (
         "10 COMMON STEP%, POSITION%\n20 CALL SCAN_LOOP(TICKS=1)\n"
         "30 CALL SUMMER(INPUT1=POSITION%, INPUT2=STEP%, OUTPUT=POSITION%)\n40 END\n"
@@ -173,7 +173,7 @@ def test_trace_and_compare_fit_together(automax):
 
 
 def test_empty_cells_repeat_the_row_before(automax):
-    """At first 0 and no reset; spreadsheets write 5.0 beside empty cells."""
+    """At first 0 and no reset; spreadsheets write 5.0 next to empty cells."""
     table = b"\xef\xbb\xbf POSITION% ,CLEAR@\r\n,\r\n5.0,\r\n,1.0\r\n,\r\n8,OFF\r\n\r\n"
     compared(automax, table, "--column", "POSITION%", "--reset", "CLEAR@", "--word-size", "12", "--output", "OUT.csv")
     columns = columns_of((automax.folder / "OUT.csv").read_text())

@@ -126,7 +126,7 @@ def test_asking_for_the_state_changes_nothing(text, history):
 
 
 def forced_tasks_agree(text: str, history, forced: dict[str, object]) -> None:
-    """From the second scan on commons are forced, after the third no more."""
+    """From the second scan on commons are forced, after the third no longer."""
     program = checked(text)
     (task, memory), (in_steps, other) = installed(program), installed(program)
     model = Interpreter(program)

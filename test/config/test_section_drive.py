@@ -129,7 +129,7 @@ def test_readme_names_only_what_exists(config):
 
 
 def test_line_ramps_at_its_rate(rack):
-    """RAMP with SCALE=91 gains 164/91 of a count a scan, exactly; that is 164 counts/s within 0.1 %."""
+    """RAMP with SCALE=91 gains 164/91 of a count per scan, exactly; that is 164 counts/s within 0.1 %."""
     values = [reference for (reference,) in sampled(rack, 16.0, "LINE_REF%")]
     # LINE scans before SEQUENCE at time 0, so it sees RUN@ on its second scan
     assert values == [min(164 * scan // 91, CRUISE) for scan in range(len(values))]

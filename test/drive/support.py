@@ -1,4 +1,4 @@
-"""What the tests of the drive share: circuits, firing plans, and an independent integration beside them."""
+"""What the tests of the drive share: circuits, firing plans, and an independent integration to compare with."""
 
 from math import pi, radians
 
@@ -45,7 +45,7 @@ def fire_all(circuit, gates):
         circuit.fire(on, off, number)
 
 
-def beside(circuit, **options):
+def oracle_of(circuit, **options):
     """The independent integration of the same circuit."""
     z = circuit.machine
     line = circuit.line

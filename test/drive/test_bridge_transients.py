@@ -7,7 +7,7 @@ import pytest
 
 from automax_ros.drive.events import EventKind
 
-from .support import beside, circuit_of, currents_at, fire_all, oracle_gates, plan
+from .support import circuit_of, currents_at, fire_all, oracle_gates, oracle_of, plan
 
 WINDOW_NS = 1e9 / 360
 
@@ -28,7 +28,7 @@ def compare(circuit, oracle, times, *, at_most=0.005):
 
 
 def run(circuit, gates, times, **options):
-    oracle = beside(circuit, step=50e-6, rtol=1e-8, **options)
+    oracle = oracle_of(circuit, step=50e-6, rtol=1e-8, **options)
     oracle.gates = oracle_gates(gates)
     fire_all(circuit, gates)
     return compare(circuit, oracle, times)
@@ -48,7 +48,7 @@ def test_start_into_an_inverting_emf():
 def test_emf_reversal_through_both_bridges():
     """Bridge 1 drives, phases back until no current flows, then bridge 2 brakes and drives the other way."""
     circuit = circuit_of(emf=150)
-    oracle = beside(circuit, step=50e-6, rtol=1e-8)
+    oracle = oracle_of(circuit, step=50e-6, rtol=1e-8)
     gates = plan([65.0] * 8 + [150.0] * 6) + plan([110.0] * 8 + [80.0] * 8, bridge=2, first_window=21)
     fire_all(circuit, gates)
     oracle.gates = oracle_gates(gates)
@@ -69,7 +69,7 @@ def test_a_phase_is_lost_and_returns(phase):
     circuit = circuit_of(emf=150, trace=False)
     gates = plan([60.0] * 40)
     fire_all(circuit, gates)
-    oracle = beside(circuit, step=50e-6, rtol=1e-8)
+    oracle = oracle_of(circuit, step=50e-6, rtol=1e-8)
     oracle.gates = oracle_gates(gates)
     lost_ns, back_ns = round(14.3 * WINDOW_NS), round(27.6 * WINDOW_NS)
     circuit.line.lose_phase(lost_ns, phase)
@@ -126,7 +126,7 @@ def test_a_shorted_scr(number):
     gates = plan([75.0] * 24)
     circuit = circuit_of(emf=100, ls=200e-6)
     fire_all(circuit, gates)
-    oracle = beside(circuit, step=50e-6, rtol=1e-8)
+    oracle = oracle_of(circuit, step=50e-6, rtol=1e-8)
     oracle.gates = oracle_gates(gates)
     failed_ns = round(12.4 * WINDOW_NS)
     times = [time for time in windows(22) if time != failed_ns]

@@ -1,4 +1,4 @@
-"""Random gate patterns on both bridges: beside the independent integration, and for their own sake."""
+"""Random gate patterns on both bridges: checked against the independent integration, and for their own sake."""
 
 from math import isfinite, pi, sqrt
 from random import Random
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .support import beside, circuit_of, currents_at, fire_all, oracle_gates, repeatable
+from .support import circuit_of, currents_at, fire_all, oracle_gates, oracle_of, repeatable
 from .switched import WAYS
 
 NUMBERS = sorted(WAYS)
@@ -35,7 +35,7 @@ def pattern(seed):
 
 def agrees(seed, step=20e-6):
     circuit, windows, shorted = pattern(seed)
-    oracle = beside(circuit, step=step, rtol=1e-8, shorted=shorted)
+    oracle = oracle_of(circuit, step=step, rtol=1e-8, shorted=shorted)
     oracle.gates = oracle_gates(windows)
     fire_all(circuit, windows)
     times = [n * 200_000 for n in range(1, 330)]

@@ -88,7 +88,7 @@ def seen(circuit):
 @repeatable
 @given(seed=st.integers(0, 10_000), kept=st.integers(0, 59))
 def test_circuit_goes_on_bit_for_bit(seed, kept):
-    """Run on, or make the circuit anew and load what it was: everything that follows is the same, in every bit."""
+    """Run on, or make the circuit again and load what it was: everything that follows is the same, in every bit."""
     steps = list(disturbances(seed))
     first = made(seed)
     for number, (what, random) in enumerate(steps):

@@ -233,7 +233,7 @@ def test_sixteen_characters_give_a_warning_seventeen_an_error() -> None:
     ],
 )
 def test_each_fault_of_a_call_is_one_error(text: str, code: str | None) -> None:
-    """Beside the blocks that it goes with, which stay without fault."""
+    """With the blocks that it goes with, which stay without fault."""
     others = [block for block in (WORDS, BITS) if text.partition("(")[0] != block.partition("(")[0]]
     found = problems(task(text, *others, declare=DECLARE))
     assert {item.code for item in found} == {code or "AMX4072"}

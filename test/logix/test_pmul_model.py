@@ -65,7 +65,7 @@ def model_difference(new, old, word_size):
 
 @dataclass
 class Model:
-    """The page written down anew, in exact fractions of a count."""
+    """The page written down a second time, in exact fractions of a count."""
 
     out: float = 0.0
     status: int = 0

@@ -51,7 +51,7 @@ def test_names(tunables):
         ("K [CURRENT=0.5, LOW=0.0, HIGH=0.95, STEP=0.1]", (0.0, 0.95, 0.0)),  # HIGH is
         ("K [CURRENT=0.1, LOW=-0.3, HIGH=0.3, STEP=0.1]", (-0.3, 0.3, 0.0)),  # -0.3 + 3 * 0.1 is not 0
         ("K [CURRENT=1.0, LOW=-1.0, HIGH=1.0, STEP=0.5]", (-1.0, 1.0, 0.5)),
-        ("K [CURRENT=0.5, LOW=0.0, HIGH=1.0]", (0.0, 1.0, 0.0)),  # the smallest step is no step for anybody
+        ("K [CURRENT=0.5, LOW=0.0, HIGH=1.0]", (0.0, 1.0, 0.0)),  # nobody would use the smallest step
         ("K% [CURRENT=5, LOW=-10, HIGH=10, STEP=5]", (-10, 10, 5)),
         ("K% [CURRENT=6, LOW=-10, HIGH=10, STEP=5]", (-10, 10, 1)),
         ("K% [CURRENT=6]", (-32768, 32767, 1)),

@@ -9,7 +9,7 @@ HEAD = "rack: LINE1\nslots:\n  0: {module: 57C435, tasks: {LINE: {priority: 5}}}
 
 
 def write(folder: Path, text: str) -> Path:
-    """Write a rack file beside a task source LINE.BLK."""
+    """Write a rack file next to a task source LINE.BLK."""
     (folder / "LINE.BLK").write_text("10 CALL SCAN_LOOP( TICKS=1 )\n20 END\n")
     path = folder / "rack.yaml"
     path.write_text(text, encoding="utf-8")

@@ -134,7 +134,7 @@ def test_only_some_tasks(bag):
 
 
 def test_restarted_task_starts_afresh(tmp_path):
-    """STOP and RUN: scans count from 0 again, blocks start anew, locals keep their values."""
+    """STOP and RUN: scans count from 0 again, blocks start again, locals keep their values."""
     counting = edited(SPEED, ("130 CALL", "125 SCANS% = SCANS% + 1\n130 CALL"), ("SUM%, F", "SUM%, SCANS%, F"))
     rack = build(tmp_path, YAML, SPEED=counting, WORK=WORK)
     stream = RackStream(rack, 7)

@@ -123,7 +123,7 @@ def test_a_block_sees_what_a_block_before_it_put_into_the_latch():
 
 
 class Counting(CommonMemory):
-    """Knows what was read beside the latch."""
+    """Knows what was read past the latch."""
 
     def __init__(self, views):
         super().__init__(views)

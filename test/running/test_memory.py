@@ -129,7 +129,7 @@ def test_a_force_is_what_everybody_sees_and_nobody_overwrites(memory):
     memory.write_now(TABLE, 5, WRITER, 0)
     assert (memory.latch(memory.plan([SPEED])), memory.read_now(SPEED)) == ((42,), 42)
     assert [memory.read_now(TABLE, element) for element in range(3)] == [5, 7, 0]
-    assert [(entry.view, entry.element) for entry in memory.drain()] == [(TABLE, 0)], "dropped writes are no entries"
+    assert [(entry.view, entry.element) for entry in memory.drain()] == [(TABLE, 0)], "dropped writes are not entries"
     assert memory.forced == {(SPEED, 0), (TABLE, 1)}
 
 

@@ -252,7 +252,7 @@ def test_only_opened_variables_can_be_written(client, config):
 
 
 def test_rate_limit_holds_back_messages(client, config):
-    """4 messages a second of a variable that changes 60 times a second; test_stream.py has the exact times."""
+    """4 messages per second of a variable that changes 60 times per second; test_stream.py has the exact times."""
     from automax_msgs.msg import CommonWrite
 
     writes = client.listen(CommonWrite, "/types/backplane")

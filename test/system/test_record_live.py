@@ -1,4 +1,4 @@
-"""`automax record` beside a running rack: the same messages as the rack's own recording, however late it joins."""
+"""`automax record` with a running rack: the same messages as the rack's own recording, however late it joins."""
 
 import re
 import shutil

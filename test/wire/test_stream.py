@@ -171,7 +171,7 @@ def test_array_is_sent_whole_once_a_scan(started):
 
 
 def test_rate_limit_spaces_messages_and_sends_the_last_value(started):
-    started.rack.run(1.0)  # SLOW! counts each 10 ms; 10 messages a second are allowed
+    started.rack.run(1.0)  # SLOW! counts each 10 ms; 10 messages per second are allowed
     times = [time for time, _ in started.values("SLOW")]
     assert times == [0, *range(100, 1000, 100)]
     assert started.values("SLOW")[1] == (100, 11), "the value of the scan at that very instant"
