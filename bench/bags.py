@@ -12,21 +12,11 @@ from automax_ros.bags.export import export_csv
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
+from automax_ros.core.types import DataType
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.wire.cdr import Message, decoder, encoder
-from automax_ros.wire.messages import (
-    NAMES,
-    Bool,
-    CommonWrite,
-    Int16,
-    Scan,
-    ScanError,
-    Values,
-    Variable,
-    VariableTable,
-    VariableType,
-)
+from automax_ros.wire.messages import NAMES, Bool, CommonWrite, Int16, Scan, ScanError, Values, Variable, VariableTable
 from automax_ros.wire.qos import LATCHED, SCAN
 from automax_ros.wire.stream import RackStream
 
@@ -82,7 +72,7 @@ def print_recording(folder: Path) -> None:
         )
         for i in range(MESSAGES)
     ]
-    variables = tuple(Variable(number, f"VALUE_{number}", VariableType.REAL) for number in range(10))
+    variables = tuple(Variable(number, f"VALUE_{number}", DataType.REAL.number) for number in range(10))
     table = encoder(NAMES[VariableTable])(VariableTable(0, "LINE1", 1, variables))
     size = sum(map(len, payloads))
     bag, table_file = folder / "bag", folder / "out.csv"

@@ -12,7 +12,7 @@ from automax_ros.bags.common_log import Cell
 from automax_ros.bags.errors import BagError
 from automax_ros.core.decimal_text import real_text
 from automax_ros.core.diagnostics import printable
-from automax_ros.wire.messages import VariableType
+from automax_ros.core.types import DataType
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Table(Protocol):
         """The rows, to be read once."""
 
 
-def column(label: str, kind: VariableType, unit: str = "") -> Column:
+def column(label: str, kind: DataType, unit: str = "") -> Column:
     """Return the column of a variable."""
     return Column(label, unit, _TYPECODES[kind], _TEXTS[kind])
 
@@ -80,17 +80,17 @@ def _text(value: Cell) -> str:
     return printable(str(value))
 
 
-_TEXTS: dict[VariableType, Callable[[Cell], str]] = {
-    VariableType.INTEGER: _whole,
-    VariableType.DOUBLE_INTEGER: _whole,
-    VariableType.REAL: _real,
-    VariableType.BOOLEAN: _whole,
-    VariableType.STRING: _text,
+_TEXTS: dict[DataType, Callable[[Cell], str]] = {
+    DataType.INTEGER: _whole,
+    DataType.DOUBLE: _whole,
+    DataType.REAL: _real,
+    DataType.BOOLEAN: _whole,
+    DataType.STRING: _text,
 }
-_TYPECODES: dict[VariableType, str] = {
-    VariableType.INTEGER: "i",
-    VariableType.DOUBLE_INTEGER: "i",
-    VariableType.REAL: "d",
-    VariableType.BOOLEAN: "b",
-    VariableType.STRING: "",
+_TYPECODES: dict[DataType, str] = {
+    DataType.INTEGER: "i",
+    DataType.DOUBLE: "i",
+    DataType.REAL: "d",
+    DataType.BOOLEAN: "b",
+    DataType.STRING: "",
 }

@@ -8,7 +8,8 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.variables import Watched, checked_table
 from automax_ros.core.decimal_text import seconds_text
-from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable, VariableType
+from automax_ros.core.types import DataType
+from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable
 
 Cell = float | str
 """A value: booleans are 0 and 1."""
@@ -139,4 +140,4 @@ _WRONG_TABLE_HINT = "no rack has sent it so; what it numbers cannot be told apar
 
 def strings_of(variables: dict[str, Variable]) -> frozenset[int]:
     """Return the numbers of the string variables."""
-    return frozenset(entry.id for entry in variables.values() if entry.type == VariableType.STRING)
+    return frozenset(entry.id for entry in variables.values() if entry.type == DataType.STRING.number)

@@ -9,17 +9,12 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.variables import Watched
-from automax_ros.wire.messages import TaskState, VariableType
+from automax_ros.core.types import DataType, type_of_name
+from automax_ros.wire.messages import TaskState
 
 NOT_COMMON = -1
 """``Watched.variable`` of a column that is no common variable."""
 _NAME = re.compile(r"(?P<task>[A-Z][A-Z0-9_]{0,63})\.(?P<field>[^()\[\]]{1,80}?) ?(?:[(\[](?P<index>\d{1,9})[)\]])?")
-_KINDS = {
-    "%": VariableType.INTEGER,
-    "!": VariableType.DOUBLE_INTEGER,
-    "@": VariableType.BOOLEAN,
-    "$": VariableType.STRING,
-}
 _HINT = "write TASK.NAME, such as SPEED.RATIO%, or TASK.NAME(3) for an element"
 
 
@@ -50,8 +45,8 @@ class WatchedLocals:
         if match is None:
             raise BagError("AMX6821", self._bag, f"{asked[:80]!r} is no name of a local", _HINT)
         task, field, index = match["task"], match["field"], int(match["index"] or 0)
-        kind = _KINDS.get(field[-1], VariableType.REAL)
-        if kind == VariableType.STRING:
+        kind = type_of_name(field)
+        if kind is DataType.STRING:
             raise BagError("AMX6828", self._bag, f"{task}.{field} holds texts, and states are numbers", "leave it out")
         label = f"{task}.{field}({index})" if match["index"] else f"{task}.{field}"
         if label not in self._columns:

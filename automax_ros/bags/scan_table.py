@@ -12,7 +12,8 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.series import WHOLE_RUN, Progress, Window
 from automax_ros.core.decimal_text import seconds_text
-from automax_ros.wire.messages import Scan, Values, Variable, VariableTable, VariableType
+from automax_ros.core.types import DataType
+from automax_ros.wire.messages import Scan, Values, Variable, VariableTable
 
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("Scan", "VariableTable"))
 _OWN = (
@@ -134,7 +135,7 @@ class ScanTable:
                 raise BagError("AMX6813", self._bag, text)
             indices[number, element] = len(self._columns)
             label = f"{direction}.{variable.name}"
-            self._columns.append(column(label, VariableType(variable.type), variable.unit))
+            self._columns.append(column(label, DataType.numbered(variable.type), variable.unit))
         return indices
 
     def _cells(self, columns: Mapping[tuple[int, int], int], values: Values) -> dict[int, Cell | None]:

@@ -15,7 +15,8 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
 from automax_ros.bags.variables import Watched
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.wire.messages import Scan, VariableType
+from automax_ros.core.types import DataType
+from automax_ros.wire.messages import Scan
 
 MAX_POINTS = 1 << 16
 """As many points of a line are kept as they are; a longer one is thinned to four points a column."""
@@ -136,7 +137,7 @@ class _Errors:
 
 
 def _check_names(bag: Path, columns: Sequence[Watched]) -> None:
-    text = next((item.label for item in columns if item.kind == VariableType.STRING), None)
+    text = next((item.label for item in columns if item.kind is DataType.STRING), None)
     if text is not None:
         raise BagError("AMX6828", bag, f"{text} holds texts, which have no place in a picture", "leave it out")
     if len(columns) > MAX_LINES:

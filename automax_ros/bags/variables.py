@@ -7,7 +7,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from automax_ros.wire.messages import Variable, VariableTable, VariableType
+from automax_ros.core.types import DataType
+from automax_ros.wire.messages import Variable, VariableTable
 
 _NAME = re.compile(r"[A-Z_][A-Z0-9_]{0,63}[%!@$]?")
 _WATCH = re.compile(r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>\d{1,9}(?:,\d{1,9}){0,3})[)\]])?")
@@ -28,7 +29,7 @@ class Watched:
     label: str
     variable: int
     element: int
-    kind: VariableType
+    kind: DataType
     unit: str = ""
 
 
@@ -44,7 +45,7 @@ def checked_table(table: VariableTable) -> dict[str, Variable]:
             raise ValueError(f"variable {entry.id} is named {entry.name[:80]!r}")
         if entry.name in by_name:
             raise ValueError(f"variable {entry.name} stands in it twice")
-        VariableType(entry.type)
+        DataType.numbered(entry.type)
         by_name[entry.name] = entry
     if len({entry.id for entry in by_name.values()}) < len(by_name):
         raise ValueError("two variables have the same number")
@@ -54,9 +55,9 @@ def checked_table(table: VariableTable) -> dict[str, Variable]:
 def watched_by_default(variables: dict[str, Variable]) -> list[Watched]:
     """Return all simple numeric and boolean variables, in the order of the table."""
     return [
-        Watched(name, entry.id, 0, VariableType(entry.type), entry.unit)
+        Watched(name, entry.id, 0, DataType.numbered(entry.type), entry.unit)
         for name, entry in variables.items()
-        if not entry.dimensions and entry.type != VariableType.STRING
+        if not entry.dimensions and entry.type != DataType.STRING.number
     ]
 
 
@@ -75,7 +76,7 @@ def _find(variables: dict[str, Variable], asked: str) -> Watched:
     entry = variables.get(match["name"]) if match else None
     if match is None or entry is None:
         raise WatchError(f"no common variable {asked[:80]!r} in the recording", _suggestion(variables, asked))
-    kind = VariableType(entry.type)
+    kind = DataType.numbered(entry.type)
     if match["subscripts"] is None:
         if entry.dimensions:
             raise WatchError(f"{entry.name} is an array", f"name one element, such as {_element_name(entry)}")

@@ -18,8 +18,9 @@ from automax_ros.bags.info import BagInfo, bag_info
 from automax_ros.bags.info_tasks import TaskFacts, task_facts
 from automax_ros.cli.bag_info_text import lines_of
 from automax_ros.cli.progress import share_shown
+from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.wire.messages import VariableType, WriterKind
+from automax_ros.core.types import DataType
 
 _WALL_CLOCK_NS = 10**9 * NS_PER_S
 """Stamps of a run from here on are times of day (September 2001); simulated runs begin at 0."""
@@ -80,7 +81,7 @@ def as_data(info: BagInfo, facts: dict[str, TaskFacts], *, checked: bool) -> dic
         "tasks": [_task(info, name, facts.get(name)) for name in dict.fromkeys([*facts, *info.tasks])],
         "variables": _variables(info),
         "writers": [
-            {"id": item.id, "name": item.name, "kind": _word(WriterKind, item.kind), "slot": item.slot}
+            {"id": item.id, "name": item.name, "kind": _writer_word(item.kind), "slot": item.slot}
             for item in (table.writers if table else ())
         ],
         "topics": [
@@ -125,8 +126,8 @@ def _task(info: BagInfo, name: str, facts: TaskFacts | None) -> dict[str, Any]:
 
 def _variables(info: BagInfo) -> dict[str, Any]:
     variables = info.table.variables if info.table else ()
-    simple = Counter(_word(VariableType, item.type) for item in variables if not item.dimensions)
-    arrays = Counter(_word(VariableType, item.type) for item in variables if item.dimensions)
+    simple = Counter(_type_word(item.type) for item in variables if not item.dimensions)
+    arrays = Counter(_type_word(item.type) for item in variables if item.dimensions)
     return {
         "count": len(variables),
         "simple": dict(simple),
@@ -135,9 +136,16 @@ def _variables(info: BagInfo) -> dict[str, Any]:
     }
 
 
-def _word(kind: type[VariableType] | type[WriterKind], number: int) -> str:
+def _type_word(number: int) -> str:
     try:
-        return kind(number).name.lower().replace("_", " ")
+        return DataType.numbered(number).word.lower()
+    except ValueError:
+        return f"kind {number}"
+
+
+def _writer_word(number: int) -> str:
+    try:
+        return WriterKind(number).name.lower()
     except ValueError:
         return f"kind {number}"
 

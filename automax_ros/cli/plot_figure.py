@@ -12,7 +12,7 @@ from automax_ros.bags.traces import ErrorMark, Line, Traces, thinned
 from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import printable
-from automax_ros.wire.messages import VariableType
+from automax_ros.core.types import DataType
 
 DPI = 120
 _LINE_STYLES = ("-", "--", ":", "-.")
@@ -50,8 +50,8 @@ def figure_of(traces: Traces, layout: Layout) -> Any:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise UsageError("plot needs matplotlib", "pip install matplotlib, or `make setup`") from error
-    analog = _lanes([line for line in traces.lines if line.variable.kind != VariableType.BOOLEAN], layout.separate)
-    logic = [line for line in traces.lines if line.variable.kind == VariableType.BOOLEAN]
+    analog = _lanes([line for line in traces.lines if line.variable.kind is not DataType.BOOLEAN], layout.separate)
+    logic = [line for line in traces.lines if line.variable.kind is DataType.BOOLEAN]
     tasks = list(dict.fromkeys(mark.task for mark in traces.errors))
     heights = [_ANALOG_IN] * len(analog)
     heights += [_ROW_IN * (len(rows) + 0.5) for rows in (logic, tasks) if rows]
@@ -127,7 +127,7 @@ def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int
     axis.set_ylabel(_plain(lines[0].variable.unit[:40]), fontsize=9)
     axis.tick_params(labelsize=8)
     axis.ticklabel_format(axis="y", useOffset=False)
-    if all(line.variable.kind != VariableType.REAL for line in lines):
+    if all(line.variable.kind is not DataType.REAL for line in lines):
         axis.yaxis.get_major_locator().set_params(integer=True)
     axis.margins(y=0.08)
     axis.grid(alpha=0.3)

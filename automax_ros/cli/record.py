@@ -27,11 +27,12 @@ from automax_ros.cli.status_line import StatusLine
 from automax_ros.cli.terminal import count_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.rack.findings import did_you_mean, quoted
 from automax_ros.rack.ros_names import namespace
 from automax_ros.wire.cdr import CdrError
-from automax_ros.wire.messages import VariableTable, WriterKind
+from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.rack_files import RACK_FILE, RackFile, RackFilesError
 
 if TYPE_CHECKING:

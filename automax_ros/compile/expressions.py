@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from automax_ros.compile import build
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.functions import BUILTINS, OVERFLOW
-from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, clamp32
+from automax_ros.core.numbers import INT32_MAX, INT32_MIN, clamp32
 from automax_ros.core.types import DataType
 from automax_ros.language.checks.typing_rules import spine
 from automax_ros.language.syntax.functions import FUNCTIONS
@@ -47,9 +47,7 @@ class Lowered:
 
 
 _BOUNDS = {
-    DataType.INTEGER: (INT16_MIN, INT16_MAX),
-    DataType.DOUBLE: (INT32_MIN, INT32_MAX),
-    DataType.BOOLEAN: (0, 1),
+    kind: (int(kind.range[0]), int(kind.range[1])) for kind in (DataType.INTEGER, DataType.DOUBLE, DataType.BOOLEAN)
 }
 
 

@@ -12,7 +12,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN
 from automax_ros.core.types import DataType, Value
 
 StateValue = Value | list[Value]
@@ -33,7 +32,8 @@ _VARIABLES = (Role.LOCAL, Role.TUNABLE)
 
 
 def _in_range(kind: DataType, value: float) -> bool:
-    return INT16_MIN <= value <= INT16_MAX if kind is DataType.INTEGER else INT32_MIN <= value <= INT32_MAX
+    low, high = kind.range
+    return low <= value <= high
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import enum
 
+from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, REAL_MAX
+
 Value = int | float | bool | str
 """A value of a variable: int for INTEGER and DOUBLE, float for REAL, bool for BOOLEAN, str for STRING."""
 Latched = tuple[Value, ...]
@@ -52,6 +54,28 @@ class DataType(enum.Enum):
         return _ZEROS[self]
 
     @property
+    def range(self) -> tuple[int | float, int | float]:
+        """The smallest and the largest value (2.4.2); 0 and 1 for a BOOLEAN, two zeros for a STRING."""
+        return _RANGES[self]
+
+    @property
+    def number(self) -> int:
+        """The number of the type in messages: ``Variable.type``."""
+        return _NUMBERS[self]
+
+    @classmethod
+    def numbered(cls, number: int) -> DataType:
+        """Return the type of a number in a message.
+
+        Raises:
+            ValueError: no type has it.
+        """
+        for kind, known in _NUMBERS.items():
+            if known == number:
+                return kind
+        raise ValueError(f"no data type has the number {number}")
+
+    @property
     def latched(self) -> bool:
         """TRUE for the types whose simple commons a scan latches (3.3)."""
         return self is not DataType.REAL and self is not DataType.STRING
@@ -71,6 +95,14 @@ _ZEROS: dict[DataType, Value] = {
     DataType.BOOLEAN: False,
     DataType.STRING: "",
 }
+_RANGES: dict[DataType, tuple[int | float, int | float]] = {
+    DataType.INTEGER: (INT16_MIN, INT16_MAX),
+    DataType.DOUBLE: (INT32_MIN, INT32_MAX),
+    DataType.REAL: (-REAL_MAX, REAL_MAX),
+    DataType.BOOLEAN: (0, 1),
+    DataType.STRING: (0, 0),
+}
+_NUMBERS = {kind: number for number, kind in enumerate(DataType, 1)}
 _BY_SUFFIX = {kind.value: kind for kind in DataType if kind.value}
 
 

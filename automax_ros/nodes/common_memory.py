@@ -19,10 +19,11 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
+from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import COMMAND_QOS, incompatible, message_class, publisher, ros_qos
-from automax_ros.rack.config import CommonVariable, Direction
+from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.writers import ROS_WRITER

@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 from pathlib import Path
 
+from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value
 
 MIN_PRIORITY, MAX_PRIORITY = 4, 11
@@ -21,14 +21,6 @@ MAX_SLOT = 15
 """Highest slot of the largest rack (J2-3106-1 p. 10-2)."""
 DEFAULT_OUT_LIMIT = 200
 """How many simple commons, from the top of the file, are published without `ros` (decision)."""
-
-
-class Direction(enum.IntEnum):
-    """What ROS 2 sees of a common variable; the numbers are those of ``Variable.direction``."""
-
-    CLOSED = 0
-    OUT = 1
-    IN = 2
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ The hardware has no presets; in the emulator one is a write by the rack at time 
 
 from __future__ import annotations
 
-from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, stored_real
+from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import VariableName
@@ -58,7 +58,7 @@ def _number(node: Node, kind: DataType) -> int | float | None:
         return _real(node.text)
     if not WHOLE.match(node.text):
         return None
-    low, high = (INT16_MIN, INT16_MAX) if kind is DataType.INTEGER else (INT32_MIN, INT32_MAX)
+    low, high = kind.range
     return int(node.text) if low <= int(node.text) <= high else None
 
 
@@ -72,8 +72,7 @@ def _real(text: str) -> float | None:
 
 
 _RANGES = {
-    DataType.INTEGER: f"a whole number from {INT16_MIN} to {INT16_MAX}",
-    DataType.DOUBLE: f"a whole number from {INT32_MIN} to {INT32_MAX}",
+    **{kind: f"a whole number from {kind.range[0]} to {kind.range[1]}" for kind in (DataType.INTEGER, DataType.DOUBLE)},
     DataType.REAL: "a number of magnitude 5.4210107E-20 to 9.2233717E18, or 0",
     DataType.BOOLEAN: "true or false",
 }

@@ -15,6 +15,7 @@ from typing import Protocol
 
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import RackConfig
@@ -24,7 +25,7 @@ from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec,
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
-from automax_ros.running.views import MemoryValueError, Write, WriteKind
+from automax_ros.running.views import MemoryValueError, Write
 
 
 class RackError(Exception):

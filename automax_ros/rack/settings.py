@@ -6,8 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.config import CommonVariable, Direction, RackConfig
+from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.findings import did_you_mean, quoted
 from automax_ros.running.views import MemoryValueError, ViewSpec, fitting
 

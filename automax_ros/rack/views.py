@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonVariable, Direction
+from automax_ros.rack.config import CommonVariable
 from automax_ros.running.views import Place, ViewSpec
 
 

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 
+from automax_ros.core.kinds import WriterKind
 from automax_ros.rack.config import RackConfig
-
-
-class WriterKind(enum.IntEnum):
-    """What a writer is; the numbers are those of ``Writer.kind``."""
-
-    TASK = 1
-    ROS = 2
-    PRESET = 3
-    OPERATOR = 6
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,13 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.span import require_scans
 from automax_ros.core.diagnostics import Diagnostic, SourceText
+from automax_ros.core.kinds import WriterKind
 from automax_ros.replay.compare import Tallies
 from automax_ros.replay.inputs import RecordedCommons
 from automax_ros.replay.report import ReplayReport
 from automax_ros.replay.stored_rack import ReplaySource, StoredRack, stored_rack
 from automax_ros.replay.task import TaskReplay
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable, WriterKind
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable
 
 DEFAULT_MAX_DIFFERENCES = 50
 """Most differences that a replay's report tells in full, unless said otherwise (decision)."""

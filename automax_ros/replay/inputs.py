@@ -11,12 +11,12 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.core.decimal_text import seconds_text
-from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, REAL_MAX
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.views import view_specs
 from automax_ros.running.registers import RegisterMap
-from automax_ros.running.views import LatchPlan, WriteKind, latch_plan
+from automax_ros.running.views import LatchPlan, latch_plan
 from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, Values
 
 Key = tuple[int, int]
@@ -24,13 +24,6 @@ Key = tuple[int, int]
 Entry = tuple[int, int, Value]
 """Variable, element, value."""
 
-_RANGES: dict[DataType, tuple[float, float]] = {
-    DataType.INTEGER: (INT16_MIN, INT16_MAX),
-    DataType.DOUBLE: (INT32_MIN, INT32_MAX),
-    DataType.REAL: (-REAL_MAX, REAL_MAX),
-    DataType.BOOLEAN: (0, 1),
-    DataType.STRING: (0, 0),
-}
 _DOUBLE = struct.Struct("<d")
 
 
@@ -64,7 +57,7 @@ class RecordedCommons:
         self.on_forces: list[Callable[[], None]] = []
         self._bag = bag
         self._sequence: int | None = None
-        self._kinds = [(item.type, _RANGES[item.type], item.elements) for item in variables]
+        self._kinds = [(item.type, item.type.range, item.elements) for item in variables]
         self._start: list[int] = []
         size = 0
         for item in variables:

@@ -25,7 +25,6 @@ from automax_ros.rack.findings import did_you_mean
 from automax_ros.rack.loader import load_stored
 from automax_ros.rack.tasks_check import check_source, commons_of
 from automax_ros.wire.messages import VariableTable
-from automax_ros.wire.rack_messages import VARIABLE_TYPES
 
 _RACK_FILE = "rack.yaml"
 _SOURCE = re.compile(r"([A-Z][A-Z0-9_]{0,7})\.BLK")
@@ -127,7 +126,7 @@ class StoredRack:
             BagError: it does not.
         """
         expected = [
-            (number, item.name, int(VARIABLE_TYPES[item.type]), item.dimensions, item.length)
+            (number, item.name, item.type.number, item.dimensions, item.length)
             for number, item in enumerate(self.config.variables)
         ]
         told = [(item.id, item.name, item.type, tuple(item.dimensions), item.length) for item in table.variables]

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Value
 from automax_ros.running.image import Image
-from automax_ros.running.views import MemoryValueError, ViewSpec, Write, WriteKind, fitting
+from automax_ros.running.views import MemoryValueError, ViewSpec, Write, fitting
 
 FORCING = "FORCINGSTATUS@"
 """The pre-defined common that is TRUE while anything is forced (2.4.6)."""

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Value
 from automax_ros.running.image import Image
 from automax_ros.running.memory import CommonMemory
-from automax_ros.running.views import ViewSpec, WriteKind
+from automax_ros.running.views import ViewSpec
 
 
 class PrivateImage(Image):

@@ -13,11 +13,12 @@ from typing import cast
 from automax_ros.compile.compiler import CompiledTask, ScanTooLong, State
 from automax_ros.compile.functions import text_of
 from automax_ros.compile.layout import Field, Layout, Role
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.running.backplane import BUS_ERROR, NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
-from automax_ros.running.views import Memory, WriteKind
+from automax_ros.running.views import Memory
 
 SCAN_TOO_LONG = 7040
 PRINTED_LINES = 1000

@@ -8,27 +8,14 @@ such a bank, so that a word and its bits show the same registers.
 from __future__ import annotations
 
 import contextlib
-import enum
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple, Protocol
 
-from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, stored_real
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Latched, Value
-
-
-class WriteKind(enum.IntEnum):
-    """How a value came into common memory; the numbers are those of ``CommonWrite.kind``.
-
-    FORCE and RELEASE are entries of the write log too: they tell from when to when a view is held.
-    """
-
-    COMMIT = 1
-    BASIC = 2
-    OUTSIDE = 3
-    FORCE = 4
-    RELEASE = 5
 
 
 @dataclass(frozen=True)
@@ -154,7 +141,7 @@ def fitting(spec: ViewSpec, value: Value) -> Value:
                 if not clamped:
                     return single
         else:
-            low, high = (INT16_MIN, INT16_MAX) if kind is DataType.INTEGER else (INT32_MIN, INT32_MAX)
+            low, high = kind.range
             if low <= value <= high and value == int(value):
                 return int(value)
     raise MemoryValueError(f"{value!r} is no value for {spec.name}, type {kind.word}")

@@ -6,49 +6,10 @@ read from a bag they are tuples.
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Sequence
 from typing import NamedTuple
 
-
-class WriteKind(enum.IntEnum):
-    """How a write came about: CommonWrite.kind."""
-
-    COMMIT = 1
-    BASIC = 2
-    OUTSIDE = 3
-    FORCE = 4
-    RELEASE = 5
-
-
-class VariableType(enum.IntEnum):
-    """Data type of a common variable: Variable.type."""
-
-    INTEGER = 1
-    DOUBLE_INTEGER = 2
-    REAL = 3
-    BOOLEAN = 4
-    STRING = 5
-
-
-class Direction(enum.IntEnum):
-    """What ROS may do with a common variable: Variable.direction."""
-
-    CLOSED = 0
-    OUT = 1
-    IN = 2
-
-
-class WriterKind(enum.IntEnum):
-    """Who writes common memory: Writer.kind."""
-
-    TASK = 1
-    ROS = 2
-    PRESET = 3
-    IO = 4
-    PLANT = 5
-    OPERATOR = 6
-    FORCE = 7
+from automax_ros.core.kinds import Direction
 
 
 class Values(NamedTuple):

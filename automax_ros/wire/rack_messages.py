@@ -8,14 +8,16 @@ from itertools import compress, groupby
 from operator import itemgetter, ne
 from typing import Any
 
+from automax_ros.core.kinds import Direction, WriteKind
 from automax_ros.core.types import DataType, Latched, Value
-from automax_ros.rack.config import CommonVariable, Direction
+from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write, WriteKind
+from automax_ros.running.views import Write
 from automax_ros.wire.messages import (
+    NAMES,
     NO_LAYOUT,
     NO_VALUES,
     Bool,
@@ -37,17 +39,9 @@ from automax_ros.wire.messages import (
     Values,
     Variable,
     VariableTable,
-    VariableType,
     Writer,
 )
 
-VARIABLE_TYPES = {
-    DataType.INTEGER: VariableType.INTEGER,
-    DataType.DOUBLE: VariableType.DOUBLE_INTEGER,
-    DataType.REAL: VariableType.REAL,
-    DataType.BOOLEAN: VariableType.BOOLEAN,
-    DataType.STRING: VariableType.STRING,
-}
 Message = tuple[object, ...]
 _SCALARS: dict[DataType, Any] = {
     DataType.INTEGER: Int16,
@@ -89,10 +83,10 @@ def _values(variables: Sequence[int], elements: Sequence[int], values: Sequence[
     return Values(variables, elements, numbers, [value for value in values if isinstance(value, str)])
 
 
-def value_type_name(variable: CommonVariable) -> str | None:
+def value_type_name(kind: DataType, *, is_array: bool) -> str | None:
     """Return the ROS type of a variable's topic, None for arrays of strings, which std_msgs cannot carry."""
-    message = _ARRAYS.get(variable.type) if variable.is_array else _SCALARS[variable.type]
-    return f"std_msgs/msg/{message.__name__}" if message else None
+    message = (_ARRAYS if is_array else _SCALARS).get(kind)
+    return NAMES[message] if message else None
 
 
 def message_maker(variable: CommonVariable) -> Callable[[Any], Message]:
@@ -162,7 +156,7 @@ class RackMessages:
             Variable(
                 number,
                 variable.name,
-                VARIABLE_TYPES[variable.type],
+                variable.type.number,
                 variable.dimensions,
                 variable.length,
                 home,

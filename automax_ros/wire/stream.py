@@ -10,8 +10,9 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from automax_ros.core.kinds import Direction
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.config import CommonVariable, Direction
+from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
 from automax_ros.running.scheduler import EventClass, EventKey
@@ -219,7 +220,7 @@ class RackStream:
         names = topic_names(variable.name for variable in variables)
         topics = {}
         for view, variable in enumerate(variables):
-            type_name = value_type_name(variable)
+            type_name = value_type_name(variable.type, is_array=variable.is_array)
             if variable.direction is not Direction.CLOSED and type_name is not None:
                 topics[view] = _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
         return topics

@@ -8,6 +8,8 @@ from typing import Any
 from hypothesis import strategies as st
 
 from automax_ros.bags.writer import BagWriter
+from automax_ros.core.kinds import Direction, WriteKind, WriterKind
+from automax_ros.core.types import DataType
 from automax_ros.wire.cdr import encode
 from automax_ros.wire.definitions import TIME, Field, message_types
 from automax_ros.wire.messages import (
@@ -15,17 +17,13 @@ from automax_ros.wire.messages import (
     NAMES,
     CommonImage,
     CommonWrite,
-    Direction,
     Int16,
     Scan,
     ScanError,
     Values,
     Variable,
     VariableTable,
-    VariableType,
-    WriteKind,
     Writer,
-    WriterKind,
 )
 from automax_ros.wire.qos import LATCHED, SCAN, VALUE
 
@@ -37,13 +35,13 @@ TABLE = VariableTable(
     rack="LINE1",
     run_id=RUN,
     variables=(
-        Variable(0, "REF%", VariableType.INTEGER, direction=Direction.OUT, topic="/line1/common/REF"),
-        Variable(1, "COUNT!", VariableType.DOUBLE_INTEGER),
-        Variable(2, "GAIN", VariableType.REAL, unit="1/s"),
-        Variable(3, "RUN@", VariableType.BOOLEAN, non_volatile=True),
-        Variable(4, "NOTE$", VariableType.STRING, length=31),
-        Variable(5, "TABLE%", VariableType.INTEGER, dimensions=(2, 3)),
-        Variable(6, "REEL$", VariableType.STRING, length=8),
+        Variable(0, "REF%", DataType.INTEGER.number, direction=Direction.OUT, topic="/line1/common/REF"),
+        Variable(1, "COUNT!", DataType.DOUBLE.number),
+        Variable(2, "GAIN", DataType.REAL.number, unit="1/s"),
+        Variable(3, "RUN@", DataType.BOOLEAN.number, non_volatile=True),
+        Variable(4, "NOTE$", DataType.STRING.number, length=31),
+        Variable(5, "TABLE%", DataType.INTEGER.number, dimensions=(2, 3)),
+        Variable(6, "REEL$", DataType.STRING.number, length=8),
     ),
     writers=(Writer(1, "SPEED", WriterKind.TASK, 1), Writer(2, "ROS", WriterKind.ROS, 0)),
 )

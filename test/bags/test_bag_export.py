@@ -14,7 +14,8 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.export import export_csv
 from automax_ros.core.decimal_text import seconds_text
 from automax_ros.core.numbers import stored_real
-from automax_ros.wire.messages import Int16, Values, Variable, VariableTable, VariableType
+from automax_ros.core.types import DataType
+from automax_ros.wire.messages import Int16, Values, Variable, VariableTable
 
 from .recordings import MS, TABLE, image_of, record, sample_recording, write_of
 
@@ -178,9 +179,9 @@ def test_values_that_do_not_fit_together(tmp_path: Path, values: Values) -> None
 @pytest.mark.parametrize(
     "variable",
     [
-        Variable(9, "=CMD()", VariableType.INTEGER),
-        Variable(9, "REF%", VariableType.INTEGER),
-        Variable(0, "NEW%", VariableType.INTEGER),
+        Variable(9, "=CMD()", DataType.INTEGER.number),
+        Variable(9, "REF%", DataType.INTEGER.number),
+        Variable(0, "NEW%", DataType.INTEGER.number),
         Variable(9, "NEW%", 6),
     ],
 )

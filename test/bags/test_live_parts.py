@@ -11,14 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.bags.live.arrival import ArrivalOrder
-from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics, value_type_name
+from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
 from automax_ros.bags.recorded_qos import MAX_DEPTH, MAX_QOS_BYTES, STREAM, recorded_qos
+from automax_ros.core.kinds import Direction
+from automax_ros.core.types import DataType
 from automax_ros.wire.cdr import CdrError, encode
 from automax_ros.wire.heads import image_head, scan_head, write_head
-from automax_ros.wire.messages import CommonImage, CommonWrite, Direction, Scan, Variable, VariableType
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, Variable
 from automax_ros.wire.qos import LATCHED
 from automax_ros.wire.rack_files import MAX_TEXT, RackFilesError, files_from_text, files_of, files_text, fingerprint
-from automax_ros.wire.rack_messages import value_type_name as racks_type_name
 from automax_ros.wire.stream import RackStream
 
 from .live_racks import build
@@ -156,24 +157,22 @@ def test_topics_of_the_table_are_those_of_the_rack(tmp_path: Path) -> None:
     assert {name: (kind.type_name, kind.qos) for name, kind in found.items()} == {
         topic.name: (topic.type_name, topic.qos) for topic in stream.topics
     }
-    for variable, told in zip(rack.config.variables, table.variables, strict=True):
-        assert value_type_name(told) == racks_type_name(variable)
 
 
 def test_topics_outside_of_the_rack_are_left_alone() -> None:
     """A table comes from the network: it cannot make the recorder listen elsewhere, or to what is not a type."""
     variables = [
-        Variable(0, "A%", VariableType.INTEGER, direction=Direction.OUT, topic="/cmd_vel"),
-        Variable(1, "B%", VariableType.INTEGER, direction=Direction.OUT, topic="/line1/common/B"),
+        Variable(0, "A%", DataType.INTEGER.number, direction=Direction.OUT, topic="/cmd_vel"),
+        Variable(1, "B%", DataType.INTEGER.number, direction=Direction.OUT, topic="/line1/common/B"),
         Variable(2, "C%", 99, direction=Direction.OUT, topic="/line1/common/C"),
-        Variable(3, "D%", VariableType.INTEGER, direction=Direction.CLOSED, topic="/line1/common/D"),
+        Variable(3, "D%", DataType.INTEGER.number, direction=Direction.CLOSED, topic="/line1/common/D"),
     ]
     assert list(LiveTopics("/line1", TABLE._replace(variables=variables)).values) == ["/line1/common/B"]
 
 
 def test_number_of_topics_is_bounded_and_told() -> None:
     variables = [
-        Variable(n, f"V{n}%", VariableType.INTEGER, direction=Direction.OUT, topic=f"/line1/common/V{n}")
+        Variable(n, f"V{n}%", DataType.INTEGER.number, direction=Direction.OUT, topic=f"/line1/common/V{n}")
         for n in range(MAX_VALUE_TOPICS + 3)
     ]
     topics = LiveTopics("/line1", TABLE._replace(variables=variables))

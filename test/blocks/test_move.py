@@ -3,8 +3,8 @@ from compile.support import OTHER, WRITER, lines, ran, run_scans, scan_in_steps,
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.running.task import Task
-from automax_ros.running.views import WriteKind
 
 from .support import int16, repeatable, run
 

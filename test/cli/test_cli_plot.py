@@ -11,7 +11,8 @@ from bags.recordings import MS, TABLE, image_of, record, sample_recording, write
 from automax_ros.bags.traces import ErrorMark, Line, Traces, traces
 from automax_ros.bags.variables import Watched
 from automax_ros.cli.plot_figure import Layout, figure_of, save
-from automax_ros.wire.messages import Scan, ScanError, VariableType
+from automax_ros.core.types import DataType
+from automax_ros.wire.messages import Scan, ScanError
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
@@ -112,7 +113,7 @@ def test_a_line_of_millions_is_drawn_with_its_peak():
     times = np.arange(2_000_000) / 1000
     values = np.sin(times)
     values[1_234_567] = 50.0
-    line = Line(Watched("GAIN", 0, 0, VariableType.REAL), times, values)
+    line = Line(Watched("GAIN", 0, 0, DataType.REAL), times, values)
     (drawn,) = lines_of(figure_of(Traces("R", 0.0, 2000.0, (line,), (), 0), Layout("t", 1000))).values()
     assert len(drawn.get_xdata()) <= 4001
     assert (1234.567, 50.0) in corners(drawn)
@@ -120,8 +121,8 @@ def test_a_line_of_millions_is_drawn_with_its_peak():
 
 @pytest.mark.parametrize("name", ["_HIDDEN", "A$B", "x^{2}$y$", "\u4e2d\x1b[31m", "\\frac"])
 def test_odd_texts_are_drawn_as_they_stand(automax, name):
-    line = Line(Watched(name, 0, 0, VariableType.REAL, name), np.array([0.0, 1.0]), np.array([0.0, 1.0]))
-    logic = Line(Watched(name, 0, 0, VariableType.BOOLEAN), np.array([0.0]), np.array([1.0]))
+    line = Line(Watched(name, 0, 0, DataType.REAL, name), np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+    logic = Line(Watched(name, 0, 0, DataType.BOOLEAN), np.array([0.0]), np.array([1.0]))
     marks = (ErrorMark(0.5, name, 1, 7001),)
     figure = figure_of(Traces("R", 0.0, 1.0, (line, logic), marks, 3), Layout(name))
     save(figure, automax.folder / "odd.svg")

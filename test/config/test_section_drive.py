@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value, bare_name
-from automax_ros.rack.config import Direction, RackConfig
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rack.ros_names import set_topic

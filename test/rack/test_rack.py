@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from automax_ros.core.kinds import WriteKind, WriterKind
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, RackError, scans_per_second
-from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER, WriterKind
+from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER
 from automax_ros.running.task import Status
-from automax_ros.running.views import MemoryValueError, WriteKind
+from automax_ros.running.views import MemoryValueError
 
 RACK = """\
 rack: LINE1

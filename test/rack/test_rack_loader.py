@@ -5,8 +5,9 @@ import dataclasses
 import pytest
 
 from automax_ros.core.diagnostics import render
+from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonMemoryConfig, Direction
+from automax_ros.rack.config import CommonMemoryConfig
 
 from .helpers import HEAD, codes, common, good, loaded
 

@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
+from automax_ros.core.kinds import Direction
 from automax_ros.rack import commons, modules
-from automax_ros.rack.config import Direction
 from automax_ros.rack.loader import load
 
 PAGE = Path(__file__).parents[2] / "docs" / "rack_yaml.md"

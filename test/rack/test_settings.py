@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonVariable, Direction, RackConfig
+from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.settings import DEFAULT_WATCHED, SettingError, Watched, setting, value_of_text, watched
 
 from .helpers import HEAD, good

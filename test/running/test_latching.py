@@ -5,9 +5,9 @@ from compile.support import OTHER, WRITER, compiled_of, repeatable, scan_in_step
 from hypothesis import given
 from hypothesis import strategies as st
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
-from automax_ros.running.views import WriteKind
 
 
 class Restless(CommonMemory):

@@ -7,9 +7,10 @@ from compile.support import OTHER, WRITER, repeatable, task_of
 from hypothesis import given
 from hypothesis import strategies as st
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
 from automax_ros.running.memory import CommonMemory
-from automax_ros.running.views import MemoryValueError, ViewSpec, WriteKind
+from automax_ros.running.views import MemoryValueError, ViewSpec
 
 VIEWS = (
     ViewSpec("SPEED%", DataType.INTEGER),

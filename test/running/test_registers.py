@@ -7,12 +7,13 @@ from compile.support import OTHER, WRITER, compiled_of, lines, repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
 from automax_ros.running.backplane import Backplane, Bank
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.private_image import PrivateImage
 from automax_ros.running.task import Task
-from automax_ros.running.views import Place, ViewSpec, WriteKind
+from automax_ros.running.views import Place, ViewSpec
 
 BANK = 0
 SPECS = (

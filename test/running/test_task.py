@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from compile.support import OTHER, WRITER, lines, logged, run_scans, scan_in_steps, task_of
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Status
-from automax_ros.running.views import WriteKind
 
 COUNTING = """10 LOCAL N%, OUT%, STARTS%
 20 STARTS% = STARTS% + 1

@@ -10,6 +10,8 @@ from types import ModuleType
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from automax_ros.core import kinds
+from automax_ros.core.types import DataType
 from automax_ros.wire import messages
 from automax_ros.wire.definitions import (
     MAX_SCHEMA_BYTES,
@@ -86,8 +88,8 @@ def test_only_the_time_has_no_class() -> None:
 @pytest.mark.parametrize(
     ("name", "values"),
     [
-        ("CommonWrite", messages.WriteKind),
-        ("Writer", messages.WriterKind),
+        ("CommonWrite", kinds.WriteKind),
+        ("Writer", kinds.WriterKind),
     ],
 )
 def test_enumerations_are_the_constants(name: str, values: type) -> None:
@@ -97,7 +99,8 @@ def test_enumerations_are_the_constants(name: str, values: type) -> None:
 
 def test_enumerations_of_variables_are_the_constants() -> None:
     constants = message_types()["automax_msgs/msg/Variable"].definition.constants
-    both = {item.name: int(item) for kind in (messages.VariableType, messages.Direction) for item in kind}
+    both = {kind.word.replace(" ", "_"): kind.number for kind in DataType}
+    both |= {item.name: int(item) for item in kinds.Direction}
     assert {item.name: int(item.value) for item in constants} == both
 
 

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import pytest
 from bags.live_racks import SPEED, YAML, build
 
+from automax_ros.core.kinds import Direction, WriteKind, WriterKind
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.types import DataType
 from automax_ros.rack.rack import Rack
 from automax_ros.wire.cdr import decode
-from automax_ros.wire.messages import Direction, VariableType, WriteKind, WriterKind
 from automax_ros.wire.qos import LATCHED, SCAN
 from automax_ros.wire.stream import SNAPSHOT_PERIOD_NS, RackStream
 
@@ -84,7 +85,7 @@ def test_table_is_the_configuration(started):
     by_name = {item.name: item for item in table.variables}
     assert [item.id for item in table.variables] == list(range(len(started.rack.config.variables)))
     assert by_name["TABLE%"].dimensions == (2, 3)
-    assert (by_name["NOTE$"].type, by_name["NOTE$"].length) == (VariableType.STRING, 8)
+    assert (by_name["NOTE$"].type, by_name["NOTE$"].length) == (DataType.STRING.number, 8)
     assert (by_name["SHUT%"].direction, by_name["SHUT%"].topic) == (Direction.CLOSED, "")
     assert (by_name["RUN@"].direction, by_name["RUN@"].topic) == (Direction.IN, "/line1/common/RUN")
     assert [(item.name, item.kind) for item in table.writers][-2:] == [

@@ -18,9 +18,10 @@ from automax_ros.bags.live.provenance import provenance
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
 from automax_ros.bags.live.tracks import Gap, TaskTrack
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
+from automax_ros.core.kinds import WriterKind
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import WriteHead, image_head, scan_head, write_head
-from automax_ros.wire.messages import VariableTable, WriterKind
+from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.rack_files import RACK_FILE, RackFile
 
 SETTLE_NS = 1_000_000_000

@@ -4,23 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from automax_ros.wire.messages import Direction, Variable, VariableTable, VariableType
+from automax_ros.core.kinds import Direction
+from automax_ros.core.types import DataType
+from automax_ros.wire.messages import Variable, VariableTable
 from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
-
-_SCALARS = {
-    VariableType.INTEGER: "Int16",
-    VariableType.DOUBLE_INTEGER: "Int32",
-    VariableType.REAL: "Float32",
-    VariableType.BOOLEAN: "Bool",
-    VariableType.STRING: "String",
-}
-_ARRAYS = {
-    VariableType.INTEGER: "Int16MultiArray",
-    VariableType.DOUBLE_INTEGER: "Int32MultiArray",
-    VariableType.REAL: "Float32MultiArray",
-    VariableType.BOOLEAN: "UInt8MultiArray",
-}
-
+from automax_ros.wire.rack_messages import value_type_name
 
 MAX_VALUE_TOPICS = 2000
 """Most topics of common variables that a recorder listens to (decision: ROS serves no more at the pace of scans)."""
@@ -69,17 +57,14 @@ def _values(space: str, table: VariableTable) -> dict[str, TopicKind]:
     """The topics of common variables; a topic outside of the rack's ``common`` is none of a rack."""
     found = {}
     for variable in table.variables:
-        type_name = value_type_name(variable)
+        type_name = _value_type_name(variable)
         if variable.direction != Direction.CLOSED and type_name and variable.topic.startswith(f"{space}/common/"):
             found[variable.topic] = TopicKind(type_name, VALUE)
     return found
 
 
-def value_type_name(variable: Variable) -> str | None:
-    """Return the ROS type of a variable's topic, None for arrays of strings, which have none."""
+def _value_type_name(variable: Variable) -> str | None:
     try:
-        kind = VariableType(variable.type)
-    except ValueError:
+        return value_type_name(DataType.numbered(variable.type), is_array=bool(variable.dimensions))
+    except ValueError:  # a table that was not written by a rack
         return None
-    name = (_ARRAYS if variable.dimensions else _SCALARS).get(kind)
-    return f"std_msgs/msg/{name}" if name else None

@@ -18,8 +18,8 @@ from automax_ros.bags.repair.contents import SCAN, WRITE, FileContents
 from automax_ros.bags.repair.provenance import Provenance
 from automax_ros.bags.repair.salvage import Piece, Salvage, SoundChunk, parsed, records
 from automax_ros.bags.unpacking import MAX_RECORD_BYTES
+from automax_ros.core.kinds import WriteKind
 from automax_ros.wire.cdr import CdrError, decode
-from automax_ros.wire.messages import WriteKind
 
 _LOOSE_BYTES = 1 << 20
 """Messages that stood outside of chunks are gathered in chunks of this size."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from automax_ros.core.numbers import (
     INT16_MAX,
-    INT16_MIN,
     INT32_MAX,
     INT32_MIN,
-    REAL_MAX,
     stored_real,
     truncated_quotient,
 )
@@ -22,13 +20,6 @@ from automax_ros.language.syntax.tree import (
     StringLiteral,
     Unary,
 )
-
-RANGES: dict[DataType, tuple[int | float, int | float]] = {
-    DataType.INTEGER: (INT16_MIN, INT16_MAX),
-    DataType.DOUBLE: (INT32_MIN, INT32_MAX),
-    DataType.REAL: (-REAL_MAX, REAL_MAX),
-}
-"""Smallest and largest value of each numeric type."""
 
 Literal = (IntegerLiteral, RealLiteral, StringLiteral, BooleanLiteral)
 
@@ -88,7 +79,7 @@ def fits(value: Value, kind: DataType) -> bool:
         return True
     if kind is DataType.REAL:
         return not stored_real(float(value))[1]
-    low, high = RANGES[kind]
+    low, high = kind.range
     if isinstance(value, float):
         return low - 1 < value < high + 1
     return low <= value <= high
@@ -96,7 +87,7 @@ def fits(value: Value, kind: DataType) -> bool:
 
 def range_text(kind: DataType) -> str:
     """Return the range of a numeric type for a message."""
-    low, high = RANGES[kind]
+    low, high = kind.range
     return f"{low} to {high}" if kind.is_integer else "-9.2233717E18 to 9.2233717E18"
 
 

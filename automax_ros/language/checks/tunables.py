@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from automax_ros.core.numbers import REAL_MIN_POSITIVE, stored_real
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.checks.constant_values import RANGES, constant_value, fits, hex_hint, is_constant, range_text
+from automax_ros.language.checks.constant_values import constant_value, fits, hex_hint, is_constant, range_text
 from automax_ros.language.checks.context import Context
 from automax_ros.language.program import TuningLimits
 from automax_ros.language.syntax.tree import Declared, Expression, Scope
@@ -23,7 +23,7 @@ def tuning_limits(context: Context, scope: Scope, declared: Declared) -> TuningL
         context.report("AMX4012", f"{declared.name} cannot be tunable", declared.span, hint)
         return None
     before = len(context.diagnostics)
-    lowest, highest = RANGES[kind]
+    lowest, highest = kind.range
     current = _value(context, declared, "CURRENT", tuning.current)
     low = _value(context, declared, "LOW", tuning.low)
     high = _value(context, declared, "HIGH", tuning.high)
