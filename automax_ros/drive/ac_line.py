@@ -17,7 +17,7 @@ from math import ceil, cos, exp, fmod, pi, sin, sqrt
 
 from automax_ros.drive.errors import LARGEST, ParameterError, require
 from automax_ros.drive.scr import PHASES
-from automax_ros.drive.state import State, Stateful, check_names
+from automax_ros.drive.state import SavedState, Stateful, check_names
 
 SEGMENT_NS = 500_000
 """Longest segment while the line moves, ns."""
@@ -234,12 +234,12 @@ class AcLine(Stateful):
         self.omega = 2 * pi * (hertz.mean(time_s) if hertz.moving else hertz.value)
         self.amplitude_v = sqrt(2 / 3) * (volts.mean(time_s) if volts.moving else volts.value)
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return the angle, the changes to come, which phases are missing, and how voltage and frequency move."""
         courses = {"frequency": self._frequency.state(), "voltage": self._voltage.state()}
         return super().state() | courses | {"missing": sorted(self.missing)}
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Take a state over.
 
         Raises:

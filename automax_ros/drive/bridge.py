@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 
 from automax_ros.drive.errors import GateError, require
 from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, numbers_of
-from automax_ros.drive.state import State, Stateful, check_names
+from automax_ros.drive.state import SavedState, Stateful, check_names
 from automax_ros.drive.wiring import Wiring
 
 REST_NS = 10
@@ -157,12 +157,12 @@ class Bridge(Stateful):
         pair = MASK[number] | MASK[PARTNER[number]]
         self.recovering &= ~pair
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return gates, latches and failures."""
         wiring = asdict(self.wiring) | {"phase_arc_v": list(self.wiring.phase_arc_v)}
         return super().state() | {"wiring": wiring}
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Take a state over.
 
         Raises:

@@ -14,13 +14,13 @@ from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.conduction import Conduction
 from automax_ros.drive.errors import GateError, ParameterError
-from automax_ros.drive.events import Event, EventKind
+from automax_ros.drive.events import CircuitEvent, EventKind
 from automax_ros.drive.meter import Sample
 from automax_ros.drive.motor import Machine
 from automax_ros.drive.network import Network
 from automax_ros.drive.scr import BIT, mask_of, numbers_of
 from automax_ros.drive.search import Phases
-from automax_ros.drive.state import State, check_names
+from automax_ros.drive.state import SavedState, check_names
 from automax_ros.drive.waves import ZERO_A, Piece
 from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC
 
@@ -133,9 +133,9 @@ class Circuit(Conduction):
         """Return the armature current since the last sample, interval by interval, without those where none flowed."""
         return [Piece(*piece) for piece in self._pieces]
 
-    def take_events(self) -> list[Event]:
+    def take_events(self) -> list[CircuitEvent]:
         """Return what happened since the last call; the last 10,000 are kept, ``events_lost`` counts the others."""
-        events = [Event(*raw) for raw in self._events]
+        events = [CircuitEvent(*raw) for raw in self._events]
         self._events.clear()
         return events
 
@@ -230,7 +230,7 @@ class Circuit(Conduction):
 
     # What can be kept
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return all that the future depends on, with line, bridge and machine: plain data that JSON keeps exactly.
 
         What has not been taken yet of events and of the present sample is in it too.
@@ -246,7 +246,7 @@ class Circuit(Conduction):
             "guards": [[net.mask, [guard[0] for guard in net.guards]] for net in self._built()],
         }
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Take over the state of a circuit that was made alike, and go on from there, bit for bit.
 
         Raises:

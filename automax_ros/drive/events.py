@@ -37,7 +37,7 @@ ROUTINE = frozenset({EventKind.TURN_ON, EventKind.EXTINCTION, EventKind.COMMUTAT
 
 
 @dataclass(frozen=True)
-class Event:
+class CircuitEvent:
     """One thing that happened.
 
     Attributes:

@@ -8,7 +8,7 @@ from math import exp, fmod, pi, sqrt
 from typing import Protocol
 
 from automax_ros.drive.errors import LARGEST, SMALLEST, ParameterError, require
-from automax_ros.drive.state import State, Stateful, check_names
+from automax_ros.drive.state import SavedState, Stateful, check_names
 
 SpeedLoad = Callable[[float], float]
 """A load torque (N m) that depends on the speed (rad/s), such as a fan's; positive torque brakes positive speed."""
@@ -43,10 +43,10 @@ class Machine(Protocol):
     def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
         """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return all that its future depends on, besides what it was made of."""
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Take a state over."""
 
 
@@ -74,7 +74,7 @@ class FixedLoad(Stateful):
 
 
 @dataclass
-class Field(Stateful):
+class FieldWinding(Stateful):
     """The field: flux of its current, which follows its voltage with a time constant.
 
     ``flux = (1 + s) x / (s + x)`` with x the current and flux over rated, s = ``knee`` (0.5 is a usual machine's).
@@ -178,7 +178,7 @@ class Motor(Stateful):
         *,
         load: float | SpeedLoad = 0.0,
         load_callback: LoadCallback | None = None,
-        field: Field | None = None,
+        field: FieldWinding | None = None,
         speed_rad_s: float = 0.0,
     ) -> None:
         """Begin at a speed.
@@ -253,12 +253,12 @@ class Motor(Stateful):
         if self.field is not None:
             self.field.advance(duration_s)
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return speed, angle, field and energies, and the load torque where it is a number (None where a function)."""
         field = self.field.state() if self.field else None
         return super().state() | {"field": field, "load": None if callable(self.load) else self.load}
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Take a state over; a load that is a function stays the motor's own.
 
         Raises:

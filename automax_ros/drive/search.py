@@ -9,12 +9,12 @@ from automax_ros.drive.network import Network
 from automax_ros.drive.waves import ZERO_A, first_zero
 
 Phases = tuple[float, float, float]
-State = tuple[float, float, float, float, float]
+Start = tuple[float, float, float, float, float]
 """At the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
 
 
 def next_ending(
-    net: Network, omega: float, state: State, modes: Phases, limit: float
+    net: Network, omega: float, state: Start, modes: Phases, limit: float
 ) -> tuple[float, int, tuple[float, float, float] | None]:
     """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs.
 
@@ -71,7 +71,7 @@ def next_turn_on(
     emf: float,
     wanted: int,
     now_ns: float,
-    state: State,
+    state: Start,
     limit: float,
 ) -> tuple[float, int]:
     """Return when (s from now) forward voltage first turns on SCRs of a mask, and which; inf if not before a limit.

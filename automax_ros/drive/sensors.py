@@ -6,7 +6,7 @@ from math import pi
 from random import Random
 
 from automax_ros.drive.errors import ParameterError, require
-from automax_ros.drive.state import State, Stateful, check_names
+from automax_ros.drive.state import SavedState, Stateful, check_names
 
 TURN = 2 * pi
 
@@ -19,12 +19,12 @@ class _Sensor(Stateful):
         self.lost = False
         self._random = Random(seed)
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return whether it is lost, and where its noise has come to."""
         version, words, following = self._random.getstate()
         return super().state() | {"noise": [version, list(words), following]}
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Take a state over; the readings that follow are those that would have followed.
 
         Raises:

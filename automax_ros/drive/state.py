@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from automax_ros.drive.errors import ParameterError
 
-State = dict[str, Any]
+SavedState = dict[str, Any]
 """Numbers, texts, None, and lists and dicts of them, by name."""
 
 
@@ -18,11 +18,11 @@ class Stateful:
 
     _kept: ClassVar[tuple[str, ...]] = ()
 
-    def state(self) -> State:
+    def state(self) -> SavedState:
         """Return all that the part's future depends on, besides what it was made of."""
         return {name: _plain(getattr(self, name)) for name in self._kept}
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Take a state over; what comes then is what would have come after ``state()``, bit for bit.
 
         Raises:
@@ -38,7 +38,7 @@ class Stateful:
             setattr(self, name, value)
 
 
-def check_names(part: str, state: State, names: tuple[str, ...]) -> None:
+def check_names(part: str, state: SavedState, names: tuple[str, ...]) -> None:
     """Check that a state holds what it must.
 
     Raises:

@@ -13,7 +13,7 @@ from automax_ros.drive.circuit import Circuit
 from automax_ros.drive.coupling import Coupling
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.motor import Field, FixedLoad, Motor, MotorData
+from automax_ros.drive.motor import FieldWinding, FixedLoad, Motor, MotorData
 from automax_ros.drive.sensors import Resolver, Tachometer
 
 SECOND = 1_000_000_000
@@ -82,18 +82,18 @@ def test_a_callback_is_asked_with_time_and_speed():
 
 
 def test_field_follows_its_voltage_and_saturates():
-    field = Field(tau_s=0.8, knee=0.5, current=1.0, voltage=0.4)
+    field = FieldWinding(tau_s=0.8, knee=0.5, current=1.0, voltage=0.4)
     assert field.flux(0.0) == pytest.approx(1.0)
     field.advance(0.3)
     field.advance(0.5)
     assert field.current == pytest.approx(0.4 + 0.6 * exp(-1))
     assert field.flux(0.0) == pytest.approx(1.5 * field.current / (0.5 + field.current))
     assert field.flux_of(-0.7) == -field.flux_of(0.7)
-    assert Field().flux(0.1) == 1.0
+    assert FieldWinding().flux(0.1) == 1.0
 
 
 def test_a_weak_field_makes_less_emf_and_less_torque():
-    motor = Motor(DATA, field=Field(tau_s=0.5, voltage=0.5), speed_rad_s=100.0)
+    motor = Motor(DATA, field=FieldWinding(tau_s=0.5, voltage=0.5), speed_rad_s=100.0)
     assert motor.emf(0.0) == pytest.approx(250.0)
     coast(motor, 8.1)
     assert motor.k_v_s == pytest.approx(1.25, rel=1e-6)
@@ -242,8 +242,8 @@ def test_sensors_leave_the_modules_random_source_alone():
         lambda: MotorData(0.1, 2e-3, 2.5, -1.0),
         lambda: MotorData(0.1, 2e-3, 2.5, 1.5, -0.1),
         lambda: FixedLoad(0.1, float("nan")),
-        lambda: Field(tau_s=-1.0),
-        lambda: Field(knee=0.0),
+        lambda: FieldWinding(tau_s=-1.0),
+        lambda: FieldWinding(knee=0.0),
         lambda: Tachometer(50.0, noise_v=-1.0),
         lambda: Resolver(1),
     ],

@@ -14,7 +14,7 @@ from automax_ros.drive.circuit import Circuit
 from automax_ros.drive.coupling import Coupling
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.motor import Field, FixedLoad, Motor
+from automax_ros.drive.motor import FieldWinding, FixedLoad, Motor
 from automax_ros.drive.nameplate import EXAMPLES, derive
 from automax_ros.drive.sensors import Resolver, Tachometer
 
@@ -27,7 +27,7 @@ SLICE_NS = 700_000
 
 def motor(random):
     load = random.choice([0.0, 300.0, lambda speed: 0.01 * speed * abs(speed)])
-    field = random.choice([None, Field(tau_s=0.5, knee=0.5)])
+    field = random.choice([None, FieldWinding(tau_s=0.5, knee=0.5)])
     return Motor(PARAMETERS.motor, load=load, field=field, speed_rad_s=random.choice([0.0, 60.0, 150.0, -80.0]))
 
 
@@ -209,4 +209,4 @@ def test_state_of_something_else_is_refused():
     with pytest.raises(ParameterError, match="another choice of energy"):
         circuit.restore(state | {"energy": None if state["energy"] else {}})
     with pytest.raises(ParameterError, match="another field or another kind of load"):
-        Motor(PARAMETERS.motor).restore(Motor(PARAMETERS.motor, field=Field()).state())
+        Motor(PARAMETERS.motor).restore(Motor(PARAMETERS.motor, field=FieldWinding()).state())
