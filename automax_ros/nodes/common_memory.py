@@ -5,102 +5,109 @@ file and the tasks' sources as JSON), ``backplane`` (automax_msgs/CommonWrite), 
 (automax_msgs/CommonImage, latched, sent anew to each late joiner of either), ``common/NAME`` (std_msgs, latched) for
 each variable with ``ros: out`` or ``ros: in``.
 
-Subscribes: ``common/NAME/set`` (std_msgs, reliable) for each variable with ``ros: in``, and for no other.
+Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, and for no other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from rclpy.context import Context
-from rclpy.event_handler import QoSPublisherMatchedInfo, SubscriptionEventCallbacks
-from rclpy.node import Node
+from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSPolicyKind
 from std_msgs.msg import String
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
+from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.throttle import Throttle
-from automax_ros.nodes.topics import COMMAND_QOS, incompatible, message_class, publisher, ros_qos
+from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.config import CommonVariable
-from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.writers import ROS_WRITER
-from automax_ros.running.health import Health
 from automax_ros.running.views import MemoryValueError
-from automax_ros.wire.qos import LATCHED
+from automax_ros.wire.qos import LATCHED, QosProfile
 from automax_ros.wire.rack_files import files_of, files_text
-from automax_ros.wire.stream import RackStream, Topic
+from automax_ros.wire.stream import Topic
 
 REFUSAL_INTERVAL_S = 1.0
-"""A variable's refused writes are reported at most this often."""
+"""A variable's refused writes are logged at most this often."""
+COMMAND = QosProfile("reliable", "volatile", "keep_last", 10)
+BEST_EFFORT_COMMAND = QosProfile("best_effort", "volatile", "keep_last", 10)
 
 
-class CommonMemoryNode(Node):  # type: ignore[misc]
-    """Serves the topics of common memory; its callbacks run between scans, on the thread that scans."""
+class CommonMemoryNode(ModuleNode):
+    """Serves the topics of common memory; its callbacks run between scans."""
 
-    def __init__(
-        self,
-        rack: Rack,
-        stream: RackStream,
-        context: Context,
-        catch_up: Callable[[], None] = lambda: None,
-        health: Health | None = None,
-    ) -> None:
-        """Create publishers and subscriptions; messages flow once the stream begins.
-
-        ``catch_up`` brings rack time to the present, ``health`` counts what is refused.
-        """
-        super().__init__("common_memory", namespace=f"/{rack.config.namespace}", context=context)
-        self._rack, self._stream, self._catch_up = rack, stream, catch_up
-        self._health = health or Health()
-        self._publishers_by_name: dict[str, Publisher[Any]] = {}
+    def __init__(self, site: Site) -> None:
+        """Create publishers and subscriptions; messages flow once the stream begins."""
+        super().__init__(site, "common_memory")
+        rack, stream = site.rack, site.stream
+        self._outlets: dict[str, Publisher[Any]] = {}
         for own in stream.topics:
             if own.slot is None:
                 joined = own in (stream.snapshot_topic, stream.backplane_topic)
-                self._publishers_by_name[own.name] = publisher(self, own, self._health, self._join if joined else None)
+                # The image that waits for a late joiner may be as old as the run.
+                self._outlets[own.name] = self.outlet(own, stream.send_image if joined else None)
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
         self._config.publish(String(data=files_text(rack.config.name, files_of(rack))))
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
-                self._subscribe(view, variable, topic)
+                _Inlet(self, view, variable, topic)
         stream.add_sink(self._publish)
 
     def _publish(self, topic: Topic, _: int, payload: bytes) -> None:
-        found = self._publishers_by_name.get(topic.name)
+        found = self._outlets.get(topic.name)
         if found is not None:
             found.publish(payload)
 
-    def _join(self, matched: QoSPublisherMatchedInfo) -> None:
-        """Send the image anew to a late joiner: the one that waits for it may be as old as the run."""
-        if matched.total_count_change > 0:
-            self._catch_up()
-            self._stream.send_image()
 
-    def _subscribe(self, view: int, variable: CommonVariable, topic: Topic) -> None:
-        name = set_topic(topic.name)
-        lost = incompatible(self, f"what a writer of {name} sends is lost", self._health)
-        events = SubscriptionEventCallbacks(incompatible_qos=lost)
-        kind = message_class(topic.type_name)
-        self.create_subscription(kind, name, self._writer(view, variable), COMMAND_QOS, event_callbacks=events)
+class _Inlet:
+    """Writes of one variable from ROS.
 
-    def _writer(self, view: int, variable: CommonVariable) -> Callable[[Any], None]:
-        """Return the callback that writes a variable."""
-        throttle = Throttle(REFUSAL_INTERVAL_S)
+    A reliable subscription alone would not hear best-effort publishers, a best-effort one alone would lose messages of
+    reliable ones. So a best-effort one is opened when such a publisher comes, and from its first message on it takes
+    those of all publishers: rclpy does not tell which of two copies is the same message.
+    """
 
-        def write(message: Any) -> None:
-            self._catch_up()
-            try:
-                self._rack.write_view(view, _elements(variable, message), ROS_WRITER)
-            except MemoryValueError as error:
-                refusal = f"write refused: {error}"
-                self._health.note("refused write", variable.name, lambda: refusal)
-                if throttle.passes():
-                    self.get_logger().warning(refusal)
+    def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
+        self._node, self._view, self._variable = node, view, variable
+        self._name, self._kind = set_topic(topic.name), message_class(topic.type_name)
+        self._hears_best_effort = self._is_best_effort = False
+        self._throttle = Throttle(REFUSAL_INTERVAL_S)
+        node.create_subscription(
+            self._kind,
+            self._name,
+            node.inside(self._name, self._take_reliable),
+            ros_qos(COMMAND),
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=node.inside(self._name, self._not_heard)),
+        )
 
-        return write
+    def _not_heard(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
+        if info.last_policy_kind != QoSPolicyKind.RELIABILITY:
+            self._node.misfit(f"what a writer of {self._name} sends is lost", info)
+        elif not self._hears_best_effort:
+            self._hears_best_effort = True
+            callback = self._node.inside(self._name, self._take_best_effort)
+            self._node.create_subscription(self._kind, self._name, callback, ros_qos(BEST_EFFORT_COMMAND))
+
+    def _take_best_effort(self, message: Any) -> None:
+        self._is_best_effort = True
+        self._write(message)
+
+    def _take_reliable(self, message: Any) -> None:
+        if not self._is_best_effort:
+            self._write(message)
+
+    def _write(self, message: Any) -> None:
+        try:
+            self._node.site.rack.write_view(self._view, _elements(self._variable, message), ROS_WRITER)
+        except MemoryValueError as error:
+            refusal = f"write refused: {error}"
+            self._node.site.health.note("refused write", self._variable.name, lambda: refusal)
+            if self._throttle.passes():
+                self._node.get_logger().warning(refusal)
 
 
 def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:

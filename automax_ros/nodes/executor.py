@@ -11,6 +11,7 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 _TRIAL_PERIOD_S = 0.001
 _TRIAL_LIMIT_S = 0.2
@@ -34,7 +35,15 @@ def make_executor(context: Context) -> Any:
 
 def dispatches(executor: Any, context: Context) -> bool:
     """Return whether an executor carries out the callback of a timer that is due."""
-    node = Node("executor_trial", context=context, enable_rosout=False, start_parameter_services=False)
+    # A service of rclpy's own would outlive its node in the graph.
+    quiet = [Parameter("start_type_description_service", value=False)]
+    node = Node(
+        "executor_trial",
+        context=context,
+        enable_rosout=False,
+        start_parameter_services=False,
+        parameter_overrides=quiet,
+    )
     hits: list[bool] = []
     timer = node.create_timer(_TRIAL_PERIOD_S, lambda: hits.append(True))
     try:

@@ -8,7 +8,6 @@ Services: ``~/pause`` and ``~/resume`` (std_srvs/Trigger).
 
 from __future__ import annotations
 
-import importlib
 import re
 import time
 from collections.abc import Callable
@@ -19,7 +18,6 @@ from ament_index_python import get_resources
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
@@ -29,10 +27,10 @@ from automax_ros.bags.playback import PlayTopic, Renaming, Survey
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.executor import make_executor
+from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.wire.cdr import CdrError, decoder, encoder
 from automax_ros.wire.definitions import message_types
 from automax_ros.wire.messages import Clock
-from automax_ros.wire.qos import QosProfile
 
 CLOCK_PERIOD_NS = 10 * NS_PER_MS
 """How often ``/clock`` is sent."""
@@ -132,7 +130,7 @@ class Player:
                 if kind is not None:
                     self._open(topic, kind)
         if self._with_clock:
-            kind = _class("rosgraph_msgs", "Clock")
+            kind = message_class("rosgraph_msgs/msg/Clock")
             self._clock = self._node.create_publisher(kind, "/clock", 1)
 
     def play(self, stopping: Callable[[], bool], on_idle: Callable[[], None]) -> bool:
@@ -173,7 +171,7 @@ class Player:
     def _open(self, topic: PlayTopic, kind: Any) -> None:
         name = self._renaming.topic(topic.name)
         try:
-            publisher = self._node.create_publisher(kind, name, _ros_qos(topic.qos))
+            publisher = self._node.create_publisher(kind, name, ros_qos(topic.qos))
         except (ValueError, RuntimeError) as error:  # a name that ROS refuses, for example
             topic.fault = f"ROS refuses it: {str(error).splitlines()[0][:120]}"
             return
@@ -291,21 +289,7 @@ def _installed(topic: PlayTopic) -> Any | None:
         topic.fault = f"its type {topic.type_name[:100]} is not installed"
         return None
     try:
-        return _class(match[1], match[2])
+        return message_class(topic.type_name)
     except (ImportError, AttributeError):
         topic.fault = f"its type {topic.type_name[:100]} is not installed"
         return None
-
-
-def _class(package: str, name: str) -> Any:
-    return getattr(importlib.import_module(f"{package}.msg"), name)
-
-
-def _ros_qos(profile: QosProfile) -> QoSProfile:
-    reliable, latched = profile.reliability == "reliable", profile.durability == "transient_local"
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=profile.depth,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )

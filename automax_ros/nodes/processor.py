@@ -12,28 +12,25 @@ Its tasks' run-time errors and PRINT lines go to /rosout.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.context import Context
-from rclpy.event_handler import QoSPublisherMatchedInfo
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.throttle import Throttle
-from automax_ros.nodes.topics import publisher
 from automax_ros.nodes.tunables import Tunable, tunables_of
-from automax_ros.rack.rack import Processor, Rack
+from automax_ros.rack.rack import Processor
 from automax_ros.running.error_log import LogEntry
-from automax_ros.running.health import Health
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.running.views import Write
-from automax_ros.wire.stream import RackStream, Topic
+from automax_ros.wire.stream import Topic
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S
 ERROR_INTERVAL_S = 1.0
@@ -42,28 +39,18 @@ ERRORS_SHOWN = 5
 """... and then so many of one scan."""
 
 
-class ProcessorNode(Node):  # type: ignore[misc]
+class ProcessorNode(ModuleNode):
     """Serves one Processor; the scheduler of the rack scans its tasks."""
 
-    def __init__(
-        self,
-        rack: Rack,
-        processor: Processor,
-        stream: RackStream,
-        context: Context,
-        catch_up: Callable[[], None] = lambda: None,
-        health: Health | None = None,
-    ) -> None:
-        """Create publishers and parameters, and observe the rack.
-
-        ``catch_up`` brings rack time to the present, ``health`` counts run-time errors.
-        """
-        super().__init__(f"processor_{processor.slot}", namespace=f"/{rack.config.namespace}", context=context)
-        self._rack, self._processor, self._stream, self._catch_up = rack, processor, stream, catch_up
-        self._health = health or Health()
-        own = [topic for topic in stream.module_topics if topic.slot == processor.slot]
-        self._publishers_by_topic: dict[Topic, Publisher[Any]] = {
-            topic: publisher(self, topic, self._health, self._join) for topic in own
+    def __init__(self, site: Site, processor: Processor) -> None:
+        """Create publishers and parameters, and observe the rack."""
+        super().__init__(site, f"processor_{processor.slot}")
+        rack, stream = site.rack, site.stream
+        self._rack, self._processor = rack, processor
+        self._outlets: dict[Topic, Publisher[Any]] = {
+            topic: self.outlet(topic, partial(stream.send_states, processor.slot))
+            for topic in stream.module_topics
+            if topic.slot == processor.slot
         }
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(processor.tasks)}
@@ -84,14 +71,18 @@ class ProcessorNode(Node):  # type: ignore[misc]
         """Report errors and printed lines of the Processor's own tasks."""
         if task.slot != self._processor.slot:
             return
-        for line, code in record.errors:
-            entry = LogEntry(line, code, record.scan)
-            self._health.note("run-time error", (task, line, code), lambda: f"{task.name}: {entry.describe()}")  # noqa: B023
-        if record.errors and self._error_throttles[task.name].passes():
-            for line, code in record.errors[:ERRORS_SHOWN]:
-                self.get_logger().warning(f"{task.name}: {LogEntry(line, code, record.scan).describe()}")
+        if record.errors:
+            self._report_errors(task, record)
         while task.printed:
             self.get_logger().info(f"{task.name}: {task.printed.popleft()}")
+
+    def _report_errors(self, task: Task, record: ScanRecord) -> None:
+        told = self._error_throttles[task.name].passes()
+        for number, (line, code) in enumerate(record.errors):
+            describe = partial(_described, task, LogEntry(line, code, record.scan))
+            self.site.health.note("run-time error", (task.name, line, code), describe)
+            if told and number < ERRORS_SHOWN:
+                self.get_logger().warning(describe())
 
     def written(self, writes: list[Write]) -> None:
         """Writes from outside are no matter of a Processor."""
@@ -105,15 +96,9 @@ class ProcessorNode(Node):  # type: ignore[misc]
         self._publish_diagnostics(now_ns)
 
     def _publish(self, topic: Topic, _: int, payload: bytes) -> None:
-        found = self._publishers_by_topic.get(topic)
+        found = self._outlets.get(topic)
         if found is not None:
             found.publish(payload)
-
-    def _join(self, matched: QoSPublisherMatchedInfo) -> None:
-        """Send a late joiner of scans or states what it needs to follow the tasks."""
-        if matched.total_count_change > 0:
-            self._catch_up()
-            self._stream.send_states(self._processor.slot)
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         """Refuse what a task would refuse, before any of the parameters is set; those that are no tunables pass."""
@@ -129,16 +114,18 @@ class ProcessorNode(Node):  # type: ignore[misc]
 
     def _tune(self, parameters: list[Parameter[Any]]) -> None:
         """Tune tasks by the parameters that have been set."""
-        self._catch_up()
-        for parameter in parameters:
-            tunable = self._tunables.get(parameter.name)
-            if tunable is not None:
-                self._rack.tune(tunable.task, tunable.variable, parameter.value)
+        with self.site.lock:
+            self.site.pacer.catch_up()
+            for parameter in parameters:
+                tunable = self._tunables.get(parameter.name)
+                if tunable is not None:
+                    self._rack.tune(tunable.task, tunable.variable, parameter.value)
 
     def _publish_diagnostics(self, now_ns: int) -> None:
         statuses = [self._status(task, now_ns) for task in self._processor.tasks]
         message = DiagnosticArray(status=statuses)
-        message.header.stamp = self.get_clock().now().to_msg()
+        stamp = self.site.stream.stamp(now_ns)
+        message.header.stamp = Time(sec=stamp // NS_PER_S, nanosec=stamp % NS_PER_S)
         self._diagnostics.publish(message)
 
     def _status(self, task: Task, now_ns: int) -> DiagnosticStatus:
@@ -173,3 +160,7 @@ class ProcessorNode(Node):  # type: ignore[misc]
             hardware_id=f"{self._rack.config.name} slot {task.slot}",
             values=[KeyValue(key=key, value=f"{value:g}") for key, value in values.items()],
         )
+
+
+def _described(task: Task, entry: LogEntry) -> str:
+    return f"{task.name}: {entry.describe()}"

@@ -1,0 +1,119 @@
+"""What the nodes of all kinds of module share: the rack they serve, and the door through which ROS enters it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.context import Context
+from rclpy.event_handler import (
+    PublisherEventCallbacks,
+    QoSOfferedIncompatibleQoSInfo,
+    QoSPublisherMatchedInfo,
+    QoSRequestedIncompatibleQoSInfo,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import qos_policy_name_from_kind
+
+from automax_ros.nodes.guard import guard_services
+from automax_ros.nodes.topics import message_class, ros_qos
+from automax_ros.rack.rack import Rack
+from automax_ros.running.health import Health
+from automax_ros.running.pacer import Pacer
+from automax_ros.wire.stream import RackStream, Topic
+
+MOST_TOLD, MOST_LOGGED = 300, 20
+"""So many characters of an error are told, and so many failed callbacks are logged."""
+_SIM_TIME = "use_sim_time"
+
+
+@dataclass(frozen=True)
+class Site:
+    """One rack that lives in this process, as its nodes see it.
+
+    Attributes:
+        rack: the rack.
+        stream: the messages that it sends.
+        pacer: what keeps it on the wall clock.
+        context: of all its nodes.
+        health: where they report trouble.
+        lock: held by whoever touches the rack; one thread at a time, between scans.
+    """
+
+    rack: Rack
+    stream: RackStream
+    pacer: Pacer
+    context: Context
+    health: Health
+    lock: threading.RLock = field(default_factory=threading.RLock)
+
+
+class ModuleNode(Node):  # type: ignore[misc]
+    """A module's node: in the rack's namespace, on its time, and safe from what clients ask of its parameters."""
+
+    def __init__(self, site: Site, name: str) -> None:
+        """Join the graph."""
+        # The rack is the clock: its stamps are the grid's, whatever a launch file says to all nodes.
+        own_time = [Parameter(_SIM_TIME, value=False)]
+        space = f"/{site.rack.config.namespace}"
+        super().__init__(name, namespace=space, context=site.context, parameter_overrides=own_time)
+        self.site = site
+        self.add_on_set_parameters_callback(_refuse_simulated_time)
+        guard_services(self, self.report)
+
+    def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Publisher[Any]:
+        """Return a publisher of a topic; it takes CDR bytes. ``joined`` is called for each reader that comes."""
+
+        def matched(info: QoSPublisherMatchedInfo) -> None:
+            if joined is not None and info.total_count_change > 0:
+                joined()
+
+        def incompatible(info: QoSOfferedIncompatibleQoSInfo) -> None:
+            self.misfit(f"a reader of {topic.name} gets nothing", info)
+
+        events = PublisherEventCallbacks(
+            matched=self.inside(topic.name, matched) if joined is not None else None,
+            incompatible_qos=self.inside(topic.name, incompatible),
+        )
+        kind = message_class(topic.type_name)
+        return self.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events)
+
+    def misfit(self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo) -> None:
+        """Tell of a reader or writer with an incompatible quality of service; ``what`` says what is lost."""
+        policy = str(qos_policy_name_from_kind(info.last_policy_kind)).lower()
+        text = f"{what}: its quality of service does not fit ({policy})"
+        self.site.health.note("QoS conflict", what, lambda: text, times=info.total_count_change)
+        self.get_logger().warning(text)
+
+    def inside(self, what: str, action: Callable[..., None]) -> Callable[..., None]:
+        """Return an action as a callback: in the rack's present, between two scans, its exceptions reported."""
+
+        def entered(*arguments: Any) -> None:
+            with self.site.lock:
+                try:
+                    self.site.pacer.catch_up()
+                    action(*arguments)
+                except Exception as error:
+                    self.report(what, error)
+
+        return entered
+
+    def report(self, what: str, error: Exception) -> None:
+        """Count what failed, and tell it: a client may go on and on, so the log gets the first of them only."""
+        text = f"{what}: {type(error).__name__}: {str(error)[:MOST_TOLD]}"
+        health = self.site.health
+        health.note("failed callback", (what, type(error)), lambda: text)
+        if health.counts["failed callback"] <= MOST_LOGGED:
+            self.get_logger().error(text)
+
+
+def _refuse_simulated_time(parameters: list[Parameter[Any]]) -> SetParametersResult:
+    """Refuse ``use_sim_time``: the rack's own time is what its messages are stamped with."""
+    wanted = any(parameter.name == _SIM_TIME and parameter.value for parameter in parameters)
+    reason = "the rack keeps its own time; use_sim_time cannot be set on its nodes" if wanted else ""
+    return SetParametersResult(successful=not wanted, reason=reason)

@@ -1,0 +1,158 @@
+"""A rack as ROS 2 nodes in any program: in its context, in its executor.
+
+rclpy.init()
+executor = SingleThreadedExecutor()
+nodes = RackNodes("rack.yaml")
+nodes.add_to(executor)
+nodes.start()
+executor.spin()        # serves your nodes and the rack's; a thread of the rack's own keeps its pace
+nodes.close()
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.utilities import get_default_context
+
+from automax_ros.core.types import Value
+from automax_ros.nodes.common_memory import CommonMemoryNode
+from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack, RackError
+from automax_ros.running.health import Health
+from automax_ros.running.pacer import START_LEAD_NS, Pacer
+from automax_ros.wire.stream import RackStream
+
+
+class RackNodes:
+    """The nodes of one rack, and the rack in them.
+
+    ``add_to`` an executor and ``start``, then let it spin; or ``start`` with ``paced=False`` and ``run``, which spins
+    it between scans on one thread. ``close`` in any case (a ``with`` block does). Whoever touches ``rack`` meanwhile
+    holds ``lock``: scans and messages from outside do, so nothing ever falls into a scan.
+
+    Attributes:
+        rack: the rack.
+        stream: its messages, for a recorder.
+        health: what went wrong so far.
+        nodes: the node of each module.
+    """
+
+    def __init__(self, rack: Rack | Path | str, *, context: Context | None = None) -> None:
+        """Create the nodes; nothing runs yet.
+
+        Args:
+            rack: a rack that was not started, or the path of its YAML file.
+            context: the context of all nodes, initialised; rclpy's default one if None.
+
+        Raises:
+            RackError: the YAML file or a task has errors, which ``findings`` holds.
+        """
+        self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack))
+        run_id = int.from_bytes(os.urandom(8), "big") >> 1
+        self.stream = RackStream(self.rack, run_id)
+        self.health = Health()
+        self._executor: Any = None
+        self._pacer = Pacer(self.rack.scheduler, wait=self._serve)
+        self._context = get_default_context() if context is None else context
+        self._site = Site(self.rack, self.stream, self._pacer, self._context, self.health)
+        self.lock = self._site.lock
+        self._begun = self._closed = False
+        self._thread: threading.Thread | None = None
+        memory = CommonMemoryNode(self._site)
+        processors = [ProcessorNode(self._site, processor) for processor in self.rack.processors]
+        self.nodes: tuple[ModuleNode, ...] = (memory, *processors)
+
+    def add_to(self, executor: Any) -> None:
+        """Let an executor of rclpy serve the nodes: any kind, alone or with nodes of your own."""
+        self._executor = executor
+        for node in self.nodes:
+            executor.add_node(node)
+
+    def start(self, settings: Sequence[tuple[str, Value]] = (), *, paced: bool = True) -> None:
+        """Send what stands at the start and put the rack into RUN; rack time 0 comes in a moment.
+
+        Args:
+            settings: those of ``Rack.start``, which raises what it says.
+            paced: whether a thread scans from then on; without one, ``run`` does.
+        """
+        with self.lock:
+            self._pacer.begin(START_LEAD_NS)
+            self.stream.begin(time.time_ns() + START_LEAD_NS)
+            self._begun = True
+            self.rack.start(settings)
+        if paced:
+            self._thread = threading.Thread(target=self._keep_pace, name=self.rack.config.namespace, daemon=True)
+            self._thread.start()
+
+    def run(
+        self,
+        until_ns: int | None = None,
+        on_idle: Callable[[int], None] | None = None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Scan, and spin the executor in between, until rack time ``until_ns``, or asked to stop (``Pacer.run``).
+
+        All on this thread. No exception of any callback ends it.
+        """
+        self._pacer.run(until_ns, on_idle, should_stop)
+
+    def close(self) -> None:
+        """Stop the tasks, send what is still to be sent, and leave the graph; a second time this does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        if self._thread is not None:
+            self._thread.join()
+        with self.lock:
+            self.rack.stop()
+            if self._begun:
+                self.stream.end()
+        for node in self.nodes:
+            if self._executor is not None:
+                self._executor.remove_node(node)
+            node.destroy_node()
+
+    def __enter__(self) -> RackNodes:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close."""
+        self.close()
+
+    def _keep_pace(self) -> None:
+        try:
+            while not self._closed:
+                with self.lock:
+                    wait_s = self._pacer.step()
+                time.sleep(wait_s)
+        except Exception as error:
+            self.nodes[0].report(f"rack {self.rack.config.name} has ended", error)
+
+    def _serve(self, seconds: float) -> None:
+        """Let the executor carry out one callback; one that fails is reported and the rack goes on."""
+        try:
+            self._executor.spin_once(timeout_sec=seconds)
+        except Exception as error:
+            if not self._context.ok():
+                raise
+            self.nodes[0].report("a message or a request was dropped", error)
+
+
+def _loaded(path: Path) -> Rack:
+    result = load(path)
+    if result.config is None:
+        raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
+    return Rack(result.config, stopwatch=time.perf_counter_ns)
