@@ -16,6 +16,7 @@ from automax_ros.blocks.coefficients import (
     times_c,
 )
 from automax_ros.blocks.declaration import Block, Coefficients, Form, Input, Limit, Output, Relation, State, Time, Times
+from automax_ros.blocks.dynamic_parameters import RESET, WM
 from automax_ros.blocks.dynamics import Dynamics, Integrator, corners_at
 from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
@@ -23,9 +24,7 @@ from automax_ros.core.types import DataType
 
 _INPUT = Input("INPUT", DataType.INTEGER, "I", "signal input", required=True, form=Form.VARIABLE)
 _WLG = Input("WLG", DataType.REAL, "WLG", "lag frequency in rad/s", required=True)
-_WM = Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL)
 _INITIAL_VALUE = Input("INITIAL_VALUE", DataType.INTEGER, "IV", "the output while RESET is TRUE", default=0)
-_RESET = Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False)
 _LAG_LIMITS = (
     Limit("WM", per_period(2.0**-17), per_period(2.0 * math.pi / 4.5), "2**-17 / T", "2 pi / (4.5 T)"),
     Limit("WLG", times_c(TWO_TO_MINUS_18), times_c(0.71), "C x 2**-18", "0.71 C", uses=("WM",)),
@@ -69,27 +68,34 @@ def lag_step(
     return output, x1, y1
 
 
-LAG = Block(
-    name="LAG",
-    section="43",
-    title="Lag",
-    function="1 / (1 + s/WLG)",
-    inputs=(_INPUT, _WLG, _WM, _INITIAL_VALUE, _RESET),
-    outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the filtered signal"),),
-    states=(State("x1", DataType.INTEGER, 0), State("y1", DataType.REAL, 0.0)),
-    coefficients=Coefficients(
+def _coefficients(dynamics: Dynamics) -> Coefficients:
+    """Return the coefficients of LAG and of DIFF_LAG."""
+    return Coefficients(
         parameters=("WLG", "WM"),
         names=("gain", "feedback", "span"),
         limits=_LAG_LIMITS,
         defaults=mapping_default,
         compute=lag_coefficients,
-        dynamics=Dynamics(
+        dynamics=dynamics,
+    )
+
+
+LAG = Block(
+    name="LAG",
+    section="43",
+    title="Lag",
+    function="1 / (1 + s/WLG)",
+    inputs=(_INPUT, _WLG, WM, _INITIAL_VALUE, RESET),
+    outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the filtered signal"),),
+    states=(State("x1", DataType.INTEGER, 0), State("y1", DataType.REAL, 0.0)),
+    coefficients=_coefficients(
+        Dynamics(
             transfer=lag_transfer,
             laplace="1 / (1 + s/{WLG:.6g})".format_map,
             equation="y = gain (x + x1) + feedback y1".format_map,
             corners=corners_at("WLG"),
             integrator=Integrator("y1", _lag_rate, "WLG / C", what="OUTPUT"),
-        ),
+        )
     ),
     times=Times(Time(26.52), Time(118.0), Time(41.0), Time(18.56)),
     notes=(_RANGE_NOTE.format(what="OUTPUT"),),
@@ -134,22 +140,17 @@ DIFF_LAG = Block(
     section="41",
     title="Differentiator lag",
     function="(s/WLG) / (1 + s/WLG)",
-    inputs=(_INPUT, _WLG, _WM, _INITIAL_VALUE, _RESET),
+    inputs=(_INPUT, _WLG, WM, _INITIAL_VALUE, RESET),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "what changes in the signal"),),
     states=(State("x1", DataType.INTEGER, 0), State("integrator", DataType.REAL, 0.0)),
-    coefficients=Coefficients(
-        parameters=("WLG", "WM"),
-        names=("gain", "feedback", "span"),
-        limits=_LAG_LIMITS,
-        defaults=mapping_default,
-        compute=lag_coefficients,
-        dynamics=Dynamics(
+    coefficients=_coefficients(
+        Dynamics(
             transfer=diff_lag_transfer,
             laplace="(s/{WLG:.6g}) / (1 + s/{WLG:.6g})".format_map,
             equation="y = x - i,  i = gain (x + x1) + feedback i1".format_map,
             corners=corners_at("WLG"),
             integrator=Integrator("integrator", _lag_rate, "WLG / C", what=_IN_FEEDBACK, in_feedback=True),
-        ),
+        )
     ),
     times=Times(Time(33.04), Time(154.0), Time(41.50), Time(23.12)),
     notes=(
@@ -229,9 +230,9 @@ LEAD_LAG = Block(
         _INPUT,
         Input("WLD", DataType.REAL, "WLD", "lead frequency in rad/s", required=True),
         _WLG,
-        _WM,
+        WM,
         _INITIAL_VALUE,
-        _RESET,
+        RESET,
     ),
     outputs=(Output("OUTPUT", DataType.INTEGER, "O", "the filtered signal"),),
     states=(State("x1", DataType.INTEGER, 0), State("y1", DataType.REAL, 0.0)),

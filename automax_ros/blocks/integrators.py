@@ -15,7 +15,8 @@ from automax_ros.blocks.coefficients import (
     per_period,
     times_c,
 )
-from automax_ros.blocks.declaration import Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.declaration import Block, Coefficients, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.dynamic_parameters import RESET, SATURATED, WM
 from automax_ros.blocks.dynamics import Dynamics, Integrator, corners_at
 from automax_ros.blocks.transfer import Transfer, mapped
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
@@ -81,17 +82,16 @@ INTEGRATE = Block(
     inputs=(
         Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
         Input("KI", DataType.REAL, "KI", "gain in 1/s", required=True),
-        Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL),
+        WM,
         Input("INITIAL_VALUE", DataType.INTEGER, "IV", "the output while RESET is TRUE", default=0),
         Input("LIMIT_PLUS", DataType.INTEGER, "LP", "upper limit of the integrator", default=INT16_MAX),
         Input("LIMIT_MINUS", DataType.INTEGER, "LM", "lower limit of the integrator", default=-32767),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        RESET,
         Input("HOLD_PLUS", DataType.BOOLEAN, "HP", "TRUE keeps OUTPUT from becoming more positive", default=False),
         Input("HOLD_MINUS", DataType.BOOLEAN, "HM", "TRUE keeps OUTPUT from becoming more negative", default=False),
     ),
     outputs=(
-        Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
-        Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
+        *SATURATED,
         Output("OUTPUT", DataType.INTEGER, "O", "the integral"),
     ),
     states=(State("x1", DataType.INTEGER, 0), State("y1", DataType.REAL, 0.0)),
@@ -189,11 +189,11 @@ PROP_INT = Block(
         Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
         Input("KP", DataType.REAL, "KP", "proportional gain", required=True),
         Input("WLD", DataType.REAL, "WLD", "lead frequency in rad/s", required=True),
-        Input("WM", DataType.REAL, "WM", "mapping frequency in rad/s, (2 pi / T) / 20 unless given", form=Form.LITERAL),
+        WM,
         Input("INITIAL_VALUE", DataType.INTEGER, "IV", "output and integrator while RESET is TRUE", default=0),
         Input("LIMIT_PLUS", DataType.INTEGER, "LP", "upper limit of integrator and output", default=INT16_MAX),
         Input("LIMIT_MINUS", DataType.INTEGER, "LM", "lower limit of integrator and output", default=INT16_MIN),
-        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        RESET,
         Input(
             "HOLD_PLUS", DataType.BOOLEAN, "HP", "TRUE keeps the integrator from becoming more positive", default=False
         ),
@@ -202,8 +202,7 @@ PROP_INT = Block(
         ),
     ),
     outputs=(
-        Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
-        Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
+        *SATURATED,
         Output("OUTPUT", DataType.INTEGER, "O", "integrator plus KP times INPUT"),
     ),
     states=(State("x1", DataType.INTEGER, 0), State("integrator", DataType.REAL, 0.0)),

@@ -18,6 +18,7 @@ from automax_ros.blocks.declaration import (
     Time,
     Times,
 )
+from automax_ros.blocks.dynamic_parameters import SATURATED
 from automax_ros.blocks.dynamics import Dynamics, Integrator
 from automax_ros.blocks.transfer import Transfer
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, REAL_LIMIT
@@ -234,8 +235,7 @@ PID = Block(
         ),
     ),
     outputs=(
-        Output("SATURATED_PLUS", DataType.BOOLEAN, "SP", "TRUE if OUTPUT reaches LIMIT_PLUS", required=False),
-        Output("SATURATED_MINUS", DataType.BOOLEAN, "SM", "TRUE if OUTPUT reaches LIMIT_MINUS", required=False),
+        *SATURATED,
         Output("ERROR", DataType.INTEGER, "E", "INPUT - FEEDBACK, or with ACTION the reverse", required=False),
         Output("OUTPUT", DataType.INTEGER, "O", "the controller's output"),
     ),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.bounds import loose_bounds, range_within
 from automax_ros.blocks.coefficients import is_within
-from automax_ros.blocks.declaration import Block, Limit
+from automax_ros.blocks.declaration import Block, Coefficients, Limit
 from automax_ros.language.checks.context import Context
 from automax_ros.language.syntax.tree import BooleanLiteral, Element, Expression, IntegerLiteral, RealLiteral, Variable
 
@@ -66,7 +66,7 @@ def check_coefficients(
             del known[limit.parameter]
     _check_relation(context, block, values, known)
     if block.coefficients.executed_every in known:
-        _check_loop_time(context, block, values[block.coefficients.executed_every], period)
+        _check_own_period(context, block.coefficients, values[block.coefficients.executed_every], period)
 
 
 def _sides(
@@ -109,20 +109,16 @@ def _check_relation(
         context.report("AMX4084", message, last.span, "choose others; `automax blocks` tells the rule of the block")
 
 
-def _check_loop_time(context: Context, block: Block, given: Expression, period: float) -> None:
+def _check_own_period(context: Context, declared: Coefficients, given: Expression, period: float) -> None:
     """Warn of a time between executions that cannot be: the block runs in each scan or each n-th (50)."""
     if not isinstance(given, RealLiteral) or any("EVENT" in call.arguments for call in context.calls.values()):
         return
     scans = max(1, round(given.value / period)) if given.value < 1e6 * period else 0
     if scans == 0 or abs(given.value - scans * period) <= LOOP_TIME_MISS * given.value:
         return
-    message = f"LOOP_TIME = {given.value:.7g} s is {given.value / period:.4g} scan periods of {period * 1000.0:g} ms"
-    assert block.coefficients is not None
-    least = max(
-        limit.low(period, {})
-        for limit in block.coefficients.limits
-        if limit.parameter == block.coefficients.executed_every
-    )
+    name, scan = declared.executed_every, f"{period * 1000.0:g} ms"
+    message = f"{name} = {given.value:.7g} s is {given.value / period:.4g} scan periods of {scan}"
+    least = max(limit.low(period, {}) for limit in declared.limits if limit.parameter == name)
     while not is_within(scans * period, least, math.inf):
         scans += 1
     hint = f"write {scans * period:.7g} if the block runs in every{'' if scans == 1 else f' {_ordinal(scans)}'} scan"
