@@ -113,7 +113,8 @@ def evaluate_noting(
 
     There is a bit for each limit, in their order, that a parameter had to be moved to, and one for the relation; so a
     second parameter that goes out of its limits is noticed while the first still is. ``kept`` is what the last
-    evaluation gave to keep: the parameters of the relation, 0 as long as there was none.
+    evaluation gave to keep: the parameters of the relation, 0 as long as there was none. While a variable breaks the
+    relation, the last pair that kept it stays in force (decision).
     """
     declared = block.coefficients
     if declared is None:

@@ -158,7 +158,8 @@ class Output:
 class State:
     """A value that a block keeps from scan to scan: ``initial`` at its first execution since RUN.
 
-    INTEGER states are ints of any width the step function keeps to, REAL states double precision. A state with a
+    INTEGER states are ints of any width the step function keeps to; REAL states and coefficients are double precision,
+    not a REAL's 24 bits (decision). A state with a
     ``size`` is a buffer: the number of its elements comes from the facts of the CALL, by lower-case name: its literals
     and defaults, and the ``CALL_FACTS``. A place in a buffer, or a count of places, is always 0 or more and less than
     what ``below`` gives; a snapshot that breaks this is refused.
@@ -250,10 +251,10 @@ class Coefficients:
 
     ``parameters`` are the inputs they come from; ``names`` the values handed to the step function;
     ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that is not programmed,
-    such as WM, is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits is limited and
-    logs AMX7004. A literal beyond them is an error of the task, unless ``limits_literals``: then it is limited and
-    logged too. ``dynamics`` is what they make of the block. ``executed_every`` names a literal that tells the time
-    between executions in s.
+    such as WM, is filled in by ``defaults(period_s)`` before. A variable one that leaves its limits counts as the
+    nearest limit and logs AMX7004 on the scan in which it leaves them, not while it stays beyond (decision). A literal
+    beyond them is an error of the task, unless ``limits_literals``: then it is limited and logged too. ``dynamics`` is
+    what they make of the block. ``executed_every`` names a literal that gives the time between executions in s.
     """
 
     parameters: tuple[str, ...]

@@ -51,7 +51,8 @@ def integrate_step(
 
     A hold keeps the integrator from moving that way, then the limits act, themselves cut to the range of section 51;
     LIMIT_PLUS comes last and wins. While RESET is TRUE, INITIAL_VALUE is shown as it is, even beyond a
-    limit or the range, and the next free scan limits it; the history of INPUT goes on (decisions).
+    limit or the range, and the next free scan limits it; the history of INPUT goes on (decisions). SATURATED compares
+    OUTPUT as shown, not the range of section 51 (decision).
     """
     if reset:
         y1 = float(initial_value)

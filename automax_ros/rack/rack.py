@@ -276,6 +276,7 @@ class Rack:
         return processors
 
     def _write_presets(self) -> None:
+        """Write presets, as a writer of their own, at the start (decision): the hardware has none."""
         for view, variable in enumerate(self.config.variables):
             for element, value in enumerate(variable.presets):
                 self.memory.write_from_outside(view, value, PRESET_WRITER, element)
