@@ -10,9 +10,9 @@ from typing import Protocol
 
 from automax_ros.bags.common_log import Cell
 from automax_ros.bags.errors import BagError
-from automax_ros.core.decimal_text import real_text
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import printable
 from automax_ros.core.types import DataType
+from automax_ros.core.values import real_text
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.variables import Watched, checked_table
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import printable
 
 
 class BagError(Exception):
@@ -11,12 +11,12 @@ class BagError(Exception):
     ``code`` is the problem's code (AMX68nn), ``place`` names the file or folder, ``hint`` says what to do.
     """
 
-    def __init__(self, code: str, place: object, message: str, hint: str = "") -> None:
+    def __init__(self, code: str, place: object, message: str, hint: str | None = None) -> None:
         super().__init__(code, place, message, hint)
         self.code = code
         self.place = printable(str(place))
         self.message = printable(message)
-        self.hint = printable(hint)
+        self.hint = printable(hint or "")
 
     def __str__(self) -> str:
         text = f"{self.place}: error[{self.code}]: {self.message}"

@@ -10,7 +10,7 @@ from automax_ros.bags.columns import Column, Table, column, require_another_file
 from automax_ros.bags.common_log import Cell
 from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
 from automax_ros.bags.whole_file import written_whole
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.ticks import seconds_text
 
 TIME = "time_s"
 """Heading of the times, which count from the start of the run."""

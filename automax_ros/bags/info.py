@@ -18,7 +18,7 @@ from automax_ros.bags.opening import NO_BAG_HINT, size_of
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.series import Progress
 from automax_ros.bags.unpacking import DAMAGED_HINT
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.ticks import seconds_text
 from automax_ros.wire.cdr import CdrError, decoder
 from automax_ros.wire.definitions import message_types
 from automax_ros.wire.heads import scan_head

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.variables import Watched
+from automax_ros.core.text import near_or_listed
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.wire.messages import TaskState
 
@@ -93,19 +93,10 @@ class WatchedLocals:
         for column, field, index in asked:
             if field not in fields:
                 text = f"task {state.task} has no local {field[:80]!r}"
-                raise BagError("AMX6821", self._bag, text, _suggestion(state.task, field, fields))
+                raise BagError("AMX6821", self._bag, text, near_or_listed(field, fields, f"{state.task}."))
             start, size = fields[field]
             if index >= size:
                 text = f"element {index} of {state.task}.{field[:80]} is out of range"
                 raise BagError("AMX6821", self._bag, text, f"the largest is {size - 1}")
             found.append((column, start + index))
         return found
-
-
-def _suggestion(task: str, field: str, fields: Mapping[str, object]) -> str:
-    names = list(fields)[:5000]
-    near = difflib.get_close_matches(field, names, n=3, cutoff=0.6)
-    near += [name for name in names if name.rstrip("%!@$") == field.rstrip("%!@$") and name not in near]
-    if near:
-        return f"did you mean {' or '.join(f'{task}.{name}' for name in near[:3])}?"
-    return f"it has {', '.join(names[:8])}{' ...' if len(names) > 8 else ''}"

@@ -16,7 +16,7 @@ from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE
 from automax_ros.bags.opening import no_recording, opened, size_of
 from automax_ros.bags.schemas import require_known
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import printable
 from automax_ros.wire.cdr import CdrError, Message, decoder
 
 MAX_METADATA_BYTES = 4 << 20

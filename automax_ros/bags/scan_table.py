@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -11,7 +10,8 @@ from automax_ros.bags.common_log import NO_COMMON_MEMORY_HINT, Cell, entries, st
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.series import WHOLE_RUN, Progress, Window
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.text import did_you_mean
+from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.wire.messages import Scan, Values, Variable, VariableTable
 
@@ -146,11 +146,8 @@ class ScanTable:
 
     def _unknown_task(self, tasks: set[str]) -> BagError:
         names = sorted(tasks)
-        near = difflib.get_close_matches(self._task, names, n=2, cutoff=0.5)
-        if near:
-            hint = f"did you mean {' or '.join(near)}?"
-        else:
-            hint = f"there are {', '.join(names[:8])}" if names else "it holds no scans at all"
+        there = f"there are {', '.join(names[:8])}" if names else "it holds no scans at all"
+        hint = did_you_mean(self._task, names) or there
         return BagError("AMX6827", self._bag, f"holds no scan of a task {self._task[:40]!r}", hint)
 
 

@@ -18,8 +18,9 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.locals import WatchedLocals, is_local
 from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.span import span_of
-from automax_ros.bags.variables import Watched, WatchError, watched_by_default, watched_by_name
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.bags.variables import Watched, watched_by_default, watched_by_name
+from automax_ros.core.names import NameFault
+from automax_ros.core.ticks import seconds_text
 from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, Variable, VariableTable
 
 MAX_GRID_ROWS = 20_000_000
@@ -121,8 +122,8 @@ class Series:
                 else:
                     (item,) = watched_by_name(variables, [name])
                 watched.setdefault(item.label, item)
-        except WatchError as error:
-            raise BagError("AMX6821", self._bag, str(error), error.hint) from error
+        except NameFault as error:
+            raise BagError("AMX6821", self._bag, error.message, error.hint) from error
         return list(watched.values())
 
     def _first_table(self) -> VariableTable:

@@ -10,7 +10,7 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.opening import size_of
 from automax_ros.bags.reader import BagReader
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.ticks import seconds_text
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import scan_head
 from automax_ros.wire.messages import VariableTable

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from automax_ros.core.names import element
 from automax_ros.core.types import DataType
 from automax_ros.wire.messages import Variable, VariableTable
 
 _NAME = re.compile(r"[A-Z_][A-Z0-9_]{0,63}[%!@$]?")
-_WATCH = re.compile(r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>\d{1,9}(?:,\d{1,9}){0,3})[)\]])?")
-
-
-class WatchError(ValueError):
-    """A name to watch is not one of the recording's variables; ``hint`` says which is near."""
-
-    def __init__(self, message: str, hint: str = "") -> None:
-        super().__init__(message)
-        self.hint = hint
 
 
 @dataclass(frozen=True)
@@ -65,53 +56,13 @@ def watched_by_name(variables: dict[str, Variable], names: Sequence[str]) -> lis
     """Return the variables and array elements that were asked for, such as ``REF%`` and ``TABLE%(3)``, each once.
 
     Raises:
-        WatchError: there is no such variable or element.
+        NameFault: there is no such variable or element.
     """
-    found = (_find(variables, name) for name in names)
-    return list({(item.variable, item.element): item for item in found}.values())
-
-
-def _find(variables: dict[str, Variable], asked: str) -> Watched:
-    match = _WATCH.fullmatch("".join(asked.upper().split()))
-    entry = variables.get(match["name"]) if match else None
-    if match is None or entry is None:
-        raise WatchError(f"no common variable {asked[:80]!r} in the recording", _suggestion(variables, asked))
-    kind = DataType.numbered(entry.type)
-    if match["subscripts"] is None:
-        if entry.dimensions:
-            raise WatchError(f"{entry.name} is an array", f"name one element, such as {_element_name(entry)}")
-        return Watched(entry.name, entry.id, 0, kind, entry.unit)
-    subscripts = [int(text) for text in match["subscripts"].split(",")]
-    if not entry.dimensions:
-        raise WatchError(f"{entry.name} is not an array", f"write {entry.name}")
-    if len(subscripts) != len(entry.dimensions):
-        raise WatchError(
-            f"{entry.name} has {len(entry.dimensions)} subscripts, not {len(subscripts)}",
-            f"write it as {_element_name(entry)}",
+    found = (element(name, variables, "the recording has no common variable") for name in names)
+    columns = {
+        item.label: Watched(
+            item.label, item.variable.id, item.index, DataType.numbered(item.variable.type), item.variable.unit
         )
-    for subscript, size in zip(subscripts, entry.dimensions, strict=True):
-        if subscript >= size:
-            raise WatchError(f"subscript {subscript} of {asked[:80]} is out of range", f"the largest is {size - 1}")
-    label = f"{entry.name}({','.join(map(str, subscripts))})"
-    return Watched(label, entry.id, flat_index(subscripts, entry.dimensions), kind, entry.unit)
-
-
-def flat_index(subscripts: Sequence[int], dimensions: Sequence[int]) -> int:
-    """Return the index of an array element, last dimension fastest."""
-    index = 0
-    for subscript, size in zip(subscripts, dimensions, strict=True):
-        index = index * size + subscript
-    return index
-
-
-def _element_name(entry: Variable) -> str:
-    return f"{entry.name}({','.join('0' * len(entry.dimensions))})"
-
-
-def _suggestion(variables: dict[str, Variable], asked: str) -> str:
-    name = "".join(asked.upper().split())[:80].split("(", 1)[0].split("[", 1)[0]
-    near = difflib.get_close_matches(name, list(variables)[:5000], n=3, cutoff=0.6)
-    near += [item for item in variables if item.rstrip("%!@$") == name.rstrip("%!@$") and item not in near]
-    if near:
-        return f"did you mean {' or '.join(near[:3])}?"
-    return f"it has {', '.join(list(variables)[:8])}{' ...' if len(variables) > 8 else ''}"
+        for item in found
+    }
+    return list(columns.values())

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from automax_ros.cli.terminal import count_of
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import count_of, printable
 
 _MOST_ROWS = 100
 """Longest table that is printed whole; ``--json`` has it all."""

@@ -15,9 +15,8 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.repair.repairing import FileReport, RepairReport, repair
 from automax_ros.cli.progress import ProgressBar
-from automax_ros.cli.terminal import count_of
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 
 _STEPS = 1000

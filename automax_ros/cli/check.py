@@ -23,10 +23,11 @@ from automax_ros.cli.task_files import (
     name_warning,
     target_of,
 )
-from automax_ros.cli.terminal import count_of, print_diagnostics
+from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, as_json, has_errors, in_order
 from automax_ros.core.problems import Severity
+from automax_ros.core.text import count_of
 from automax_ros.rack.config import RackConfig
 
 _LINE_NUMBER = re.compile(r"\s*([0-9]{1,6})")

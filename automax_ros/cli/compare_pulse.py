@@ -19,15 +19,16 @@ from pathlib import Path
 from typing import TextIO
 
 from automax_ros.cli.compare_pulse_report import Report, json_text, report_text
-from automax_ros.cli.csv_table import CsvFault, CsvTable, cell_value
+from automax_ros.cli.csv_table import CsvFault, CsvTable
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.numbers import INT16_MAX, INT16_MIN
+from automax_ros.core.numbers import INT16_MAX
+from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType
+from automax_ros.core.values import value_of, wanted
 from automax_ros.logix.pulse_comparison import PulseComparison
 from automax_ros.logix.pulse_conversion import ConversionError, PulseParameters
-from automax_ros.rack.findings import did_you_mean, quoted
 
 _ROWS_A_LOOK = 256
 """Rows between two looks at the clock for the progress bar."""
@@ -187,26 +188,26 @@ def _scans(table: CsvTable, columns: _Columns) -> Iterator[tuple[int, bool]]:
     feedback, reset = 0, False
     for line, cells in table.numbered_rows():
         if cell := cells[columns.feedback_at].strip():
-            value = cell_value(cell, DataType.INTEGER)
-            if not isinstance(value, int) or not INT16_MIN <= value <= INT16_MAX:
-                wanted = f"a whole number from {INT16_MIN} to {INT16_MAX}"
-                raise _wrong_cell(columns.feedback, cell, wanted, line, _unsigned_hint(value))
+            value = value_of(cell, DataType.INTEGER)
+            if not isinstance(value, int):
+                raise _wrong_cell(columns.feedback, cell, wanted(DataType.INTEGER), line, _unsigned_hint(cell))
             feedback = value
         if columns.reset_at is not None and (cell := cells[columns.reset_at].strip()):
-            value = cell_value(cell, DataType.BOOLEAN)
+            value = value_of(cell, DataType.BOOLEAN)
             if not isinstance(value, bool):
-                raise _wrong_cell(str(columns.reset), cell, "0 or 1", line)
+                raise _wrong_cell(str(columns.reset), cell, wanted(DataType.BOOLEAN), line)
             reset = value
         yield feedback, reset
 
 
-def _wrong_cell(column: str, cell: str, wanted: str, line: int, hint: str | None = None) -> CsvFault:
-    message = f"{quoted(column, marks='')} = {quoted(cell, marks='')}, it must be {wanted}"
+def _wrong_cell(column: str, cell: str, takes: str, line: int, hint: str | None = None) -> CsvFault:
+    message = f"{quoted(column, marks='')} = {quoted(cell, marks='')}, it must be {takes}"
     return CsvFault("AMX6915", line, message, hint)
 
 
-def _unsigned_hint(value: object) -> str | None:
+def _unsigned_hint(cell: str) -> str | None:
     """Return what to do with a word that a logger wrote without sign."""
+    value = value_of(cell, DataType.DOUBLE)
     if isinstance(value, int) and INT16_MAX < value <= 0xFFFF:
         return f"as a word of 16 bits this is {value - 0x10000}"
     return None

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
-from automax_ros.cli.terminal import count_of
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import count_of, printable
 from automax_ros.logix.pmul import GAIN_ONE
 from automax_ros.logix.pulse_comparison import Pair, PulseComparison
 from automax_ros.logix.pulse_conversion import DEFAULT_MULTIPLIER, PulseParameters

@@ -8,23 +8,16 @@ from __future__ import annotations
 import codecs
 import csv
 import os
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import TypeVar
 
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.diagnostics import printable
-from automax_ros.core.types import DataType, Value
+from automax_ros.core.text import printable
 
 MAX_LINE = 1_000_000
 """Longest line of a CSV table, in bytes (decision: a bound on memory for untrusted files)."""
-
-_WHOLE = re.compile(r"([-+]?[0-9]{1,40})(\.0{0,40})?")
-"""A whole number; spreadsheets write 100.0 into columns with empty cells."""
-_DECIMAL = re.compile(r"[-+]?([0-9]{1,60}(\.[0-9]{0,60})?|\.[0-9]{1,60})([eE][-+]?[0-9]{1,4})?")
-_TRUTH = {"0": False, "FALSE": False, "OFF": False, "0.0": False, "1": True, "TRUE": True, "ON": True, "1.0": True}
 
 _Table = TypeVar("_Table", bound="CsvTable")
 
@@ -155,15 +148,3 @@ class CsvTable:
         except csv.Error as error:
             hint = "a cell with quotes begins and ends with them on one line"
             raise CsvFault("AMX6910", self._line, f"not CSV: {printable(str(error))}", hint) from error
-
-
-def cell_value(text: str, kind: DataType) -> Value | None:
-    """Return what a cell that is not empty says for a variable of a type, None if it says nothing for it."""
-    if kind is DataType.STRING:
-        return text
-    if kind is DataType.BOOLEAN:
-        return _TRUTH.get(text.upper()) if len(text) <= 5 else None
-    if kind is DataType.REAL:
-        return float(text) if _DECIMAL.fullmatch(text) else None
-    match = _WHOLE.fullmatch(text)
-    return int(match[1]) if match else None

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declaration import Block
 from automax_ros.blocks.dynamics import Dynamics
-from automax_ros.cli.csv_table import cell_value
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.decimal_text import real_text
-from automax_ros.core.types import DataType, Value
-from automax_ros.language.checks.constant_values import range_text
-from automax_ros.language.program import BoundCall, Program, Symbol
+from automax_ros.core.faults import Fault
+from automax_ros.core.settings import setting
+from automax_ros.core.text import quoted
+from automax_ros.core.types import Value
+from automax_ros.core.values import value_text
+from automax_ros.language.program import BoundCall, Program
 from automax_ros.language.syntax.statement_text import print_expression
 from automax_ros.language.syntax.tree import (
     BooleanLiteral,
@@ -31,8 +32,6 @@ from automax_ros.language.syntax.tree import (
     Unary,
 )
 from automax_ros.language.syntax.walk import bodies, statements_in_order
-from automax_ros.rack.findings import did_you_mean, quoted
-from automax_ros.running.views import MemoryValueError, ViewSpec, fitting
 
 _LABEL = re.compile(r"0*([0-9]{1,6})(?:\.0*([1-9][0-9]{0,2}))?")
 _LEADING_ZEROS = re.compile(r"(?<=[(,])0+(?=[0-9])")
@@ -192,13 +191,6 @@ def _settable(call: DynamicCall, *, driven: bool) -> list[Parameter]:
     return [call.parameters[name] for name in names]
 
 
-def value_text(value: Value | None) -> str:
-    """Return a parameter's value as the source has it."""
-    if isinstance(value, bool):
-        return str(value).upper()
-    return real_text(value) if isinstance(value, float) else str(value)
-
-
 def _labelled(program: Program) -> dict[str, tuple[BoundCall, str]]:
     """Return the dynamic blocks by line, with what they stand in.
 
@@ -305,44 +297,19 @@ def _settings(program: Program, texts: Sequence[str]) -> dict[str, Value]:
 
 
 def _setting(program: Program, text: str) -> tuple[str, Value]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise UsageError(f"--set {quoted(text)} is not NAME=VALUE")
-    label = _plain(name)
-    symbol = program.symbols.get(label.partition("(")[0])
-    if symbol is not None and symbol.dimensions and "(" not in label:
-        element = f"{symbol.name}({','.join(str(size - 1) for size in symbol.dimensions)})"
-        raise UsageError(f"--set {label}: it is an array", f"write an element, as in --set '{element}=VALUE'")
-    if symbol is None or bool(symbol.dimensions) != ("(" in label):
-        raise UsageError(f"--set: the task has no variable {quoted(name)}", did_you_mean(label, program.symbols))
-    return label, _value(label, symbol, value.strip())
-
-
-def _value(label: str, symbol: Symbol, text: str) -> Value:
-    value = cell_value(text, symbol.type) if text else None
-    if value is None:
-        raise UsageError(f"--set {label}: {quoted(text)} is no value of type {symbol.type.word}", _wanted(symbol))
     try:
-        fit = fitting(ViewSpec(symbol.name, symbol.type, length=symbol.length), value)
-    except MemoryValueError as error:
-        raise UsageError(
-            f"--set {label}: {quoted(text)} does not fit type {symbol.type.word}", _wanted(symbol)
-        ) from error
-    tuning = symbol.tuning
-    if tuning is not None and not isinstance(fit, str) and not isinstance(tuning.low, str):
+        meant, value = setting(text, program.symbols, "the task has no variable")
+    except Fault as fault:
+        raise UsageError(f"--set: {fault.message}", fault.hint) from fault
+    tuning = meant.variable.tuning
+    if tuning is not None and not isinstance(value, str) and not isinstance(tuning.low, str):
         assert not isinstance(tuning.high, str)
-        if not tuning.low <= fit <= tuning.high:
+        if not tuning.low <= value <= tuning.high:
             limits = f"{value_text(tuning.low)} to {value_text(tuning.high)}"
-            raise UsageError(f"--set {label}: {quoted(text)} is beyond its tuning limits, {limits}")
-    return fit
-
-
-def _wanted(symbol: Symbol) -> str | None:
-    if symbol.type is DataType.BOOLEAN:
-        return "write TRUE or FALSE"
-    return f"a number from {range_text(symbol.type)}" if symbol.type.is_numeric else None
+            raise UsageError(f"--set {meant.label}: {value_text(value)} is beyond its tuning limits, {limits}")
+    return meant.label, value
 
 
 def _plain(text: str) -> str:
-    """Return a variable's text without blanks, in capitals and round brackets, subscripts without leading zeros."""
+    """Return a variable's text as ``element`` labels it: no blanks, capitals, round brackets, no leading zeros."""
     return _LEADING_ZEROS.sub("", "".join(text.split()).upper().replace("[", "(").replace("]", ")"))

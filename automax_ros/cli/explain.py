@@ -13,7 +13,7 @@ from importlib import resources
 from automax_ros.cli.terminal import painted, wants_colour
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.problems import PROBLEMS, Problem
-from automax_ros.rack.findings import quoted
+from automax_ros.core.text import quoted
 
 _CODE = re.compile(r"(?:AMX)?([0-9]{4})")
 _NEAR = 3

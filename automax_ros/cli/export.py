@@ -17,10 +17,10 @@ from automax_ros.bags.scan_table import ScanTable
 from automax_ros.bags.series import Progress
 from automax_ros.cli.progress import share_shown
 from automax_ros.cli.signals import ended_by_signals
-from automax_ros.cli.terminal import count_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
 from automax_ros.cli.window import add_grid_argument, add_window_arguments, window_of
+from automax_ros.core.text import count_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -2,35 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
+from automax_ros.core.names import Element, element
 from automax_ros.core.types import Value
-from automax_ros.language.checks.suggestions import Suggester
 from automax_ros.language.program import Program, Symbol
 from automax_ros.language.syntax.tree import Scope
-from automax_ros.rack.findings import quoted
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
 from automax_ros.running.views import ViewSpec, fitting
 
-_NAME = re.compile(
-    r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>[0-9]{1,6}(?:,[0-9]{1,6}){0,3})[)\]])?"
-)
 _TASK, _OUTSIDE = 1, 2
 """Writers of the memory: the task, and whoever sets variables between scans."""
-
-
-class UnknownVariableError(ValueError):
-    """A text names no value of the task; ``code`` is AMX6911 (no such variable) or AMX6913 (subscripts)."""
-
-    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.code = code
-        self.hint = hint
 
 
 @dataclass(frozen=True)
@@ -58,36 +44,27 @@ class LoneTask:
 
     def simple_variables(self) -> list[LoneVariable]:
         """Return every simple variable in the order of declaration."""
-        return [self._variable(item, item.name, 0) for item in self.program.symbols.values() if not item.dimensions]
+        return [self._variable(Element(item)) for item in self.program.symbols.values() if not item.dimensions]
 
     def variable(self, text: str) -> LoneVariable:
         """Return the value that a text such as ``REF%`` or ``TABLE%(3)`` names; case and blanks do not matter.
 
         Raises:
-            UnknownVariableError: the task has no such variable or element.
+            NameFault: the task has no such variable or element.
         """
-        plain = "".join(text.split())
-        match = _NAME.fullmatch(plain.upper()) if plain.isascii() else None
-        symbols = self.program.symbols
-        symbol = symbols.get(match["name"]) if match else None
-        if match is None or symbol is None:
-            name = match["name"] if match else plain[:80].upper()
-            raise UnknownVariableError(
-                "AMX6911", f"the task has no variable {quoted(text)}", _suggestion(name, symbols)
-            )
-        subscripts = tuple(map(int, match["subscripts"].split(","))) if match["subscripts"] else ()
-        return self._variable(symbol, _label(symbol, subscripts), _element(symbol, subscripts, text))
+        return self._variable(element(text, self.program.symbols, "the task has no variable"))
 
-    def _variable(self, symbol: Symbol, label: str, element: int) -> LoneVariable:
+    def _variable(self, meant: Element[Symbol]) -> LoneVariable:
+        symbol, label, index = meant.variable, meant.label, meant.index
         if symbol.scope is Scope.COMMON:
             view = self._views[symbol.name]
-            read = partial(self.memory.read_now, view, element)
-            return LoneVariable(label, symbol, read, partial(self._write_common, view, element))
+            read = partial(self.memory.read_now, view, index)
+            return LoneVariable(label, symbol, read, partial(self._write_common, view, index))
         position = self.task.compiled.layout.index(symbol.name)
-        read = partial(self._read_local, position, element)
+        read = partial(self._read_local, position, index)
         if symbol.tuning is not None:
             return LoneVariable(label, symbol, read, partial(self._tune, _spec(symbol)))
-        return LoneVariable(label, symbol, read, partial(self._write_local, position, element, _spec(symbol)))
+        return LoneVariable(label, symbol, read, partial(self._write_local, position, index, _spec(symbol)))
 
     def _write_common(self, view: int, element: int, value: Value) -> None:
         self.memory.write_from_outside(view, value, _OUTSIDE, element)
@@ -120,35 +97,3 @@ def compiled_alone(program: Program) -> CompiledTask:
 
 def _spec(symbol: Symbol) -> ViewSpec:
     return ViewSpec(symbol.name, symbol.type, symbol.elements, bool(symbol.dimensions), symbol.length)
-
-
-def _label(symbol: Symbol, subscripts: tuple[int, ...]) -> str:
-    return f"{symbol.name}({','.join(map(str, subscripts))})" if subscripts else symbol.name
-
-
-def _element(symbol: Symbol, subscripts: tuple[int, ...], text: str) -> int:
-    """Return the flat index of an element, last subscript fastest; 0 for a simple variable."""
-    name, sizes = symbol.name, symbol.dimensions
-    if len(subscripts) != len(sizes):
-        if not sizes:
-            raise UnknownVariableError("AMX6913", f"{quoted(text)}: {name} is a simple variable", f"write {name}")
-        last = ",".join(str(size - 1) for size in sizes)
-        wanted = f"has {len(sizes)} subscripts" if len(sizes) > 1 else "is an array"
-        raise UnknownVariableError(
-            "AMX6913", f"{quoted(text)}: {name} {wanted}", f"name one element, the last is {name}({last})"
-        )
-    index = 0
-    for subscript, size in zip(subscripts, sizes, strict=True):
-        if subscript >= size:
-            message = f"{quoted(text)}: the subscript {subscript} is not 0 to {size - 1}"
-            raise UnknownVariableError("AMX6913", message)
-        index = index * size + subscript
-    return index
-
-
-def _suggestion(name: str, symbols: dict[str, Symbol]) -> str | None:
-    if "(" in name and ")" not in name:
-        return 'a name with several subscripts needs quotes in a CSV table: "TABLE%(1,2)"'
-    if ";" in name or "\t" in name:
-        return "columns are separated by commas"
-    return Suggester().hint(name, symbols)

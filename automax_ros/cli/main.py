@@ -141,7 +141,7 @@ def _module(name: str) -> ModuleType:
 
 def _unknown(name: str) -> Exception:
     from automax_ros.cli.usage import UsageError
-    from automax_ros.rack.findings import did_you_mean, quoted
+    from automax_ros.core.text import did_you_mean, quoted
 
     hint = did_you_mean(name, SUBCOMMANDS) or f"there are {', '.join(SUBCOMMANDS)}"
     return UsageError(f"no subcommand {quoted(name)}", hint)

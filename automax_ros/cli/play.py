@@ -22,11 +22,9 @@ from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
-from automax_ros.cli.terminal import count_of
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import count_of, did_you_mean, printable, quoted
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S, seconds_ns
-from automax_ros.rack.findings import did_you_mean, quoted
 
 if TYPE_CHECKING:
     from automax_ros.nodes.player import Player

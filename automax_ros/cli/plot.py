@@ -19,7 +19,7 @@ from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import watch_list
 from automax_ros.cli.window import add_window_arguments, window_of
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.ticks import seconds_text
 
 _SIZES_PX = range(200, 10_001)
 _DEFAULT_WIDTH_PX = 1400

@@ -11,7 +11,7 @@ from typing import Any
 from automax_ros.bags.traces import ErrorMark, Line, Traces, thinned
 from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import printable
 from automax_ros.core.types import DataType
 
 DPI = 120

@@ -24,12 +24,11 @@ from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
-from automax_ros.cli.terminal import count_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.kinds import WriterKind
+from automax_ros.core.text import count_of, did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
-from automax_ros.rack.findings import did_you_mean, quoted
 from automax_ros.rack.ros_names import namespace
 from automax_ros.wire.cdr import CdrError
 from automax_ros.wire.messages import VariableTable

@@ -7,9 +7,9 @@ import argparse
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.bags.writer import COMPRESSIONS, StorageOptions
 from automax_ros.cli.usage import UsageError
+from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.findings import did_you_mean, quoted
 
 _BYTES_PER_MB = 1_000_000
 _MAX_MB = 1_000_000

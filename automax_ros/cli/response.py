@@ -21,7 +21,6 @@ from automax_ros.cli.dynamic_calls import (
     add_call_arguments,
     dynamic_calls,
     require_running,
-    value_text,
 )
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.response_data import BlockResponse, Range, measured_response
@@ -30,6 +29,7 @@ from automax_ros.cli.tune_info import checked_program, tuning_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.types import DataType, Value
+from automax_ros.core.values import source_text
 from automax_ros.language.program import Program
 from automax_ros.tuning.step_response import MOST_SCANS, default_scans
 from automax_ros.tuning.tuning import Tuning
@@ -129,7 +129,7 @@ def _driving(call: DynamicCall) -> tuple[dict[str, Value], list[str]]:
         value = given.value
         if given.source is Source.UNKNOWN:
             value = _default(call.block, name)
-            assumed.append(f"{name} = {value_text(value)} ({given.text})")
+            assumed.append(f"{name} = {source_text(value)} ({given.text})")
         if value is not None:
             parameters[name] = value
     return parameters, assumed

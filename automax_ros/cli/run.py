@@ -22,11 +22,12 @@ from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
 from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import RackError
-from automax_ros.rack.settings import SettingError, Watched, setting, watched
+from automax_ros.rack.settings import CommonElement, setting, watched
 
 WITHOUT_ROS = "or run with --simulated, which needs no ROS"
 
@@ -109,15 +110,15 @@ def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:
 def _settings(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
     try:
         return [setting(config, text) for text in texts]
-    except SettingError as error:
-        raise UsageError(f"--set: {error}", error.hint) from error
+    except Fault as error:
+        raise UsageError(f"--set: {error.message}", error.hint) from error
 
 
-def _watched(config: RackConfig, texts: list[str] | None) -> list[Watched]:
+def _watched(config: RackConfig, texts: list[str] | None) -> list[CommonElement]:
     try:
         return watched(config, watch_list(texts))
-    except SettingError as error:
-        raise UsageError(f"--watch: {error}", error.hint) from error
+    except Fault as error:
+        raise UsageError(f"--watch: {error.message}", error.hint) from error
 
 
 def _refused(error: RackError) -> int:

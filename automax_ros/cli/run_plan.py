@@ -11,7 +11,7 @@ from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import Watched
+from automax_ros.rack.settings import CommonElement
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class RunPlan:
     record: Path | None
     recording: RecordingOptions
     settings: tuple[tuple[str, Value], ...]
-    watch: tuple[Watched, ...]
+    watch: tuple[CommonElement, ...]
 
 
 def warn(rack: Rack) -> None:

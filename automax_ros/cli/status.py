@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from automax_ros.cli.status_line import StatusLine
-from automax_ros.cli.terminal import count_of
-from automax_ros.compile.functions import text_of
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.core.types import Value
+from automax_ros.core.values import value_text
 from automax_ros.rack.rack import Processor, Rack
-from automax_ros.rack.settings import Watched
+from automax_ros.rack.settings import CommonElement
 from automax_ros.running.health import Health
 
 
@@ -24,7 +22,7 @@ class StatusDisplay:
     ``health`` is what a rack on the wall clock has trouble with; each thing is a line when it first happens.
     """
 
-    def __init__(self, rack: Rack, watch: Sequence[Watched], *, live: bool, health: Health | None = None) -> None:
+    def __init__(self, rack: Rack, watch: Sequence[CommonElement], *, live: bool, health: Health | None = None) -> None:
         """Begin; nothing is printed before the first update is due."""
         self._rack, self._watch, self._live, self._health = rack, watch, live, health
         self._line = StatusLine()
@@ -108,10 +106,5 @@ class StatusDisplay:
         return [count_of(number, kind) for kind, number in counts.items() if number]
 
     def _values(self) -> list[str]:
-        return [f"{item.label}={_shown(self._rack.value(item.name, item.element))}" for item in self._watch]
-
-
-def _shown(value: Value) -> str:
-    if isinstance(value, bool):
-        return "1" if value else "0"
-    return printable(text_of(value))
+        values = [value_text(self._rack.value(item.name, item.index)) for item in self._watch]
+        return [f"{item.label}={printable(value)}" for item, value in zip(self._watch, values, strict=True)]

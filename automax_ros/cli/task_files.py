@@ -11,10 +11,10 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Processor
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.rack.files import FileFault
-from automax_ros.rack.findings import quoted
 from automax_ros.rack.names import NameFault, check_task_name
 from automax_ros.rack.task_source import read_task_source
 

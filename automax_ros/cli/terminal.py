@@ -1,4 +1,4 @@
-"""What the person sees: colours where they are welcome, diagnostics, numbers of things."""
+"""What the person sees: colours where they are welcome, diagnostics."""
 
 from __future__ import annotations
 
@@ -29,11 +29,6 @@ def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, str
     for item in in_order(diagnostics):
         text = render(item, source)
         stream.write((_painted(item, text) if colour else text) + "\n")
-
-
-def count_of(number: int, thing: str) -> str:
-    """Return a number with its noun: ``1 error``, ``2 errors``."""
-    return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def painted(text: str, colour: str) -> str:

@@ -16,31 +16,25 @@ from pathlib import Path
 from typing import TextIO
 
 from automax_ros.cli.csv_table import CsvFault
-from automax_ros.cli.lone_task import LoneTask, LoneVariable, UnknownVariableError
+from automax_ros.cli.lone_task import LoneTask, LoneVariable
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
-from automax_ros.cli.terminal import count_of, print_diagnostics
+from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.trace_input import InputTable
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
-from automax_ros.core.decimal_text import real_text, seconds_text
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.names import NameFault
 from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.text import count_of, printable
+from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
+from automax_ros.core.values import value_text
 from automax_ros.running.error_log import LogEntry
 from automax_ros.running.task import ScanRecord, Status
 
 _ROWS_A_LOOK = 256
 """Rows between two looks at the clock for the progress bar."""
-
-_FORMATS: dict[DataType, Callable[..., str]] = {
-    DataType.INTEGER: str,
-    DataType.DOUBLE: str,
-    DataType.REAL: real_text,
-    DataType.BOOLEAN: lambda value: "1" if value else "0",
-    DataType.STRING: printable,
-}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,7 +81,7 @@ class _Trace:
     def __init__(self, lone: LoneTask, watched: Sequence[LoneVariable], output: TextIO, errors: TextIO | None) -> None:
         """Write the headers and put the task into RUN."""
         self._lone = lone
-        self._cells = [(item.read, _FORMATS[item.symbol.type]) for item in watched]
+        self._cells = [(item.read, _text_of(item.symbol.type)) for item in watched]
         self._output = csv.writer(output, lineterminator="\n")
         self._output.writerow(["scan", "time_s", *(item.label for item in watched)])
         self._errors = csv.writer(errors, lineterminator="\n") if errors is not None else None
@@ -130,13 +124,17 @@ class _Trace:
             self._errors.writerow([str(entry.scan), str(entry.line), entry.problem, PROBLEMS[entry.problem].title])
 
 
+def _text_of(kind: DataType) -> Callable[..., str]:
+    return printable if kind is DataType.STRING else value_text
+
+
 def _watched(lone: LoneTask, names: list[str] | None) -> list[LoneVariable]:
     if names is None:
         return lone.simple_variables()
     try:
         found = [lone.variable(name) for name in names]
-    except UnknownVariableError as fault:
-        raise UsageError(f"--watch: {fault}", fault.hint) from fault
+    except NameFault as fault:
+        raise UsageError(f"--watch: {fault.message}", fault.hint) from fault
     return list({item.label: item for item in found}.values())
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from automax_ros.cli.csv_table import CsvFault, CsvTable, cell_value
-from automax_ros.cli.lone_task import LoneTask, LoneVariable, UnknownVariableError
-from automax_ros.core.decimal_text import real_text
-from automax_ros.core.types import DataType, Value
-from automax_ros.language.checks.constant_values import range_text
+from automax_ros.cli.csv_table import CsvFault, CsvTable
+from automax_ros.cli.lone_task import LoneTask, LoneVariable
+from automax_ros.core.names import NameFault, UnknownName
+from automax_ros.core.text import quoted
+from automax_ros.core.types import DataType
+from automax_ros.core.values import is_number, value_of, value_text, wanted
 from automax_ros.language.program import Symbol
-from automax_ros.rack.findings import quoted
 
 
 class InputTable(CsvTable):
@@ -51,8 +51,9 @@ class InputTable(CsvTable):
         for name in self.header:
             try:
                 variable = task.variable(name)
-            except UnknownVariableError as fault:
-                raise CsvFault(fault.code, 1, str(fault), fault.hint) from fault
+            except NameFault as fault:
+                code = "AMX6911" if isinstance(fault, UnknownName) else "AMX6913"
+                raise CsvFault(code, 1, fault.message, _header_hint(name) or fault.hint) from fault
             if variable.label in columns:
                 raise CsvFault("AMX6912", 1, f"there are two columns for {variable.label}")
             columns[variable.label] = variable
@@ -65,13 +66,13 @@ def _set(variable: LoneVariable, cell: str, line: int) -> None:
     text = cell if symbol.type is DataType.STRING else cell.strip()
     if not text:
         return
-    value = cell_value(text, symbol.type)
+    value = value_of(text, symbol.type, symbol.length)
     try:
         if value is None:
             raise ValueError
         variable.write(value)
     except ValueError:
-        tuned = symbol.tuning is not None and value is not None
+        tuned = symbol.tuning is not None and is_number(text)
         message = f"{variable.label} = {quoted(text, marks='')}, it must be {_wanted(symbol, tuned=tuned)}"
         raise CsvFault("AMX6916" if tuned else "AMX6915", line, message) from None
 
@@ -79,13 +80,11 @@ def _set(variable: LoneVariable, cell: str, line: int) -> None:
 def _wanted(symbol: Symbol, *, tuned: bool) -> str:
     """Return in words what a variable takes; ``tuned`` where its tuning limits are what matters."""
     if tuned and symbol.tuning is not None:
-        return f"inside its tuning limits, {_number(symbol.tuning.low)} to {_number(symbol.tuning.high)}"
-    if symbol.type is DataType.STRING:
-        return f"a text of at most {symbol.length} characters"
-    if symbol.type is DataType.BOOLEAN:
-        return "0 or 1"
-    return f"a {'whole ' if symbol.type.is_integer else ''}number from {range_text(symbol.type)}"
+        return f"inside its tuning limits, {value_text(symbol.tuning.low)} to {value_text(symbol.tuning.high)}"
+    return wanted(symbol.type, symbol.length)
 
 
-def _number(value: Value) -> str:
-    return real_text(value) if isinstance(value, float) else str(value)
+def _header_hint(name: str) -> str | None:
+    if "(" in name and ")" not in name:
+        return 'a name with several subscripts needs quotes in a CSV table: "TABLE%(1,2)"'
+    return "columns are separated by commas" if ";" in name or "\t" in name else None

@@ -7,9 +7,10 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from automax_ros.cli.dynamic_calls import DynamicCall, Parameter, Source, value_text
+from automax_ros.cli.dynamic_calls import DynamicCall, Parameter, Source
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.core.values import source_text
 from automax_ros.language.program import Program
 from automax_ros.tuning.transfer_text import digits_for, discrete_text, gain_text, number
 from automax_ros.tuning.tuning import Corner, LimitNow, Tuning, Verdict
@@ -93,7 +94,7 @@ def _values(call: DynamicCall, tuning: Tuning) -> Rows:
             yield "values", f"{name} = {given.variable}, 0 at first: give --set {given.variable}=VALUE"
         else:
             what = "its CURRENT" if given.source is Source.TUNABLE else "as set"
-            yield "values", f"{name} = {given.variable} = {value_text(given.value)}, {what}"
+            yield "values", f"{name} = {given.variable} = {source_text(given.value)}, {what}"
     if tuning.missing:
         yield "values", "limits follow; function, corners and range need the values"
 

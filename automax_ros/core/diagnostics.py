@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 
 from automax_ros.core.problems import PROBLEMS, Severity
+from automax_ros.core.text import printable
 
 LONGEST_EXCERPT = 240
 """Most characters of a source line that are shown: a line of a megabyte must not be printed with every finding."""
@@ -130,8 +131,3 @@ def _excerpt(span: Span, lines: list[str]) -> list[str]:
     length = max(1, min(end_column, len(line) + (1 if after else 2)) - column)
     pad = " " * len(before) + "".join("\t" if char == "\t" else " " for char in line[:start])
     return [f"  {before}{line}{after}", f"  {pad}{'^' * length}"]
-
-
-def printable(text: str) -> str:
-    """Return a text with control characters but the tab replaced, so that a hostile source cannot drive a terminal."""
-    return "".join(char if char == "\t" or char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from automax_ros.core.text import quoted
+from automax_ros.core.values import is_number
+
 NS_PER_US = 1_000
 NS_PER_MS = 1_000_000
 NS_PER_S = 1_000_000_000
@@ -43,21 +46,21 @@ def seconds_ns(seconds: float | str) -> int:
     return round(exact * NS_PER_S)
 
 
+def seconds_text(time_ns: int) -> str:
+    """Return a time of 0 ns or more as seconds, exactly and without trailing zeros."""
+    whole, rest = divmod(time_ns, NS_PER_S)
+    return f"{whole}.{rest:09d}".rstrip("0").rstrip(".") if rest else str(whole)
+
+
 def _exact(number: float | str, what: str) -> Fraction:
     """Return a number as it is written; a huge exponent is refused before it takes memory."""
     text = str(number).strip()
-    try:
-        if len(text) > _LONGEST_NUMBER:
-            raise ValueError(text)
-        if abs(float(text)) >= _LARGEST_NUMBER:
-            raise OverflowError(text)
-        tiny = float(text) != 0.0 and abs(float(text)) < 1.0 / _LARGEST_NUMBER
-        return Fraction(0) if tiny or float(text) == 0.0 else Fraction(text)
-    except OverflowError as error:
-        raise ValueError(f"{what} {text} is too large") from error
-    except ValueError as error:
-        raise ValueError(f"{what} {text[:_LONGEST_NUMBER]!r} is not a number") from error
+    if not is_number(text):
+        raise ValueError(f"{what} {quoted(text)} is not a number")
+    magnitude = abs(float(text))
+    if magnitude >= _LARGEST_NUMBER:
+        raise ValueError(f"{what} {quoted(text, marks='')} is too large")
+    return Fraction(text) if magnitude >= 1.0 / _LARGEST_NUMBER else Fraction(0)
 
 
-_LONGEST_NUMBER = 40
 _LARGEST_NUMBER = 1e12

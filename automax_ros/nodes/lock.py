@@ -8,8 +8,8 @@ import tempfile
 from pathlib import Path
 from types import TracebackType
 
+from automax_ros.core.text import quoted
 from automax_ros.nodes.environment import RosUnavailable
-from automax_ros.rack.findings import quoted
 
 MAX_DOMAIN = 232
 """Beyond it the ports of DDS end."""

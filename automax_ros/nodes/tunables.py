@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
-from automax_ros.core.decimal_text import real_text
 from automax_ros.core.types import DataType, bare_name
+from automax_ros.core.values import real_text
 from automax_ros.language.program import TuningLimits
 from automax_ros.rack.ros_names import TYPE_WORDS
 from automax_ros.running.task import Task

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.kinds import Direction
+from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType, bare_name
 from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable
-from automax_ros.rack.findings import Findings, did_you_mean, quoted
+from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import PREDEFINED, NameFault, VariableName, variable_name
 from automax_ros.rack.presets import preset_value
 from automax_ros.rack.reserved import is_reserved

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
-
-from automax_ros.core.diagnostics import Diagnostic, Note, Span, in_order, printable
+from automax_ros.core.diagnostics import Diagnostic, Note, Span, in_order
 from automax_ros.core.problems import PROBLEMS, Severity
+from automax_ros.core.text import quoted
 
 MAX_FINDINGS = 200
 """Most errors, and most warnings, that one file reports (decision: nobody reads more; hostile files have millions)."""
-_LONGEST_GUESS = 40
 
 
 class Findings:
@@ -52,18 +49,3 @@ class Findings:
     def in_order(self) -> list[Diagnostic]:
         """Return the diagnostics sorted by place."""
         return in_order(self._items[Severity.ERROR] + self._items[Severity.WARNING])
-
-
-def quoted(text: str, *, marks: str = "'", limit: int = 40) -> str:
-    """Return a piece of the file for a message: shortened, without control characters or line ends, in quotes."""
-    short = text if len(text) <= limit else text[: limit - 3] + "..."
-    return f"{marks}{printable(short)}{marks}"
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str | None:
-    """Return a hint with the known word that looks most like the one given, None if none does."""
-    if len(word) > _LONGEST_GUESS:
-        return None
-    choices = {item.casefold(): item for item in known}
-    close = difflib.get_close_matches(word.casefold(), choices, n=1, cutoff=0.6)
-    return f"did you mean {choices[close[0]]}?" if close else None

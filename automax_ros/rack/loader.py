@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.core.text import quoted
 from automax_ros.rack.commons import CommonReader
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault, read_bytes
-from automax_ros.rack.findings import Findings, quoted
+from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS, PROCESSOR_REGISTERS
 from automax_ros.rack.names import is_rack_name
 from automax_ros.rack.ros_names import namespace

@@ -19,6 +19,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import RackConfig
+from automax_ros.rack.settings import common_named
 from automax_ros.rack.tasks_check import check_tasks
 from automax_ros.rack.views import view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
@@ -127,17 +128,20 @@ class Rack:
     def start(self, settings: Sequence[tuple[str, Value]] = ()) -> None:
         """Write presets, then ``settings`` (name and value, as an operator would), and put all tasks into RUN.
 
+        A name may be that of an array's element: ``TABLE%(3)``.
+
         Scans begin at once: the first of each task at this instant, then each period.
 
         Raises:
-            KeyError: a setting names a variable that the rack does not have.
+            NameFault: a setting names a variable that the rack does not have.
             MemoryValueError: a setting's value does not fit.
         """
         now = self.now_ns
         self.memory.now_ns = now
         self._write_presets()
         for name, value in settings:
-            self.memory.write_from_outside(self.memory.view(name), value, OPERATOR_WRITER)
+            found = common_named(self.config, name)
+            self.memory.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
         self._tell_writes()
         for task in sorted(self.tasks, key=lambda task: (task.priority, task.name)):
             if self.stop_reason is None:

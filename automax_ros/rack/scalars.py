@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from automax_ros.rack.findings import Findings, quoted
+from automax_ros.core.text import quoted
+from automax_ros.rack.findings import Findings
 from automax_ros.rack.yaml_text import Mapping, Node, Scalar, Sequence
 
 WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]{0,17})\Z")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.rack.findings import Findings, did_you_mean, quoted
+from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.rack.findings import Findings
 from automax_ros.rack.scalars import wrong_kind
 from automax_ros.rack.yaml_text import Mapping, Node, Scalar
 

@@ -6,9 +6,10 @@ import re
 from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, tick_ns
 from automax_ros.rack.config import MAX_PROCESSORS, MAX_SLOT, CommonMemoryConfig, ProcessorConfig
-from automax_ros.rack.findings import Findings, quoted
+from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS, NOT_YET, PROCESSORS, SUPPORTED, module_number
 from automax_ros.rack.scalars import text_value, wrong_kind
 from automax_ros.rack.sections import Entry, Section, entries_of

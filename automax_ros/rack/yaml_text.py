@@ -14,7 +14,8 @@ from typing import TypeAlias
 import yaml
 
 from automax_ros.core.diagnostics import SourceText, Span
-from automax_ros.rack.findings import Findings, quoted
+from automax_ros.core.text import quoted
+from automax_ros.rack.findings import Findings
 
 MAX_DEPTH = 16
 """Deepest nesting of a YAML file (decision: a rack file needs 6)."""

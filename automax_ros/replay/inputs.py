@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
-from automax_ros.core.decimal_text import seconds_text
 from automax_ros.core.kinds import WriteKind
+from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.views import view_specs

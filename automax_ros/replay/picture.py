@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.variables import flat_index
 from automax_ros.bags.whole_file import written_whole
-from automax_ros.core.diagnostics import printable
+from automax_ros.core.names import element
+from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import CommonVariable
@@ -128,11 +128,9 @@ def _drawable(report: ReplayReport) -> list[Difference]:
 
 def _trace(difference: Difference, variables: Sequence[CommonVariable]) -> Trace:
     """Find the variable, and the element, that a difference names."""
-    name, _, subscripts = difference.name.partition("(")
-    view = next(number for number, item in enumerate(variables) if item.name == name)
-    variable = variables[view]
-    indices = [int(text) for text in subscripts.rstrip(")").split(",")] if subscripts else []
-    return Trace(difference, variable, (view, flat_index(indices, variable.dimensions)))
+    views = {item.name: view for view, item in enumerate(variables)}
+    found = element(difference.name, {item.name: item for item in variables}, "the rack has no common variable")
+    return Trace(difference, found.variable, (views[found.name], found.index))
 
 
 def _sample(trace: Trace, task: TaskReplay, time_s: float) -> None:

@@ -8,10 +8,10 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.decimal_text import real_text
-from automax_ros.core.diagnostics import printable
 from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.text import printable
 from automax_ros.core.types import Value
+from automax_ros.core.values import source_text
 
 OPEN_LOOP = (
     "Open loop: each task scans on the recorded inputs. Behind a first difference the values from other tasks, from "
@@ -166,15 +166,6 @@ def _plain(value: object) -> object:
     return value
 
 
-def value_text(value: Value) -> str:
-    """Return a value for the report: strings in quotes, REALs with no more digits than they have."""
-    if isinstance(value, bool):
-        return "TRUE" if value else "FALSE"
-    if isinstance(value, float):
-        return real_text(value)
-    return f'"{printable(value)}"' if isinstance(value, str) else str(value)
-
-
 def difference_text(value: float) -> str:
     """Return a difference with its sign."""
     return f"{value:+.10g}"
@@ -219,11 +210,11 @@ def _first_lines(first: FirstScan) -> Iterator[str]:
     yield f"First difference: task {first.task}, scan {first.scan} at {_seconds(first.time_s)} s"
     for item in first.differences:
         place = f"  (line {_numbers(item.lines)})" if item.lines else ""
-        values = f"recorded {value_text(item.first.recorded)}, replayed {value_text(item.first.replayed)}"
+        values = f"recorded {source_text(item.first.recorded)}, replayed {source_text(item.first.replayed)}"
         yield f"  {printable(item.name)}: {values}{place}"
     for title, values_seen in (("latched", first.latched), ("read", first.read)):
         if values_seen:
-            shown = [f"{item.name}={value_text(item.value)}" for item in values_seen[:_LONGEST_LIST]]
+            shown = [f"{item.name}={source_text(item.value)}" for item in values_seen[:_LONGEST_LIST]]
             rest = len(values_seen) - len(shown)
             yield from _wrapped(f"  it {title}: ", shown + ([f"and {rest} more"] if rest else []))
 
@@ -240,8 +231,8 @@ def _difference_row(item: Difference) -> tuple[str, ...]:
         _numbers(item.lines),
         str(item.first.scan),
         _seconds(item.first.time_s),
-        value_text(item.first.recorded),
-        value_text(item.first.replayed),
+        source_text(item.first.recorded),
+        source_text(item.first.replayed),
         difference_text(greatest.difference) if greatest else "",
         str(greatest.scan) if greatest else "",
         str(item.scans),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.compile.layout import Field, Layout, Role
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import Value
 from automax_ros.language.program import Program
 from automax_ros.running.task import Task

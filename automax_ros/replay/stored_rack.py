@@ -16,12 +16,12 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
+from automax_ros.core.text import did_you_mean
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Scope, Variable
 from automax_ros.language.syntax.walk import statements_in_order
 from automax_ros.rack.config import MAX_PROCESSORS, MAX_TASKS, RackConfig
 from automax_ros.rack.files import MAX_BYTES
-from automax_ros.rack.findings import did_you_mean
 from automax_ros.rack.loader import load_stored
 from automax_ros.rack.tasks_check import check_source, commons_of
 from automax_ros.wire.messages import VariableTable

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import cast
 
 from automax_ros.bags.errors import BagError
-from automax_ros.core.decimal_text import seconds_text
+from automax_ros.core.names import element_name
+from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import Value
+from automax_ros.core.values import source_text
 from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
 from automax_ros.replay.inputs import Entry, Key, RecordedCommons, ScanMemory, UnknownValue, same_bits
-from automax_ros.replay.report import Kind, NamedValue, TaskReport, errors_text, value_text
+from automax_ros.replay.report import Kind, NamedValue, TaskReport, errors_text
 from automax_ros.replay.state import (
     fitting_state,
     state_differences,
@@ -371,7 +373,7 @@ class TaskReplay:
     def _write_text(self, entry: Entry | None) -> str:
         if entry is None:
             return "no write"
-        return f"{element_name(self._variable(entry[:2]), entry[1])} = {value_text(entry[2])}"
+        return f"{element_name(self._variable(entry[:2]), entry[1])} = {source_text(entry[2])}"
 
     def _variable(self, key: Key) -> CommonVariable:
         return self._commons.variables[key[0]]
@@ -382,14 +384,3 @@ class TaskReplay:
     def _note(self, text: str) -> None:
         if len(self._notes) < 10 * _MOST_NOTES:
             self._notes[text] = None
-
-
-def element_name(variable: CommonVariable, element: int) -> str:
-    """Return the name of a variable, or of an array's element with its subscripts."""
-    if not variable.dimensions:
-        return variable.name
-    subscripts: list[int] = []
-    for size in reversed(variable.dimensions):
-        element, subscript = divmod(element, size)
-        subscripts.append(subscript)
-    return f"{variable.name}({','.join(map(str, reversed(subscripts)))})"

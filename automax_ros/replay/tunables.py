@@ -8,7 +8,7 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError
 from automax_ros.compile.layout import Layout
 from automax_ros.core.types import DataType, Value, type_of_name
-from automax_ros.replay.report import value_text
+from automax_ros.core.values import source_text
 from automax_ros.replay.state import current_values, places_of, tunable_names
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.running.task import Task
@@ -37,8 +37,8 @@ class Tunables:
         new = current_values(source.compiled.program)
         self._changed = {name: new[name] for name, value in self._current.items() if new.get(name, value) != value}
         for name, value in self._changed.items():
-            old = value_text(self._current[name])
-            note(f"tunable {name} starts at its new CURRENT={value_text(value)}, not at {old}")
+            old = source_text(self._current[name])
+            note(f"tunable {name} starts at its new CURRENT={source_text(value)}, not at {old}")
 
     def fresh(self, state: TaskState) -> dict[str, Value]:
         """Return the tunables that an edited task does not take over from a state: those whose CURRENT was edited.
@@ -77,7 +77,7 @@ class Tunables:
             if self._known.get(name) == value:
                 continue
             self._known[name] = value
-            told = value_text(value) if type_of_name(name) is DataType.REAL else f"{value:.10g}"
+            told = source_text(value) if type_of_name(name) is DataType.REAL else f"{value:.10g}"
             what = f"tunable {name} set to {told} at {self._when(state.stamp)} s"
             try:
                 task.tune(name, value)

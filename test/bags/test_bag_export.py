@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.export import export_csv
-from automax_ros.core.decimal_text import seconds_text
 from automax_ros.core.numbers import stored_real
+from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.wire.messages import Int16, Values, Variable, VariableTable
 
@@ -129,8 +129,8 @@ def test_numbers_that_no_rack_writes_do_no_harm(tmp_path: Path) -> None:
         ("run", "no common variable 'run'", "RUN@"),
         ("XYZZY", "no common variable 'XYZZY'", "it has REF%, COUNT!, GAIN"),
         ("", "no common variable ''", "it has REF%"),
-        ("TABLE%", "TABLE% is an array", "TABLE%(0,0)"),
-        ("TABLE%(1)", "TABLE% has 2 subscripts, not 1", "TABLE%(0,0)"),
+        ("TABLE%", "TABLE% is an array", "name one element; the last is TABLE%(1,"),
+        ("TABLE%(1)", "TABLE% has 2 subscripts, not 1", "name one element; the last is TABLE%(1,"),
         ("TABLE%(2,0)", "subscript 2 of TABLE%(2,0) is out of range", "the largest is 1"),
         ("REF%(0)", "REF% is not an array", "write REF%"),
         ("TABLE%(1,", "no common variable", "TABLE%"),

@@ -10,7 +10,7 @@ from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.status_line import erasing, fitting
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import Watched
+from automax_ros.rack.settings import watched
 
 RACK = """\
 rack: LINE1
@@ -99,16 +99,16 @@ def test_set_writes_before_the_first_scan(run, text, values):
         ("=5", "no common variable ''"),
         ("REFF%=5", "did you mean REF%?"),
         ("REF=5", "no common variable 'REF'"),
-        ("REF%=40000", "'40000' is no value for REF%, type INTEGER"),
-        ("REF%=1.5", "'1.5' is no value for REF%"),
-        ("REF%=", "'' is no value for REF%"),
-        ("RUN@=2", "'2' is no value for RUN@, type BOOLEAN"),
-        ("GAIN=nan", "'nan' is no value for GAIN, type REAL"),
-        ("GAIN=1e30", "no value for GAIN"),
-        ("NOTE$=123456789", "no value for NOTE$, type STRING"),
-        ("NOTE$=\udcff", "no value for NOTE$"),
+        ("REF%=40000", "'40000' is not a value for REF%, type INTEGER"),
+        ("REF%=1.5", "'1.5' is not a value for REF%"),
+        ("REF%=", "'' is not a value for REF%"),
+        ("RUN@=2", "'2' is not a value for RUN@, type BOOLEAN"),
+        ("GAIN=nan", "'nan' is not a value for GAIN, type REAL"),
+        ("GAIN=1e30", "not a value for GAIN"),
+        ("NOTE$=123456789", "not a value for NOTE$, type STRING"),
+        ("NOTE$=\udcff", "not a value for NOTE$"),
         ("TABLE%=1", "TABLE% is an array"),
-        ("REF%=" + "9" * 10_000, "no value for REF%"),
+        ("REF%=" + "9" * 10_000, "not a value for REF%"),
     ],
 )
 def test_bad_setting_is_wrong_usage(run, text, words):
@@ -136,7 +136,7 @@ def test_watched_values_are_shown(run, watch, shown):
     ("watch", "words"),
     [
         ("SPEED%", "no common variable 'SPEED%'"),
-        ("TABLE%", "TABLE% is an array\n  hint: one element of it is TABLE%(0,0)"),
+        ("TABLE%", "TABLE% is an array\n  hint: name one element; the last is TABLE%(2,3)"),
         ("TABLE%(1)", "TABLE% has 2 subscripts, not 1"),
         ("TABLE%(1,4)", "the largest is 3"),
         ("REF%(0)", "REF% is not an array"),
@@ -322,7 +322,7 @@ def rack(automax):
 def test_plain_line_comes_every_five_seconds(rack, capsys, monkeypatch):
     clock = iter([0, 1_000_000_000, 5_000_000_000, 9_000_000_000, 10_000_000_000])
     monkeypatch.setattr(status_module.time, "monotonic_ns", lambda: next(clock))
-    display = StatusDisplay(rack, [Watched("REF%", "REF%")], live=True)
+    display = StatusDisplay(rack, watched(rack.config, ["REF%"]), live=True)
     rack.start()
     for second in (1, 5, 9, 10):
         rack.scheduler.run_until(second * 1_000_000_000)
@@ -333,7 +333,7 @@ def test_plain_line_comes_every_five_seconds(rack, capsys, monkeypatch):
 
 
 def test_text_of_a_string_cannot_drive_the_terminal(rack, capsys):
-    display = StatusDisplay(rack, [Watched("NOTE$", "NOTE$")], live=False)
+    display = StatusDisplay(rack, watched(rack.config, ["NOTE$"]), live=False)
     rack.start([("NOTE$", "\x1b[2Jx\r\n")])
     display.finish(None)
     assert "NOTE$=\N{REPLACEMENT CHARACTER}[2Jx" in capsys.readouterr().out

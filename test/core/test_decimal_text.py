@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.core.decimal_text import real_text, seconds_text
 from automax_ros.core.numbers import stored_real
+from automax_ros.core.ticks import seconds_text
+from automax_ros.core.values import real_text
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,11 @@ from automax_ros.core.diagnostics import (
     as_json,
     has_errors,
     in_order,
-    printable,
     render,
     render_all,
 )
 from automax_ros.core.problems import PROBLEMS, Severity
+from automax_ros.core.text import printable
 
 SOURCE = SourceText("task.blk", "10 LOCAL A%\r\n\t20 B% = 1\n30 END")
 FAULT = Diagnostic(

@@ -8,7 +8,7 @@ from golden_text import check_golden
 from replay.reexecution import Reexecution
 
 from automax_ros.bags.reader import BagReader
-from automax_ros.core.decimal_text import real_text
+from automax_ros.core.values import real_text
 
 from .support import ROOT, TYPES, automax
 

@@ -85,12 +85,6 @@ def fits(value: Value, kind: DataType) -> bool:
     return low <= value <= high
 
 
-def range_text(kind: DataType) -> str:
-    """Return the range of a numeric type for a message."""
-    low, high = kind.range
-    return f"{low} to {high}" if kind.is_integer else "-9.2233717E18 to 9.2233717E18"
-
-
 def hex_hint(expression: Expression, kind: DataType) -> str | None:
     """Return how to write a negative hex constant where 16 bits were meant: a constant has 32 bits (decision)."""
     if not isinstance(expression, IntegerLiteral) or not expression.hexadecimal or kind is not DataType.INTEGER:

@@ -10,8 +10,8 @@ from automax_ros.blocks.declaration import Block, Processor
 from automax_ros.core.diagnostics import Diagnostic, Note, Span
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.problems.problem import Severity
+from automax_ros.core.text import Suggester
 from automax_ros.language.checks.broken_lines import BrokenLines
-from automax_ros.language.checks.suggestions import Suggester
 from automax_ros.language.program import BoundCall, CommonSpec, DataStructure, Symbol
 from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
 from automax_ros.language.syntax.tree import Data, Event

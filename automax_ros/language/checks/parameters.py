@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from automax_ros.blocks.declaration import Block, Form, Input, Output, Special
 from automax_ros.core.types import DataType
-from automax_ros.language.checks.constant_values import fits, hex_hint, literal_of, range_text
+from automax_ros.core.values import range_text
+from automax_ros.language.checks.constant_values import fits, hex_hint, literal_of
 from automax_ros.language.checks.context import Context
 from automax_ros.language.checks.expressions import check_expression, check_variable
 from automax_ros.language.checks.statements import check_written

@@ -5,7 +5,8 @@ from __future__ import annotations
 from automax_ros.blocks.declaration import Processor
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.checks.constant_values import constant_value, fits, hex_hint, literal_of, range_text
+from automax_ros.core.values import range_text
+from automax_ros.language.checks.constant_values import constant_value, fits, hex_hint, literal_of
 from automax_ros.language.checks.context import Context
 from automax_ros.language.checks.expressions import check_boolean, check_expression, check_integer, check_variable
 from automax_ros.language.syntax.tree import (

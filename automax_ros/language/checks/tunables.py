@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from automax_ros.core.numbers import REAL_MIN_POSITIVE, stored_real
 from automax_ros.core.types import DataType, Value
-from automax_ros.language.checks.constant_values import constant_value, fits, hex_hint, is_constant, range_text
+from automax_ros.core.values import range_text
+from automax_ros.language.checks.constant_values import constant_value, fits, hex_hint, is_constant
 from automax_ros.language.checks.context import Context
 from automax_ros.language.program import TuningLimits
 from automax_ros.language.syntax.tree import Declared, Expression, Scope

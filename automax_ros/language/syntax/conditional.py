@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.language.syntax.cursor import Cursor, suggestion
+from automax_ros.core.text import did_you_mean
+from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.expressions import expression, variable
 from automax_ros.language.syntax.frames import NESTING_LIMIT, FrameStack, too_deep
 from automax_ros.language.syntax.reporter import SyntaxFaultError
@@ -183,12 +184,13 @@ class StatementReader:
             cursor.fail("AMX0077", "FOR needs a simple variable, not an array element")
         cursor.expect("=", "AMX0035", f"`=` is missing behind FOR {control.name[:20]}", form)
         first = expression(cursor)
-        hint = (suggestion(cursor.current.text, ("TO",)) or form) if cursor.current.kind is Kind.WORD else form
+        hint = (did_you_mean(cursor.current.text, ("TO",)) or form) if cursor.current.kind is Kind.WORD else form
         cursor.expect("TO", "AMX0061", f"TO is missing before {cursor.found()}", hint)
         last = expression(cursor)
         step = expression(cursor) if cursor.accept("STEP") else None
         if cursor.current.kind is Kind.WORD and step is None:
-            cursor.fail("AMX0036", f"{cursor.found()} is not expected here", suggestion(cursor.current.text, ("STEP",)))
+            near = did_you_mean(cursor.current.text, ("STEP",))
+            cursor.fail("AMX0036", f"{cursor.found()} is not expected here", near)
         cursor.expect_end()
         self._frames.open(cursor, For(control, first, last, step, ()), _span(cursor, start))
 
@@ -251,5 +253,5 @@ def _check_glued_remark(cursor: Cursor) -> None:
 
 
 def _meant(word: str, meant: str) -> bool:
-    hint = suggestion(word, STATEMENT_WORDS)
+    hint = did_you_mean(word, STATEMENT_WORDS)
     return word not in STATEMENT_WORDS and hint == f"did you mean {meant}?"

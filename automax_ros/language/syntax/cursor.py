@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
 from typing import NoReturn
 
-from automax_ros.core.diagnostics import Note, Span, printable
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.text import did_you_mean, printable
 from automax_ros.core.types import NAME_LIMIT, bare_name
 from automax_ros.language.syntax.reporter import Reporter, SyntaxFaultError
 from automax_ros.language.syntax.tokens import RESERVED_WORDS, Fault, Kind, Token
-
-_LONGEST_SUGGESTED = 30
 
 
 class Cursor:
@@ -93,7 +90,7 @@ class Cursor:
         """Read the word or mark, or raise a syntax error; a misspelt word gets a suggestion."""
         if self.current.text != text:
             if hint is None and text.isalpha() and self.current.kind is Kind.WORD:
-                hint = suggestion(self.current.text, (text,))
+                hint = did_you_mean(self.current.text, (text,))
             self.fail(code, message, hint)
         return self.advance()
 
@@ -132,11 +129,3 @@ class Cursor:
     def skip_line(self) -> None:
         """Step to the end of the logical line."""
         self.position = len(self.tokens) - 1
-
-
-def suggestion(word: str, candidates: Iterable[str]) -> str | None:
-    """Return a hint with the candidate that a misspelt word comes closest to, None where none is close."""
-    if len(word) > _LONGEST_SUGGESTED:
-        return None
-    close = difflib.get_close_matches(word, sorted(candidates), n=1, cutoff=0.65)
-    return f"did you mean {close[0]}?" if close else None

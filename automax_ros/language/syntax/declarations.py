@@ -5,7 +5,8 @@ Form of a tunable (decision): LOCAL GAIN [CURRENT=1.5, HIGH=10.0, LOW=0.0, STEP=
 
 from __future__ import annotations
 
-from automax_ros.language.syntax.cursor import Cursor, suggestion
+from automax_ros.core.text import did_you_mean
+from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.expressions import close_parenthesis, constant, variable
 from automax_ros.language.syntax.functions import FUNCTIONS, REFUSED_FUNCTIONS
 from automax_ros.language.syntax.tokens import RESERVED_WORDS, Kind, Token
@@ -79,7 +80,7 @@ def _tuning(cursor: Cursor) -> Tuning:
     while True:
         key = cursor.current
         if key.text not in TUNING_KEYS:
-            hint = suggestion(key.text, TUNING_KEYS) or "the keys are CURRENT, HIGH, LOW and STEP"
+            hint = did_you_mean(key.text, TUNING_KEYS) or "the keys are CURRENT, HIGH, LOW and STEP"
             cursor.fail("AMX0074", f"{cursor.found()} is not a key of a tunable", hint)
         if key.text in given:
             cursor.fail("AMX0074", f"{key.text} is given twice")
@@ -115,7 +116,7 @@ def event(cursor: Cursor, start: Token) -> Event:
     while cursor.accept(","):
         key = cursor.current
         if key.text not in EVENT_KEYS:
-            hint = suggestion(key.text, EVENT_KEYS) or form
+            hint = did_you_mean(key.text, EVENT_KEYS) or form
             cursor.fail("AMX0076", f"{cursor.found()} is not a key of EVENT", hint)
         if (status if key.text == "INTERRUPT_STATUS" else timeout) is not None:
             cursor.fail("AMX0076", f"{key.text} is given twice")

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 
-from automax_ros.core.diagnostics import Span, printable
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.text import printable
 from automax_ros.language.syntax.constants import hexadecimal_fault, integer_value, real_fault, string_fault
 from automax_ros.language.syntax.tokens import Fault, Kind, Token
 

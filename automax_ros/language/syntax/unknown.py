@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from automax_ros.language.syntax.cursor import Cursor, suggestion
+from automax_ros.core.text import did_you_mean
+from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.lexer import TYPE_CHARACTERS
 from automax_ros.language.syntax.tokens import BASIC_TASK_WORDS, RESERVED_WORDS, STATEMENT_WORDS, Kind
 
@@ -66,7 +67,7 @@ def refuse_statement(cursor: Cursor) -> NoReturn:
         if token.text in ("THEN", "TO", "STEP", "AND", "OR", "XOR", "NOT"):
             hint = "did the line before it need an `&` at its end?"
             cursor.fail("AMX0030", f"{cursor.found()} cannot begin a statement", hint)
-        hint = suggestion(token.text, STATEMENT_WORDS | BASIC_TASK_WORDS.keys())
+        hint = did_you_mean(token.text, STATEMENT_WORDS | BASIC_TASK_WORDS.keys())
         if hint is None and cursor.following.text == "(":
             hint = f"a block is called by CALL {token.text[:20]}("
         cursor.fail("AMX0030", f"{cursor.found()} is not a statement", hint)

@@ -1,0 +1,83 @@
+"""Pieces of text for messages: untrusted text made harmless, counted things, the known word nearest to another."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterable
+from itertools import islice
+
+from automax_ros.core.types import bare_name
+
+MAX_COMPARISONS = 50_000
+"""Most pairs of words that one ``Suggester`` compares (decision: a bound on time for hostile sources)."""
+_LONGEST_GUESS = 60
+_LISTED = 8
+"""How many words a hint lists where none is near."""
+_LIKENESS = 0.62
+"""Share of letters in common from which a word counts as a misspelling (decision)."""
+
+
+def printable(text: str) -> str:
+    """Return a text with control characters but the tab replaced, so that a hostile source cannot drive a terminal."""
+    return "".join(char if char == "\t" or char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)
+
+
+def quoted(text: str, *, marks: str = "'", limit: int = 40) -> str:
+    """Return a piece of a file for a message: shortened, without control characters or line ends, in quotes."""
+    short = text if len(text) <= limit else text[: limit - 3] + "..."
+    return f"{marks}{printable(short)}{marks}"
+
+
+def count_of(number: int, thing: str) -> str:
+    """Return a number of things: ``1 scan``, ``2 scans``."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def did_you_mean(word: str, known: Iterable[str], *, most: int = 1) -> str | None:
+    """Return the hint ``did you mean X?`` with the known words nearest to one that is not known, None if none is near.
+
+    At most ``most`` words, ``X or Y``.
+    """
+    return Suggester().hint(word, known, most=most)
+
+
+def near_or_listed(word: str, known: Collection[str], prefix: str = "") -> str | None:
+    """Return ``did_you_mean``, or a hint with the first known words where none is near; None if there are none.
+
+    ``prefix`` belongs before the word that is meant.
+    """
+    near = Suggester().nearest(word, known)
+    if near is not None:
+        return f"did you mean {prefix}{near}?"
+    return f"it has {', '.join(islice(known, _LISTED))}{' ...' if len(known) > _LISTED else ''}" if known else None
+
+
+class Suggester:
+    """Finds near words until its budget of comparisons is spent."""
+
+    def __init__(self) -> None:
+        """Begin with the whole budget."""
+        self._left = MAX_COMPARISONS
+
+    def hint(self, word: str, known: Iterable[str], *, most: int = 1) -> str | None:
+        """Return the hint ``did you mean X?``, None where no known word is near or the budget is spent."""
+        found = self._near(word, known, most)
+        return f"did you mean {' or '.join(found)}?" if found else None
+
+    def nearest(self, word: str, known: Iterable[str]) -> str | None:
+        """Return the known word that looks most like ``word``, None where none is near or the budget is spent."""
+        return next(iter(self._near(word, known, 1)), None)
+
+    def _near(self, word: str, known: Iterable[str], most: int) -> list[str]:
+        """Return near words in any case: twins of another type character first, then by letters in common."""
+        if len(word) > _LONGEST_GUESS:
+            return []
+        choices = {item.casefold(): item for item in sorted(known, reverse=True)}
+        self._left -= len(choices)
+        if self._left < 0:
+            return []
+        asked = word.casefold()
+        bare = bare_name(asked)
+        twins = sorted(item for item in choices if bare_name(item) == bare and item != asked)
+        alike = difflib.get_close_matches(asked, choices, n=most + len(twins), cutoff=_LIKENESS)
+        return [choices[item] for item in dict.fromkeys((*twins, *alike))][:most]
