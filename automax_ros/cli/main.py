@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 SUBCOMMANDS: dict[str, str] = {
     "check": "find everything that is wrong with tasks and rack files",
+    "new": "make a rack file from a folder of tasks",
     "trace": "run a task scan by scan on a CSV table",
     "compile": "print the function that a task becomes",
     "tune-info": "coefficients and limits of dynamic blocks in a task",

@@ -56,15 +56,24 @@ def target_of(arguments: argparse.Namespace) -> Target:
     is_udc = processor is Processor.UDC
     if arguments.tick_ms is None:
         return Target(processor, UDC_TICK_NS if is_udc else DEFAULT_TICK_NS)
-    if not _MILLISECONDS.fullmatch(arguments.tick_ms):
-        raise UsageError(f"--tick-ms {quoted(arguments.tick_ms)} is not a number of milliseconds such as 5.5")
-    try:
-        tick = tick_ns(arguments.tick_ms)
-    except ValueError as error:
-        raise UsageError(f"--tick-ms: {error}") from error
+    tick = tick_option(arguments.tick_ms)
     if is_udc and tick != UDC_TICK_NS:
         raise UsageError(f"--tick-ms {arguments.tick_ms}: the tick of a UDC is always 0.5 ms")
     return Target(processor, tick)
+
+
+def tick_option(text: str) -> int:
+    """Return the tick in ns that ``--tick-ms`` asks for.
+
+    Raises:
+        UsageError: not a tick that a Processor can have.
+    """
+    if not _MILLISECONDS.fullmatch(text):
+        raise UsageError(f"--tick-ms {quoted(text)} is not a number of milliseconds such as 5.5")
+    try:
+        return tick_ns(text)
+    except ValueError as error:
+        raise UsageError(f"--tick-ms: {error}") from error
 
 
 def is_rack_file(path: Path) -> bool:

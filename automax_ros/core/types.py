@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, REAL_MAX
 
@@ -114,3 +115,13 @@ def type_of_name(name: str) -> DataType:
 def bare_name(name: str) -> str:
     """Return a variable's name without its type character."""
     return name[:-1] if name[-1:] in _BY_SUFFIX else name
+
+
+def declaration_text(name: str, dimensions: Sequence[int] = (), length: int = 0) -> str:
+    """Return a variable as COMMON and rack files declare it: ``TABLE%(10)``, ``NOTE$:8(3)``.
+
+    ``dimensions`` are numbers of elements, ``length`` is a STRING's, 0 for other types.
+    """
+    maximum = f":{length}" if length not in (0, DEFAULT_STRING_LENGTH) else ""
+    subscripts = f"({','.join(str(size - 1) for size in dimensions)})" if dimensions else ""
+    return f"{name}{maximum}{subscripts}"

@@ -14,6 +14,7 @@ from automax_ros.core.types import (
     MAX_SUBSCRIPT,
     DataType,
     bare_name,
+    declaration_text,
 )
 from automax_ros.language.checks.context import Context
 from automax_ros.language.checks.task_layout import TaskLayout
@@ -153,7 +154,10 @@ def _compare_with_rack(context: Context, symbol: Symbol, commons: Mapping[str, C
             )
             context.report("AMX4011", message, symbol.span)
         else:
-            hint = context.suggest.hint(symbol.name, commons)
+            line = declaration_text(symbol.name, symbol.dimensions, symbol.length)
+            hint = f"or add to `common:` of the rack file:  {line}: {{}}"
+            near = context.suggest.hint(symbol.name, commons)
+            hint = f"{near} {hint}" if near else hint.removeprefix("or ")
             context.report("AMX4010", f"the rack does not define the common {symbol.name}", symbol.span, hint)
     elif spec.dimensions != symbol.dimensions:
         message = f"{symbol.name} is {_shape(symbol.dimensions)} here, {_shape(spec.dimensions)} at {spec.place}"

@@ -1,0 +1,243 @@
+"""A rack file for a folder of tasks: a beginning for somebody who has the sources of a plant and nothing else.
+
+Every COMMON that a task declares becomes a common variable of the rack. The tasks share the Processors evenly; the one
+that scans most often is served first (decision).
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
+from automax_ros.language.checks.checker import CheckResult
+from automax_ros.language.program import CommonSpec
+from automax_ros.language.syntax.parser import parse
+from automax_ros.language.syntax.tree import Declaration, Declared, Scope
+from automax_ros.language.syntax.walk import statements_in_order
+from automax_ros.rack.config import (
+    DEFAULT_OUT_LIMIT,
+    MAX_PRIORITY,
+    MAX_PROCESSORS,
+    MAX_TASKS,
+    MIN_PRIORITY,
+    CommonVariable,
+)
+from automax_ros.rack.files import MAX_BYTES, FileFault, is_inside
+from automax_ros.rack.findings import quoted
+from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS
+from automax_ros.rack.names import NameFault, variable_name
+from automax_ros.rack.task_source import read_task_source
+from automax_ros.rack.tasks_check import check_source
+
+_PROCESSOR = "57C435"
+_MOST_FILES = 10_000
+"""Most entries of a folder that are looked at (decision: a bound on untrusted folders)."""
+_MOST_NAMED = 4
+"""How many of the tasks that share a common are named next to it."""
+_RACK_NAME_LIMIT = 8
+_COMMENT_COLUMN = 36
+_UNKNOWN_NS = 1 << 62
+"""Stands for the scan period of a task with errors."""
+
+
+class DraftFault(Exception):
+    """No rack file can be made of a folder; ``hint`` says what to do."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+@dataclass(frozen=True)
+class DraftedTask:
+    """A task of the rack to be: its ``file`` as the rack file names it, and its text."""
+
+    name: str
+    file: str
+    source: SourceText
+
+
+@dataclass
+class Draft:
+    """A rack to be. ``left_out`` are the names of files that cannot be tasks, each with the reason.
+
+    ``commons`` are by full name, each with the place of its first declaration; ``users`` the tasks that declare it.
+    ``results`` are what the checks of the tasks against these commons found, by the tasks' names.
+    """
+
+    name: str
+    tick_ns: int
+    tasks: list[DraftedTask] = field(default_factory=list)
+    left_out: list[tuple[str, str]] = field(default_factory=list)
+    commons: dict[str, CommonSpec] = field(default_factory=dict)
+    users: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    results: dict[str, CheckResult] = field(default_factory=dict)
+
+    def text(self, processors: int) -> str:
+        """Return the rack file with 1 to 4 Processors.
+
+        Raises:
+            DraftFault: more tasks than these Processors run, or more text than a rack file may have.
+        """
+        if len(self.tasks) > processors * MAX_TASKS:
+            message = f"{len(self.tasks)} tasks are more than the {processors * MAX_TASKS} of {processors} Processors"
+            needed = -(-len(self.tasks) // MAX_TASKS)
+            raise DraftFault(message, f"--processors {needed}" if needed <= MAX_PROCESSORS else "make several racks")
+        lines = [
+            "# Made from the tasks of this folder; docs/rack_yaml.md has every key. `ros: in` lets ROS 2 write a",
+            "# common, `preset:` gives it a value at the start, `unit:` and `description:` say what it is.",
+            f"rack: {self.name}",
+            "slots:",
+            _commented(f"  0: {{module: {self._memory_module()}}}", "common memory"),
+            *self._processor_lines(processors),
+            "common:" if self.commons else "common: {}",
+            *self._common_lines(),
+        ]
+        text = "\n".join(lines) + "\n"
+        if len(text.encode()) > MAX_BYTES:
+            raise DraftFault(f"the rack file would have more than {MAX_BYTES} bytes", "make several racks")
+        return text
+
+    def _processor_lines(self, processors: int) -> Iterator[str]:
+        periods = {task.name: self._period_ns(task) for task in self.tasks}
+        ranks = sorted(set(periods.values()))
+        share = -(-len(self.tasks) // processors)
+        for number in range(processors):
+            own = self.tasks[number * share : (number + 1) * share]
+            yield f"  {number + 1}:"
+            yield f"    module: {_PROCESSOR}"
+            yield f"    tick_ms: {self.tick_ns / NS_PER_MS:g}"
+            yield "    tasks:" if own else "    tasks: {}"
+            for task in own:
+                priority = min(MIN_PRIORITY + ranks.index(periods[task.name]), MAX_PRIORITY)
+                file = "" if task.file == f"{task.name}.BLK" else f"file: {_yaml_quoted(task.file)}, "
+                period = periods[task.name]
+                comment = f"a scan every {period / NS_PER_MS:g} ms" if period < _UNKNOWN_NS else "see `automax check`"
+                yield _commented(f"      {task.name}: {{{file}priority: {priority}}}", comment)
+
+    def _period_ns(self, task: DraftedTask) -> int:
+        program = self.results[task.name].program
+        return program.period_ns if program is not None else _UNKNOWN_NS
+
+    def _common_lines(self) -> Iterator[str]:
+        simple = 0
+        for spec in self.commons.values():
+            simple += not spec.dimensions
+            closed = "{ros: closed}" if not spec.dimensions and simple > DEFAULT_OUT_LIMIT else "{}"
+            users = self.users[spec.name]
+            more = ", ..." if len(users) > _MOST_NAMED else ""
+            text = declaration_text(spec.name, spec.dimensions, spec.length)
+            yield _commented(f"  {text}: {closed}", ", ".join(users[:_MOST_NAMED]) + more)
+
+    def _memory_module(self) -> str:
+        """Return the smallest common memory that holds the commons, else the largest."""
+        needed = sum(
+            CommonVariable(spec.name, spec.type, spec.dimensions, spec.length).registers
+            for spec in self.commons.values()
+        )
+        fitting = (model for model, size in sorted(COMMON_MEMORY_REGISTERS.items()) if needed <= size)
+        return next(fitting, max(COMMON_MEMORY_REGISTERS))
+
+
+def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
+    """Collect the tasks and commons of a folder for a rack file in ``rack_folder``, which is the folder or above it.
+
+    Whatever the files hold: one that cannot be a task is left out, a faulty task is taken as far as it can be read.
+
+    Raises:
+        DraftFault: the folder cannot be read, holds no task, or is not below ``rack_folder``.
+    """
+    try:
+        inner = folder.resolve().relative_to(rack_folder.resolve())
+    except (OSError, ValueError, RuntimeError):
+        message = f"{rack_folder} is not the folder of the tasks, nor above it"
+        raise DraftFault(message, f"put the rack file into {folder}") from None
+    found = Draft(_rack_name(folder), tick_ns)
+    for path in _sources(folder):
+        _take(found, path, folder, inner)
+    if not found.tasks:
+        reasons = "".join(f"; {quoted(name)} {reason}" for name, reason in found.left_out[:3])
+        raise DraftFault(f"{folder} holds no task (.BLK){reasons}")
+    for task in found.tasks:
+        found.results[task.name] = check_source(task.source, task.name, tick_ns, found.commons)
+    return found
+
+
+def _sources(folder: Path) -> list[Path]:
+    try:
+        entries = list(islice(folder.iterdir(), _MOST_FILES + 1))
+    except (OSError, ValueError) as error:
+        raise DraftFault(f"{folder} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    if len(entries) > _MOST_FILES:
+        raise DraftFault(f"{folder} holds more than {_MOST_FILES} files", "put the tasks into a folder of their own")
+    return sorted(path for path in entries if path.suffix.upper() == ".BLK")
+
+
+def _take(found: Draft, path: Path, folder: Path, inner: Path) -> None:
+    """Take a file into the draft, or note why not."""
+    if not path.name.isprintable():
+        found.left_out.append((path.name, "has a name that no rack file can hold: rename it"))
+        return
+    if not is_inside(path, folder):
+        found.left_out.append((path.name, "is a link out of the folder"))
+        return
+    try:
+        source = read_task_source(path)
+    except FileFault as fault:
+        found.left_out.append((path.name, str(fault)))
+        return
+    task = DraftedTask(_task_name(path.stem, {task.name for task in found.tasks}), str(inner / path.name), source)
+    found.tasks.append(task)
+    module, _ = parse(source)
+    for statement, *_ in statements_in_order(module.statements):
+        if isinstance(statement, Declaration) and statement.scope is Scope.COMMON:
+            for declared in statement.variables:
+                _add_common(found, task, declared)
+
+
+def _add_common(found: Draft, task: DraftedTask, declared: Declared) -> None:
+    spec = CommonSpec(
+        name=declared.name,
+        type=declared.type,
+        place=f"{task.source.name}:{declared.span.line}:{declared.span.column}",
+        dimensions=tuple(subscript + 1 for subscript in declared.subscripts),
+        length=(declared.length or DEFAULT_STRING_LENGTH) if declared.type is DataType.STRING else 0,
+    )
+    try:
+        variable_name(declaration_text(spec.name, spec.dimensions, spec.length))
+    except NameFault:  # the check of the task says what is wrong with it
+        return
+    known = found.commons.setdefault(spec.name, spec)
+    if task.name not in found.users[known.name]:
+        found.users[known.name].append(task.name)
+
+
+def _task_name(stem: str, taken: set[str]) -> str:
+    """Return a name for a task that its file's name suggests (2.4.1)."""
+    plain = re.sub(r"[^A-Z0-9_]", "_", stem.upper())
+    plain = plain if plain[:1].isalpha() else f"T{plain}"
+    name, number = plain[:TASK_NAME_LIMIT], 1
+    while name in taken:
+        number += 1
+        name = f"{plain[: TASK_NAME_LIMIT - len(str(number))]}{number}"
+    return name
+
+
+def _rack_name(folder: Path) -> str:
+    plain = re.sub(r"[^A-Z0-9]", "", folder.resolve().name.upper())
+    return plain[:_RACK_NAME_LIMIT] or "RACK1"
+
+
+def _commented(line: str, comment: str) -> str:
+    return f"{line:<{_COMMENT_COLUMN}} # {comment}"
+
+
+def _yaml_quoted(text: str) -> str:
+    return "'" + text.replace("'", "''") + "'"
