@@ -159,7 +159,13 @@ def test_disagreement_shows_both_places(names: str, code: str, words: str) -> No
 
 
 def test_unknown_common_suggests_a_near_one() -> None:
-    assert one(common("REFF%"), commons=RACK).hint == "did you mean REF%?"
+    hint = one(common("REFF%"), commons=RACK).hint
+    assert hint == "did you mean REF%? If not, add to `common:` of the rack file:  REFF%: {}"
+
+
+@pytest.mark.parametrize("declared", ["XYZ%", "XYZ!(7,2)", "XYZ$:8(3)", "XYZ$", "XYZ"])
+def test_unknown_common_gives_the_line_to_paste(declared) -> None:
+    assert one(common(declared), commons=RACK).hint == f"add to `common:` of the rack file:  {declared}: {{}}"
 
 
 @pytest.mark.parametrize(

@@ -155,9 +155,9 @@ def _compare_with_rack(context: Context, symbol: Symbol, commons: Mapping[str, C
             context.report("AMX4011", message, symbol.span)
         else:
             line = declaration_text(symbol.name, symbol.dimensions, symbol.length)
-            hint = f"or add to `common:` of the rack file:  {line}: {{}}"
             near = context.suggest.hint(symbol.name, commons)
-            hint = f"{near} {hint}" if near else hint.removeprefix("or ")
+            add = f"add to `common:` of the rack file:  {line}: {{}}"
+            hint = f"{near} If not, {add}" if near else add
             context.report("AMX4010", f"the rack does not define the common {symbol.name}", symbol.span, hint)
     elif spec.dimensions != symbol.dimensions:
         message = f"{symbol.name} is {_shape(symbol.dimensions)} here, {_shape(spec.dimensions)} at {spec.place}"
