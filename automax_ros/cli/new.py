@@ -14,12 +14,12 @@ from pathlib import Path
 from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.rack_file import DEFAULT_RACK_FILE
 from automax_ros.cli.task_files import is_rack_file, tick_option
-from automax_ros.cli.terminal import count_of, print_diagnostics
+from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.text import count_of, quoted
 from automax_ros.rack.config import MAX_PROCESSORS
 from automax_ros.rack.draft import Draft, DraftFault, draft
-from automax_ros.rack.findings import quoted
 from automax_ros.rack.loader import load
 
 
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         drafted = draft(folder, output.parent, tick_ns)
         _write(output, drafted.text(arguments.processors), force=arguments.force)
     except DraftFault as fault:
-        raise UsageError(str(fault), fault.hint) from fault
+        raise UsageError(fault.message, fault.hint) from fault
     counts = ((arguments.processors, "Processor"), (len(drafted.tasks), "task"), (len(drafted.commons), "common"))
     print(f"wrote {output}: {', '.join(count_of(number, thing) for number, thing in counts)}")
     for name, reason in drafted.left_out:

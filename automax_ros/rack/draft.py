@@ -14,6 +14,8 @@ from itertools import islice
 from pathlib import Path
 
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
 from automax_ros.language.checks.checker import CheckResult
@@ -30,7 +32,6 @@ from automax_ros.rack.config import (
     CommonVariable,
 )
 from automax_ros.rack.files import MAX_BYTES, FileFault, is_inside
-from automax_ros.rack.findings import quoted
 from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS
 from automax_ros.rack.names import NameFault, variable_name
 from automax_ros.rack.task_source import read_task_source
@@ -47,12 +48,8 @@ _UNKNOWN_NS = 1 << 62
 """Stands for the scan period of a task with errors."""
 
 
-class DraftFault(Exception):
-    """No rack file can be made of a folder; ``hint`` says what to do."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
+class DraftFault(Fault):
+    """No rack file can be made of a folder."""
 
 
 @dataclass(frozen=True)
