@@ -189,6 +189,8 @@ class _Show:
                 if self._paused
                 else "goes on"
             )
+        for text in player.health.news():
+            self._line.message(printable(text))
         passed = self._line.due()
         if not passed:
             return

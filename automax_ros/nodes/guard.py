@@ -1,7 +1,7 @@
-"""What keeps a client's request from ending a program: callbacks whose exceptions stay inside.
+"""What keeps a client's message or request from ending a program.
 
-rclpy lets an exception of any callback leave ``spin_once``, those of its own parameter services included: a
-``ParameterValue`` of an unknown type is enough. A node that is ``guard``ed refuses instead.
+rclpy lets an exception of any callback leave ``spin_once``, those of its own services and conversions included: a
+``ParameterValue`` of an unknown type is enough, or a string that is not UTF-8. Behind a guard the program goes on.
 """
 
 from __future__ import annotations
@@ -11,33 +11,63 @@ from typing import Any
 
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.context import Context
 from rclpy.node import Node
 
+from automax_ros.running.health import Health
+
+FAILED = "failed callback"
+"""What ``Health`` counts them as."""
+MOST_TOLD, MOST_LOGGED = 300, 20
+"""So many characters of an error are told, and so many failures are logged: a client may go on and on."""
 _LAST_TYPE = ParameterType.PARAMETER_STRING_ARRAY
 
-Report = Callable[[str, Exception], None]
-"""Told what failed, and with what."""
 
+class Guard:
+    """Reports what fails to ``health``, and the first failures to ``log``."""
 
-def guard_services(node: Node, report: Report) -> None:
-    """Let no exception leave the services that a node has now; a request to set parameters that fails is refused."""
-    for service in node.services:
-        service.callback = _guarded(service.callback, service.srv_type, service.srv_name, report)
+    def __init__(self, health: Health, log: Callable[[str], object]) -> None:
+        """Begin to guard."""
+        self._health, self._log = health, log
 
+    def report(self, what: str, error: Exception) -> None:
+        """Count a failure and tell it."""
+        text = f"{what}: {type(error).__name__}: {str(error)[:MOST_TOLD]}"
+        self._health.note(FAILED, (what, type(error)), lambda: text)
+        if self._health.counts[FAILED] <= MOST_LOGGED:
+            self._log(text)
 
-def _guarded(callback: Callable[[Any, Any], Any], kind: Any, name: str, report: Report) -> Callable[[Any, Any], Any]:
-    setting = kind in {SetParameters, SetParametersAtomically}
+    def services(self, node: Node) -> None:
+        """Let no exception leave the services that a node has now; a request that fails is refused."""
+        for service in node.services:
+            service.callback = self._answering(service.callback, service.srv_type, service.srv_name)
 
-    def answer(request: Any, response: Any) -> Any:
+    def serve(self, executor: Any, context: Context, seconds: float) -> None:
+        """Let an executor carry out what has come, or wait for it at most a time (s).
+
+        Raises:
+            Exception: what the executor raises once the context is shut down.
+        """
         try:
-            if setting:
-                _check_types(request)
-            return callback(request, response)
+            executor.spin_once(timeout_sec=seconds)
         except Exception as error:
-            report(f"a request to {name} was refused", error)
-            return _refusal(kind, request, str(error))
+            if not context.ok():
+                raise
+            self.report("a message or a request was dropped", error)
 
-    return answer
+    def _answering(self, callback: Callable[[Any, Any], Any], kind: Any, name: str) -> Callable[[Any, Any], Any]:
+        setting = kind in {SetParameters, SetParametersAtomically}
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                if setting:
+                    _check_types(request)
+                return callback(request, response)
+            except Exception as error:
+                self.report(f"a request to {name} was refused", error)
+                return _refusal(kind, request, str(error))
+
+        return answer
 
 
 def _check_types(request: Any) -> None:
@@ -47,7 +77,7 @@ def _check_types(request: Any) -> None:
 
 
 def _refusal(kind: Any, request: Any, reason: str) -> Any:
-    result = SetParametersResult(successful=False, reason=reason[:500])
+    result = SetParametersResult(successful=False, reason=reason[:MOST_TOLD])
     if kind is SetParameters:
         return kind.Response(results=[result] * len(request.parameters))
     return kind.Response(result=result) if kind is SetParametersAtomically else kind.Response()

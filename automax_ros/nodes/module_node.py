@@ -20,15 +20,13 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_policy_name_from_kind
 
-from automax_ros.nodes.guard import guard_services
+from automax_ros.nodes.guard import Guard
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import Pacer
 from automax_ros.wire.stream import RackStream, Topic
 
-MOST_TOLD, MOST_LOGGED = 300, 20
-"""So many characters of an error are told, and so many failed callbacks are logged."""
 _SIM_TIME = "use_sim_time"
 
 
@@ -64,7 +62,8 @@ class ModuleNode(Node):  # type: ignore[misc]
         super().__init__(name, namespace=space, context=site.context, parameter_overrides=own_time)
         self.site = site
         self.add_on_set_parameters_callback(_refuse_simulated_time)
-        guard_services(self, self.report)
+        self.guard = Guard(site.health, self.get_logger().error)
+        self.guard.services(self)
 
     def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Publisher[Any]:
         """Return a publisher of a topic; it takes CDR bytes. ``joined`` is called for each reader that comes."""
@@ -99,17 +98,9 @@ class ModuleNode(Node):  # type: ignore[misc]
                     self.site.pacer.catch_up()
                     action(*arguments)
                 except Exception as error:
-                    self.report(what, error)
+                    self.guard.report(what, error)
 
         return entered
-
-    def report(self, what: str, error: Exception) -> None:
-        """Count what failed, and tell it: a client may go on and on, so the log gets the first of them only."""
-        text = f"{what}: {type(error).__name__}: {str(error)[:MOST_TOLD]}"
-        health = self.site.health
-        health.note("failed callback", (what, type(error)), lambda: text)
-        if health.counts["failed callback"] <= MOST_LOGGED:
-            self.get_logger().error(text)
 
 
 def _refuse_simulated_time(parameters: list[Parameter[Any]]) -> SetParametersResult:

@@ -27,7 +27,9 @@ from automax_ros.bags.playback import PlayTopic, Renaming, Survey
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.executor import make_executor
+from automax_ros.nodes.guard import Guard
 from automax_ros.nodes.topics import message_class, ros_qos
+from automax_ros.running.health import Health
 from automax_ros.wire.cdr import CdrError, decoder, encoder
 from automax_ros.wire.definitions import message_types
 from automax_ros.wire.messages import Clock
@@ -88,6 +90,9 @@ class Player:
         self._node = Node("player", namespace=space or "/", context=self._context, enable_rosout=False)
         self._node.create_service(Trigger, "~/pause", self._pause)
         self._node.create_service(Trigger, "~/resume", self._resume)
+        self.health = Health()
+        self._guard = Guard(self.health, self._node.get_logger().error)
+        self._guard.services(self._node)
         self._executor = make_executor(self._context)
         self._executor.add_node(self._node)
         self._outlets: dict[str, _Outlet] = {}
@@ -114,7 +119,7 @@ class Player:
             found = [space for space, name in tables.items() if self._node.count_publishers(name) > (name in own)]
             if found:
                 return found
-            self._executor.spin_once(timeout_sec=0.02)
+            self._serve(0.02)
         return []
 
     @property
@@ -160,13 +165,16 @@ class Player:
         deadline = time.monotonic_ns() + ACKNOWLEDGE_NS
         for outlet in self._outlets.values():
             while outlet.unconfirmed() and time.monotonic_ns() < deadline and not stopping():
-                self._executor.spin_once(timeout_sec=0.01)
+                self._serve(0.01)
 
     def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown()
         self._node.destroy_node()
         self._context.try_shutdown()
+
+    def _serve(self, seconds: float) -> None:
+        self._guard.serve(self._executor, self._context, seconds)
 
     def _open(self, topic: PlayTopic, kind: Any) -> None:
         name = self._renaming.topic(topic.name)
@@ -213,7 +221,7 @@ class Player:
             if stopping():
                 return False
         wake = min(due, self._next_clock, now + _LONGEST_WAIT_NS) if not self.paused else now + _LONGEST_WAIT_NS
-        self._executor.spin_once(timeout_sec=max(0, wake - time.monotonic_ns()) / NS_PER_S)
+        self._serve(max(0, wake - time.monotonic_ns()) / NS_PER_S)
         return True
 
     def _shift(self, now: int) -> None:

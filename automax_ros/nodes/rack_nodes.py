@@ -139,16 +139,10 @@ class RackNodes:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
-            self.nodes[0].report(f"rack {self.rack.config.name} has ended", error)
+            self.nodes[0].guard.report(f"rack {self.rack.config.name} has ended", error)
 
     def _serve(self, seconds: float) -> None:
-        """Let the executor carry out one callback; one that fails is reported and the rack goes on."""
-        try:
-            self._executor.spin_once(timeout_sec=seconds)
-        except Exception as error:
-            if not self._context.ok():
-                raise
-            self.nodes[0].report("a message or a request was dropped", error)
+        self.nodes[0].guard.serve(self._executor, self._context, seconds)
 
 
 def _loaded(path: Path) -> Rack:

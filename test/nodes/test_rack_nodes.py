@@ -1,0 +1,189 @@
+"""A rack in somebody else's process: their context, their executor, their nodes next to it."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from system.support import TYPES, wait_until
+
+from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack, RackError
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def context(ros_domain_id):
+    from rclpy.context import Context
+
+    made = Context()
+    made.init(args=[])
+    yield made
+    made.try_shutdown()
+
+
+@pytest.fixture(params=["EventsExecutor", "SingleThreadedExecutor", "MultiThreadedExecutor"])
+def executor(request, context):
+    from rclpy import executors, experimental
+
+    kind = getattr(executors, request.param, None) or getattr(experimental, request.param)
+    made = kind(context=context)
+    yield made
+    made.shutdown()
+
+
+@pytest.fixture
+def nodes(context):
+    from automax_ros.nodes import RackNodes
+
+    with RackNodes(TYPES, context=context) as made:
+        yield made
+
+
+def spin_until(executor, condition, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it never came true"
+        executor.spin_once(timeout_sec=0.05)
+
+
+def test_own_node_works_with_the_rack_in_one_executor(context, executor, nodes):
+    """A node of the user's own writes a common, the rack's task doubles it, the node hears of it."""
+    from rclpy.node import Node
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+    from std_msgs.msg import Int16
+
+    mine = Node("mine", context=context)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    heard: list[int] = []
+    mine.create_subscription(Int16, "/types/common/TWICE", lambda message: heard.append(message.data), latched)
+    publisher = mine.create_publisher(Int16, "/types/common/REF/set", 10)
+    mine.create_timer(0.05, lambda: publisher.publish(Int16(data=77)))
+    executor.add_node(mine)
+    nodes.add_to(executor)
+    nodes.start([("REF%", 12)])
+    spin_until(executor, lambda: heard and heard[-1] == 154)
+    executor.remove_node(mine)
+    mine.destroy_node()
+    with nodes.lock:
+        assert nodes.rack.value("REF%") == 77
+    assert nodes.rack.statistics["FAST"].scans > 0
+    assert not nodes.health.counts
+
+
+def test_scans_go_on_while_a_callback_of_the_users_takes_long(context, nodes):
+    """The rack has a thread of its own, so a slow callback delays messages, not scans."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor(context=context)
+    nodes.add_to(executor)
+    nodes.start()
+    wait_until(lambda: nodes.rack.statistics["FAST"].scans > 0)
+    before = nodes.rack.statistics["FAST"].scans
+    time.sleep(0.5)
+    assert nodes.rack.statistics["FAST"].scans > before + 20
+    executor.shutdown()
+
+
+def test_scans_stand_on_the_grid(nodes):
+    seen = []
+
+    class Observer:
+        def scanned(self, task, record, _):
+            if task.name == "FAST" and record.scan:
+                seen.append((record.scan, record.time_ns))
+
+        def written(self, writes):
+            pass
+
+        tuned = all_stopped = written
+
+    nodes.rack.observe(Observer())
+    nodes.start()
+    wait_until(lambda: len(seen) > 20)
+    assert [scan for scan, _ in seen[:20]] == list(range(1, 21))
+    assert not [at for _, at in seen if at % 5_500_000]
+
+
+def test_run_ends_at_its_time(context, nodes):
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor(context=context)
+    nodes.add_to(executor)
+    nodes.start(paced=False)
+    nodes.run(100 * NS_PER_MS)
+    assert nodes.rack.now_ns == 100 * NS_PER_MS - 1
+    executor.shutdown()
+
+
+def test_nothing_stays_in_the_graph(context, executor):
+    """Neither nodes nor topics nor services, but for one that rclpy leaves of each node: the process lives on."""
+    from rclpy.node import Node
+
+    from automax_ros.nodes import RackNodes
+
+    witness = Node("witness", context=context)
+    executor.add_node(witness)
+
+    def of_the_rack():
+        found = witness.get_topic_names_and_types() + witness.get_service_names_and_types()
+        return [name for name, _ in found if name.startswith("/types/") and "type_desc" not in name]
+
+    with RackNodes(TYPES, context=context) as nodes:
+        nodes.add_to(executor)
+        nodes.start()
+        spin_until(executor, of_the_rack)
+    spin_until(executor, lambda: not of_the_rack())
+    assert witness.get_node_names() == ["witness"]
+    executor.remove_node(witness)
+    witness.destroy_node()
+
+
+def test_two_racks_share_a_process(context, executor, tmp_path):
+    from automax_ros.nodes import RackNodes
+
+    (tmp_path / "rack.yaml").write_text(
+        "rack: OTHER\nslots:\n  0: {module: 57C435, tasks: {T: {priority: 5}}}\ncommon:\n  COUNT%:\n"
+    )
+    (tmp_path / "T.BLK").write_text("10 COMMON COUNT%\n100 CALL SCAN_LOOP(TICKS=1)\n110 COUNT% = COUNT% + 1\n120 END\n")
+    with RackNodes(TYPES, context=context) as first, RackNodes(tmp_path / "rack.yaml", context=context) as second:
+        for nodes in (first, second):
+            nodes.add_to(executor)
+            nodes.start()
+        spin_until(executor, lambda: second.rack.value("COUNT%") > 20 and first.rack.statistics["FAST"].scans > 20)
+
+
+def test_rack_of_ones_own_and_closing_before_the_start(context):
+    from automax_ros.nodes import RackNodes
+
+    rack = Rack(load(TYPES).config)
+    nodes = RackNodes(rack, context=context)
+    assert nodes.rack is rack
+    assert [node.get_fully_qualified_name() for node in nodes.nodes] == [
+        "/types/common_memory", "/types/processor_1", "/types/processor_2",
+    ]  # fmt: skip
+    nodes.close()
+    nodes.close()
+
+
+def test_file_with_errors_says_so(context, tmp_path):
+    from automax_ros.nodes import RackNodes
+
+    (tmp_path / "rack.yaml").write_text("rack: [\n")
+    with pytest.raises(RackError, match=r"rack\.yaml has errors") as caught:
+        RackNodes(tmp_path / "rack.yaml", context=context)
+    assert caught.value.findings
+
+
+def test_face_of_the_room_needs_no_rclpy():
+    """``prepare`` must be there before rclpy is imported."""
+    program = "import sys, automax_ros.nodes as nodes; assert 'rclpy' not in sys.modules; assert nodes.__all__"
+    subprocess.run([sys.executable, "-c", program], check=True)
+    import automax_ros.nodes
+
+    assert all(hasattr(automax_ros.nodes, name) for name in automax_ros.nodes.__all__)
+    with pytest.raises(AttributeError):
+        _ = automax_ros.nodes.nothing
