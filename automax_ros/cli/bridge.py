@@ -17,6 +17,7 @@ from math import cos, pi, radians, sqrt
 from pathlib import Path
 from typing import Protocol
 
+from automax_ros.cli.numbers import number
 from automax_ros.cli.usage import UsageError
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
@@ -44,23 +45,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     # argparse before 3.14 takes -1e-3 for an option and asks for a number.
     parser._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
     line = parser.add_argument_group("line")
-    line.add_argument("--v-ll", type=float, default=460.0, metavar="V", help="line-to-line voltage, rms (default 460)")
-    line.add_argument("--freq", type=float, default=60.0, metavar="HZ", help="48 to 62 (default 60)")
-    line.add_argument("--ls", type=float, default=0.0, metavar="H", help="source inductance of a phase (default 0)")
-    line.add_argument("--rs", type=float, default=0.0, metavar="OHM", help="source resistance of a phase (default 0)")
+    line.add_argument("--v-ll", type=number, default=460.0, metavar="V", help="line-to-line voltage, rms (default 460)")
+    line.add_argument("--freq", type=number, default=60.0, metavar="HZ", help="48 to 62 (default 60)")
+    line.add_argument("--ls", type=number, default=0.0, metavar="H", help="source inductance of a phase (default 0)")
+    line.add_argument("--rs", type=number, default=0.0, metavar="OHM", help="source resistance of a phase (default 0)")
     load = parser.add_argument_group("load")
-    load.add_argument("--r", type=float, required=True, metavar="OHM", help="armature resistance")
-    load.add_argument("--l", type=float, required=True, metavar="H", help="armature inductance, above 0")
-    load.add_argument("--emf", type=float, default=0.0, metavar="V", help="EMF of the load (default 0)")
+    load.add_argument("--r", type=number, required=True, metavar="OHM", help="armature resistance")
+    load.add_argument("--l", type=number, required=True, metavar="H", help="armature inductance, above 0")
+    load.add_argument("--emf", type=number, default=0.0, metavar="V", help="EMF of the load (default 0)")
     fire = parser.add_argument_group("bridge")
-    fire.add_argument("--alpha", type=float, required=True, metavar="DEG", help="firing angle, 0 to 180")
+    fire.add_argument("--alpha", type=number, required=True, metavar="DEG", help="firing angle, 0 to 180")
     fire.add_argument("--reverse", action="store_true", help="fire bridge 2")
     motor = parser.add_argument_group("a motor in place of the EMF, from rest")
-    motor.add_argument("--motor-k", type=float, metavar="VS", help="EMF of 1 rad/s, torque of 1 A")
-    motor.add_argument("--inertia", type=float, metavar="KGM2", help="inertia at the shaft")
-    motor.add_argument("--friction", type=float, metavar="NMS", help="viscous friction, N m s/rad (default 0)")
-    motor.add_argument("--load", type=float, metavar="NM", help="load torque (default 0)")
-    motor.add_argument("--duration", type=float, metavar="S", help="length of the run")
+    motor.add_argument("--motor-k", type=number, metavar="VS", help="EMF of 1 rad/s, torque of 1 A")
+    motor.add_argument("--inertia", type=number, metavar="KGM2", help="inertia at the shaft")
+    motor.add_argument("--friction", type=number, metavar="NMS", help="viscous friction, N m s/rad (default 0)")
+    motor.add_argument("--load", type=number, metavar="NM", help="load torque (default 0)")
+    motor.add_argument("--duration", type=number, metavar="S", help="length of the run")
     motor.add_argument(
         "--csv", type=Path, metavar="FILE", help=f"table of the run, a row every 1 ms: {', '.join(COLUMNS)}"
     )

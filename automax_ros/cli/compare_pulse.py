@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -26,7 +25,7 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType
-from automax_ros.core.values import value_of, wanted
+from automax_ros.core.values import value_of, wanted, whole_number
 from automax_ros.logix.pulse_comparison import PulseComparison
 from automax_ros.logix.pulse_conversion import ConversionError, PulseParameters
 
@@ -36,7 +35,6 @@ _MOST_NAMES = 12
 """Names of columns in one message."""
 _MOST_GUESSES = 1000
 """Most names of columns that are searched for a similar one (decision: a header may have half a million)."""
-_NUMBER = re.compile(r"[-+]?[0-9]{1,9}")
 _HEADER = (
     "scan", "feedback", "reset", "pulse_mult", "pmul", "difference",
     "pulse_mult_total", "pmul_total", "total_difference",
@@ -102,9 +100,10 @@ def _parameters(arguments: argparse.Namespace) -> PulseParameters:
 
 
 def _number(option: str, text: str) -> int:
-    if not _NUMBER.fullmatch(text):
-        raise UsageError(f"{option} takes a whole number, {quoted(text)} is none")
-    return int(text)
+    try:
+        return whole_number(text)
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from None
 
 
 def _columns(table: CsvTable, arguments: argparse.Namespace) -> _Columns:

@@ -12,12 +12,12 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.playback import NOT_CHOSEN, Renaming, Survey, choose, survey
+from automax_ros.cli.numbers import option_number
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.signals import StopRequest, stop_signals
@@ -209,13 +209,10 @@ class _Show:
 
 
 def _rate(text: str) -> float:
-    try:
-        rate = Fraction(text) if len(text) <= 20 and "e" not in text.lower() else Fraction(0)
-    except (ValueError, ZeroDivisionError):
-        rate = Fraction(0)
-    if not 0 < rate <= MAX_RATE:
-        raise UsageError(f"--rate: {quoted(text)} is no number above 0 and up to {MAX_RATE}")
-    return float(rate)
+    rate = option_number("--rate", text, 0, MAX_RATE)
+    if rate == 0:
+        raise UsageError("--rate: 0 would never end")
+    return rate
 
 
 def _seconds(option: str, text: str | None) -> int | None:

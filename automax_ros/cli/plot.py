@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _size(text: str) -> tuple[int, int]:
     """Return width and height from a text such as ``1600x900``."""
     width, cross, height = text.lower().partition("x")
-    if cross and width.isdecimal() and height.isdecimal() and len(text) < 12:
+    if cross and (width + height).isdecimal() and text.isascii() and len(text) < 12:
         size = int(width), int(height)
         if size[0] in _SIZES_PX and size[1] in _SIZES_PX:
             return size

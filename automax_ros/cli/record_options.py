@@ -6,6 +6,7 @@ import argparse
 
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.bags.writer import COMPRESSIONS, StorageOptions
+from automax_ros.cli.numbers import option_number
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
@@ -96,12 +97,9 @@ def split_period(text: str | None, prefix: str) -> int:
 def _split_bytes(text: str | None, option: str) -> int:
     if text is None:
         return 0
-    try:
-        size = float(text)
-    except ValueError:
-        raise UsageError(f"{option}: {quoted(text)} is no number of megabytes") from None
-    if not 0 < size <= _MAX_MB:
-        raise UsageError(f"{option}: {text} lies outside 0 to {_MAX_MB}")
+    size = option_number(option, text, 0, _MAX_MB)
+    if size == 0:
+        raise UsageError(f"{option}: 0 MB hold nothing")
     return max(1, round(size * _BYTES_PER_MB))
 
 

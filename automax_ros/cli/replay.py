@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.numbers import option_number, whole_number
 from automax_ros.cli.output_files import require_different_files, require_picture_file
 from automax_ros.cli.progress import share_shown
 from automax_ros.cli.signals import ended_by_signals
@@ -29,6 +29,10 @@ from automax_ros.replay.report import ReplayReport
 from automax_ros.replay.stored_rack import SourceRefused
 
 _TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
+
+
+_MOST_COUNTS = 1e19
+"""No two values of a variable lie further apart."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the first difference (needs matplotlib)")
     parser.add_argument(
         "--max-differences",
-        type=int,
+        type=whole_number,
         default=DEFAULT_MAX_DIFFERENCES,
         metavar="N",
         help=f"most variables to tell in full, by the time they first differ (default: {DEFAULT_MAX_DIFFERENCES})",
@@ -123,7 +127,13 @@ def _options(arguments: argparse.Namespace) -> ReplayOptions:
         only = tuple(dict.fromkeys(name for name in names if name))
         if not only:
             raise UsageError("--only names no task")
-    return ReplayOptions(only, _tolerance(arguments.tolerance), from_ns, to_ns, arguments.max_differences)
+    return ReplayOptions(
+        only,
+        option_number("--tolerance", arguments.tolerance, 0.0, _MOST_COUNTS),
+        from_ns,
+        to_ns,
+        arguments.max_differences,
+    )
 
 
 def _time(option: str, text: str | None) -> int | None:
@@ -133,16 +143,6 @@ def _time(option: str, text: str | None) -> int | None:
         return seconds_ns(text)
     except ValueError as error:
         raise UsageError(f"{option}: {error}") from error
-
-
-def _tolerance(text: str) -> float:
-    try:
-        tolerance = float(text)
-    except ValueError:
-        tolerance = math.nan
-    if not (math.isfinite(tolerance) and tolerance >= 0):
-        raise UsageError(f"--tolerance {text[:40]!r} is not a number of counts, 0 or more")
-    return tolerance
 
 
 def _task_files(texts: list[str]) -> dict[str, Path]:

@@ -22,6 +22,7 @@ from automax_ros.cli.dynamic_calls import (
     dynamic_calls,
     require_running,
 )
+from automax_ros.cli.numbers import number, whole_number
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.response_data import BlockResponse, Range, measured_response
 from automax_ros.cli.task_files import add_target_arguments
@@ -46,19 +47,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
     add_call_arguments(parser, required=True)
     parser.add_argument("--output", type=Path, metavar="PLOT.png", help="draw a picture (.png, .svg, .pdf)")
-    parser.add_argument("--step", type=int, metavar="COUNTS", help="size of the step (default: up to 4095)")
+    parser.add_argument("--step", type=whole_number, metavar="COUNTS", help="size of the step (default: up to 4095)")
     parser.add_argument(
-        "--amplitude", type=int, metavar="COUNTS", help="of the sines (default: up to 4095, within the block's limits)"
+        "--amplitude",
+        type=whole_number,
+        metavar="COUNTS",
+        help="of the sines (default: up to 4095, within the block's limits)",
     )
-    parser.add_argument("--from", type=float, dest="low", metavar="RAD_S", help="lowest frequency")
-    parser.add_argument("--to", type=float, dest="high", metavar="RAD_S", help="highest frequency, below Nyquist")
+    parser.add_argument("--from", type=number, dest="low", metavar="RAD_S", help="lowest frequency")
+    parser.add_argument("--to", type=number, dest="high", metavar="RAD_S", help="highest frequency, below Nyquist")
     parser.add_argument(
         "--points",
-        type=int,
+        type=whole_number,
         metavar="N",
         help=f"frequencies, corners extra (default: {_POINTS}, {_POINTS_DRAWN} drawn)",
     )
-    parser.add_argument("--duration", type=float, metavar="S", help="length of the step response")
+    parser.add_argument("--duration", type=number, metavar="S", help="length of the step response")
     parser.add_argument("--csv", type=Path, metavar="OUT.csv", help="write both responses to a table")
     parser.add_argument("--json", action="store_true", help="print all as JSON")
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from automax_ros.blocks.declaration import Processor
 from automax_ros.cli.dynamic_calls import DynamicCall, add_call_arguments, dynamic_calls
+from automax_ros.cli.numbers import number, whole_number
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
@@ -35,9 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
     add_call_arguments(parser, required=False)
     parser.add_argument(
-        "--ki", nargs=2, type=float, metavar=("Y", "X"), help="KI for Y counts/s at a constant INPUT of X counts"
+        "--ki", nargs=2, type=number, metavar=("Y", "X"), help="KI for Y counts/s at a constant INPUT of X counts"
     )
-    parser.add_argument("--ticks", type=int, metavar="N", help="with --ki and no FILE: ticks a scan")
+    parser.add_argument("--ticks", type=whole_number, metavar="N", help="with --ki and no FILE: ticks a scan")
     parser.add_argument("--json", action="store_true", help="print all as JSON")
 
 

@@ -13,6 +13,7 @@ Blanks around a number or a boolean do not matter.
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 
@@ -29,14 +30,17 @@ _FEWEST, _MOST = 6, 9
 
 
 def number(text: str) -> float:
-    """Return the decimal number that a text writes; it may be infinite where its exponent is huge.
+    """Return the decimal number that a text writes.
 
     Raises:
-        ValueError: it writes none.
+        ValueError: it writes none, or one that no computer holds.
     """
     if not is_number(text):
         raise ValueError(f"{quoted(text)} is not a number")
-    return float(text)
+    found = float(text)
+    if math.isinf(found):
+        raise ValueError(f"{quoted(text)} is too large a number")
+    return found
 
 
 def whole_number(text: str) -> int:

@@ -5,12 +5,12 @@ The hardware has no presets; in the emulator one is a write by the rack at time 
 
 from __future__ import annotations
 
-from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
+from automax_ros.core.values import value_of, wanted
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import VariableName
-from automax_ros.rack.scalars import DECIMAL, WHOLE, kind_of, number_hint, text_value, truth
-from automax_ros.rack.yaml_text import Node, Scalar, Sequence
+from automax_ros.rack.scalars import is_plain_word, kind_of, number_hint, text_value
+from automax_ros.rack.yaml_text import Node, Sequence
 
 _CODE = "AMX6406"
 
@@ -37,9 +37,9 @@ def _one(node: Node, variable: VariableName, what: str, findings: Findings) -> V
     kind = variable.type
     if kind is DataType.STRING:
         return _text(node, variable.length, what, findings)
-    value: Value | None = truth(node) if kind is DataType.BOOLEAN else _number(node, kind)
+    value = value_of(node.text, kind) if is_plain_word(node) else None
     if value is None:
-        findings.add(_CODE, f"{what} must be {_RANGES[kind]}, not {kind_of(node)}", node.span, number_hint(node))
+        findings.add(_CODE, f"{what} must be {wanted(kind)}, not {kind_of(node)}", node.span, number_hint(node))
     return value
 
 
@@ -49,30 +49,3 @@ def _text(node: Node, length: int, what: str, findings: Findings) -> str | None:
         findings.add(_CODE, f"{what} has {len(text)} characters; the string holds {length}", node.span)
         return None
     return text
-
-
-def _number(node: Node, kind: DataType) -> int | float | None:
-    if not isinstance(node, Scalar) or not node.plain:
-        return None
-    if kind is DataType.REAL:
-        return _real(node.text)
-    if not WHOLE.match(node.text):
-        return None
-    low, high = kind.range
-    return int(node.text) if low <= int(node.text) <= high else None
-
-
-def _real(text: str) -> float | None:
-    """Return what a REAL variable would hold; None for no number, or one beyond the ranges of 2.4.2."""
-    if not DECIMAL.match(text):
-        return None
-    given = float(text)
-    held, clamped = stored_real(given)
-    return None if clamped or (given != 0.0 and held == 0.0) else held
-
-
-_RANGES = {
-    **{kind: f"a whole number from {kind.range[0]} to {kind.range[1]}" for kind in (DataType.INTEGER, DataType.DOUBLE)},
-    DataType.REAL: "a number of magnitude 5.4210107E-20 to 9.2233717E18, or 0",
-    DataType.BOOLEAN: "true or false",
-}

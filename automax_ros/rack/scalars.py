@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from typing import TypeGuard, TypeVar
 
 from automax_ros.core.text import quoted
+from automax_ros.core.types import DataType
+from automax_ros.core.values import is_number, number, value_of, whole_number
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.yaml_text import Mapping, Node, Scalar, Sequence
 
-WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]{0,17})\Z")
-"""A whole number: no leading zeros (YAML would read them as octal), no more digits than any range here needs."""
-DECIMAL = re.compile(r"[-+]?([0-9]{1,60}(\.[0-9]{0,60})?|\.[0-9]{1,60})([eE][-+]?[0-9]{1,4})?\Z")
-_TRUTH = {"true": True, "on": True, "false": False, "off": False}
+_OCTAL = re.compile(r"[-+]?0+[0-9]")
+"""Leading zeros make another number in YAML."""
+_T = TypeVar("_T", int, float)
 
 
 def kind_of(node: Node) -> str:
@@ -50,48 +53,58 @@ def is_clean(text: str) -> bool:
     return all(char.isprintable() or char == "\t" for char in text)
 
 
-def truth(node: Node) -> bool | None:
-    """Return the value of TRUE, ON, FALSE or OFF in any case; None for anything else."""
-    return _TRUTH.get(node.text.lower()) if isinstance(node, Scalar) and node.plain and len(node.text) <= 5 else None
-
-
 def boolean_value(node: Node, what: str, findings: Findings) -> bool | None:
     """Return true or false."""
-    value = truth(node)
-    if value is None:
+    value = value_of(node.text, DataType.BOOLEAN) if is_plain_word(node) else None
+    if not isinstance(value, bool):
         wrong_kind(node, what, "true or false", findings)
+        return None
     return value
 
 
 def integer_value(node: Node, what: str, findings: Findings, *, low: int, high: int, code: str) -> int | None:
     """Return a whole number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
-    if not isinstance(node, Scalar) or not node.plain or not WHOLE.match(node.text):
-        wrong_kind(node, what, "a whole number", findings, number_hint(node))
-        return None
-    value = int(node.text)
-    if not low <= value <= high:
-        findings.add(code, f"{what} is {value}; it must be {low} to {high}", node.span)
-        return None
-    return value
+    return _number(node, what, "a whole number", whole_number, findings, (low, high, code))
 
 
 def number_value(node: Node, what: str, findings: Findings, *, low: float, high: float, code: str) -> float | None:
     """Return a number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
-    if not isinstance(node, Scalar) or not node.plain or not DECIMAL.match(node.text):
-        wrong_kind(node, what, "a number", findings, number_hint(node))
+    return _number(node, what, "a number", number, findings, (low, high, code))
+
+
+def is_plain_word(node: Node) -> TypeGuard[Scalar]:
+    """Whether a node is a single value without quotes, and without the leading zeros that YAML reads as octal."""
+    return isinstance(node, Scalar) and node.plain and not _OCTAL.match(node.text)
+
+
+def _number(
+    node: Node,
+    what: str,
+    word: str,
+    read: Callable[[str], _T],
+    findings: Findings,
+    limits: tuple[float, float, str],
+) -> _T | None:
+    low, high, code = limits
+    try:
+        if not is_plain_word(node):
+            raise ValueError
+        value = read(node.text)
+    except ValueError:
+        wrong_kind(node, what, word, findings, number_hint(node))
         return None
-    value = float(node.text)
     if not low <= value <= high:
-        findings.add(code, f"{what} is {quoted(node.text, marks='')}; it must be {low:g} to {high:g}", node.span)
+        message = f"{what} is {quoted(node.text, marks='')}; it must be {low:g} to {high:g}"
+        findings.add(code, message, node.span)
         return None
     return value
 
 
 def number_hint(node: Node) -> str | None:
-    """Return what to do about a value that looks like a number but is none."""
+    """Return what to do about a value that looks like a number but is not read as one."""
     if not isinstance(node, Scalar) or len(node.text) > 60:
         return None
-    if not node.plain and DECIMAL.match(node.text):
+    if not node.plain and is_number(node.text):
         return f"write {node.text} without quotes"
     digits = node.text.lstrip("+-")
     if node.plain and digits.startswith("0") and digits.isdecimal() and digits.strip("0"):

@@ -133,7 +133,7 @@ def test_plot_without_matplotlib_says_what_to_do(automax, monkeypatch):
         (("--r", "0.05", "--l", "1e-3", "--alpha", "60", "--freq", "25"), "frequency in Hz is 25, it must be 48 to 62"),
         (("--r", "0.05", "--l", "1e-3", "--alpha", "60", "--v-ll", "0"), "line-to-line voltage in V is 0"),
         (("--r", "0.05", "--l", "1e-3", "--alpha", "60", "--ls", "-1e-6"), "source inductance in H is -1e-06"),
-        (("--r", "0.05", "--l", "1e-3", "--alpha", "60", "--emf", "nan"), "EMF in V is nan"),
+        (("--r", "0.05", "--l", "1e-3", "--alpha", "60", "--emf", "nan"), "argument --emf: 'nan' is not a number"),
         ((*CASE, "--alpha", "170", "--emf", "-640"), "SCRs fail to commutate"),
         ((*CASE, "--alpha", "60", "--inertia", "6"), "--inertia is for a motor's run"),
         ((*CASE, "--alpha", "60", "--motor-k", "1.7", "--duration", "1"), "a motor's run needs --inertia"),
@@ -144,7 +144,7 @@ def test_plot_without_matplotlib_says_what_to_do(automax, monkeypatch):
         ((*CASE, "--alpha", "60", "--motor-k", "1", "--inertia", "6", "--duration", "-1"), "duration in s is -1"),
         ((*CASE, "--alpha", "60", *MOTOR, "--csv", "no/run.csv"), "no/run.csv cannot be written"),
         ((*CASE, "--alpha", "60", *MOTOR, "--plot", "run.png"), "--plot is for a steady state"),
-        ((*CASE, "--alpha", "sixty"), "invalid float value: 'sixty'"),
+        ((*CASE, "--alpha", "sixty"), "'sixty' is not a number"),
     ],
 )
 def test_impossible_input_is_2_with_a_clear_message(automax, arguments, told):

@@ -280,10 +280,10 @@ def test_malformed_message_ends_the_playback(ros_domain_id, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--rate", "0"), "--rate: '0' is no number above 0 and up to 1000"),
-        (("--rate", "1001"), "--rate: '1001' is no number"),
-        (("--rate", "nan"), "--rate: 'nan' is no number"),
-        (("--rate", "1e3"), "--rate: '1e3' is no number"),
+        (("--rate", "0"), "--rate: 0 would never end"),
+        (("--rate", "1001"), "--rate: 1001 is not a number from 0 to 1000"),
+        (("--rate", "nan"), "--rate: 'nan' is not a number"),
+        (("--rate", "1_0"), "--rate: '1_0' is not a number"),
         (("--from", "-1"), "--from: -1 s is negative"),
         (("--from", "3"), "it lasts from 0.000 to 2.497 s of the run"),
         (("--namespace", "a b"), "--namespace: 'a b' is no ROS namespace"),
