@@ -7,10 +7,10 @@ from pathlib import Path
 
 import automax_ros
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
+from automax_ros.bags.writer import BagWriter, StorageOptions
 from automax_ros.rack.rack import Rack
 from automax_ros.running.scheduler import EventClass, EventKey
-from automax_ros.wire.stream import RackStream, Topic
+from automax_ros.wire.stream import RackStream, Take, Topic
 
 _FIRST = EventKey(EventClass.OUTSIDE, -1, "")
 """Before everything else of an instant: the rack stands as the instant before has left it."""
@@ -58,15 +58,12 @@ class Recorder:
         self._writer.attach("rack.yaml", "application/yaml", config.text.encode())
         for name, source in rack.sources.items():
             self._writer.attach(f"{name}.BLK", "text/plain", source.text.encode("utf-8", "replace"))
-        self._channels: dict[str, Channel] = {
-            topic.name: self._writer.channel(topic.name, topic.type_name, topic.qos) for topic in stream.topics
-        }
         self._split_posted = False
-        self._sink = self._take_and_measure if options.storage.split_bytes else self._take
+        self._splits_by_size = options.storage.split_bytes > 0
         if options.split_ns:
             first_ns = (rack.now_ns // options.split_ns + 1) * options.split_ns
             rack.scheduler.every(options.split_ns, first_ns, _FIRST, lambda now_ns, _: self._split(now_ns))
-        stream.add_sink(self._sink, tasks=options.tasks, every_state=options.every_state)
+        self._takes = stream.add_sink(self._sink, tasks=options.tasks, every_state=options.every_state)
 
     def flush(self, now_ns: int) -> None:
         """Hand the chunk whose time is over at a rack time to the operating system, though nothing has happened since.
@@ -100,19 +97,25 @@ class Recorder:
             except RecordingError as error:
                 self.failure = error
 
-    def _take(self, topic: Topic, stamp: int, payload: bytes) -> None:
-        if self.failure is not None:
-            return
-        try:
-            self._writer.write(self._channels[topic.name], stamp, payload)
-        except RecordingError as error:
-            self.failure = error
+    def _sink(self, topic: Topic) -> Take:
+        """Return what records a topic."""
+        channel = self._writer.channel(topic.name, topic.type_name, topic.qos)
+        write = self._writer.write
 
-    def _take_and_measure(self, topic: Topic, stamp: int, payload: bytes) -> None:
-        self._take(topic, stamp, payload)
-        if self._writer.split_due and not self._split_posted:
-            self._split_posted = True
-            self._rack.scheduler.at(self._rack.now_ns + 1, _FIRST, self._split)
+        def take(stamp: int, payload: bytes) -> None:
+            if self.failure is None:
+                try:
+                    write(channel, stamp, payload)
+                except RecordingError as error:
+                    self.failure = error
+
+        def take_and_measure(stamp: int, payload: bytes) -> None:
+            take(stamp, payload)
+            if self._writer.split_due and not self._split_posted:
+                self._split_posted = True
+                self._rack.scheduler.at(self._rack.now_ns + 1, _FIRST, self._split)
+
+        return take_and_measure if self._splits_by_size else take
 
     def _split(self, now_ns: int) -> None:  # noqa: ARG002
         """Begin the next file: an event of the scheduler, so that no scan is under way."""
@@ -123,4 +126,4 @@ class Recorder:
             self._writer.split()
         except RecordingError as error:
             self.failure = error
-        self._stream.repeat_facts(self._sink)
+        self._stream.repeat_facts(self._takes)

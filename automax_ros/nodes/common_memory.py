@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import Any
 
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
-from rclpy.publisher import Publisher
 from rclpy.qos import QoSPolicyKind
 from std_msgs.msg import String
 
@@ -28,7 +27,7 @@ from automax_ros.rack.writers import ROS_WRITER
 from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED, QosProfile
 from automax_ros.wire.rack_files import files_of, files_text
-from automax_ros.wire.stream import Topic
+from automax_ros.wire.stream import Take, Topic
 
 REFUSAL_INTERVAL_S = 1.0
 """A variable's refused writes are logged at most this often."""
@@ -43,24 +42,19 @@ class CommonMemoryNode(ModuleNode):
         """Create publishers and subscriptions; messages flow once the stream begins."""
         super().__init__(site, "common_memory")
         rack, stream = site.rack, site.stream
-        self._outlets: dict[str, Publisher[Any]] = {}
+        outlets: dict[Topic, Take] = {}
         for own in stream.topics:
             if own.slot is None:
                 joined = own in (stream.snapshot_topic, stream.backplane_topic)
                 # The image that waits for a late joiner may be as old as the run.
-                self._outlets[own.name] = self.outlet(own, stream.send_image if joined else None)
+                outlets[own] = self.outlet(own, stream.send_image if joined else None)
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
         self._config.publish(String(data=files_text(rack.config.name, files_of(rack))))
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
                 _Inlet(self, view, variable, topic)
-        stream.add_sink(self._publish)
-
-    def _publish(self, topic: Topic, _: int, payload: bytes) -> None:
-        found = self._outlets.get(topic.name)
-        if found is not None:
-            found.publish(payload)
+        stream.add_sink(outlets.get)
 
 
 class _Inlet:

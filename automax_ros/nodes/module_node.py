@@ -17,7 +17,6 @@ from rclpy.event_handler import (
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 from rclpy.qos import qos_policy_name_from_kind
 
 from automax_ros.nodes.guard import Guard
@@ -25,7 +24,7 @@ from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import Pacer
-from automax_ros.wire.stream import RackStream, Topic
+from automax_ros.wire.stream import RackStream, Take, Topic
 
 _SIM_TIME = "use_sim_time"
 
@@ -65,8 +64,8 @@ class ModuleNode(Node):  # type: ignore[misc]
         self.guard = Guard(site.health, self.get_logger().error)
         self.guard.services(self)
 
-    def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Publisher[Any]:
-        """Return a publisher of a topic; it takes CDR bytes. ``joined`` is called for each reader that comes."""
+    def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Take:
+        """Return what publishes the messages of a topic. ``joined`` is called for each reader that comes."""
 
         def matched(info: QoSPublisherMatchedInfo) -> None:
             if joined is not None and info.total_count_change > 0:
@@ -80,7 +79,8 @@ class ModuleNode(Node):  # type: ignore[misc]
             incompatible_qos=self.inside(topic.name, incompatible),
         )
         kind = message_class(topic.type_name)
-        return self.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events)
+        publish = self.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events).publish
+        return lambda _, payload: publish(payload)
 
     def misfit(self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo) -> None:
         """Tell of a reader or writer with an incompatible quality of service; ``what`` says what is lost."""

@@ -19,7 +19,6 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.module_node import ModuleNode, Site
@@ -30,7 +29,6 @@ from automax_ros.running.error_log import LogEntry
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.running.views import Write
-from automax_ros.wire.stream import Topic
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S
 ERROR_INTERVAL_S = 1.0
@@ -47,7 +45,7 @@ class ProcessorNode(ModuleNode):
         super().__init__(site, f"processor_{processor.slot}")
         rack, stream = site.rack, site.stream
         self._rack, self._processor = rack, processor
-        self._outlets: dict[Topic, Publisher[Any]] = {
+        outlets = {
             topic: self.outlet(topic, partial(stream.send_states, processor.slot))
             for topic in stream.module_topics
             if topic.slot == processor.slot
@@ -60,7 +58,7 @@ class ProcessorNode(ModuleNode):
         self.add_post_set_parameters_callback(self._tune)
         self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in processor.tasks}
         self._skipped_reported = dict.fromkeys((task.name for task in processor.tasks), 0)
-        stream.add_sink(self._publish)
+        stream.add_sink(outlets.get)
         rack.observe(self)
         key = EventKey(EventClass.OBSERVE, 0, self.get_name())
         rack.scheduler.every(DIAGNOSTICS_PERIOD_NS, rack.now_ns, key, lambda now, _: self._publish_diagnostics(now))
@@ -94,11 +92,6 @@ class ProcessorNode(ModuleNode):
         """Report a STOP ALL."""
         self.get_logger().error(f"STOP ALL: {reason}")
         self._publish_diagnostics(now_ns)
-
-    def _publish(self, topic: Topic, _: int, payload: bytes) -> None:
-        found = self._outlets.get(topic)
-        if found is not None:
-            found.publish(payload)
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         """Refuse what a task would refuse, before any of the parameters is set; those that are no tunables pass."""

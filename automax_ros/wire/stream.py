@@ -6,7 +6,7 @@ more often than a variable's rate limit allows; the last value before a pause al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,10 +18,10 @@ from automax_ros.rack.ros_names import topic_names
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import Write
-from automax_ros.wire.cdr import encoder
+from automax_ros.wire.cdr import Message, encode, encoder
 from automax_ros.wire.messages import NAMES, CommonWrite, Scan
 from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
-from automax_ros.wire.rack_messages import Message, RackMessages, message_maker, value_type_name
+from automax_ros.wire.rack_messages import RackMessages, message_maker, value_type_name
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
 """Time between two images of memory, with full latches and the tasks' states, in the stream, ns (decision: replay may
@@ -41,8 +41,12 @@ class Topic:
     slot: int | None = None
 
 
-Sink = Callable[[Topic, int, bytes], None]
-"""Takes a message: its topic, its stamp in ns, its CDR bytes."""
+Take = Callable[[int, bytes], None]
+"""Takes a message of one topic: its stamp in ns, its CDR bytes."""
+Sink = Callable[[Topic], Take | None]
+"""Asked once for each topic: what takes its messages, None where nothing does."""
+Takes = dict[Topic, Take]
+"""What a sink takes."""
 
 
 class _ValueTopic:
@@ -51,6 +55,7 @@ class _ValueTopic:
     def __init__(self, variable: CommonVariable, topic: Topic) -> None:
         self.variable = variable
         self.topic = topic
+        self.takes: list[Take] = []
         self.make = message_maker(variable)
         self.encode = encoder(topic.type_name)
         self.interval_ns = round(NS_PER_S / variable.rate_limit_hz) if variable.rate_limit_hz else 0
@@ -60,18 +65,17 @@ class _ValueTopic:
 
 
 class _TaskStream:
-    """What of one task goes where: its scans and states to ``sinks``, a state behind each scan to ``watchers``."""
+    """What takes the scans of one task, its states, and of these a state after each scan."""
 
-    def __init__(self, scans: Topic, states: Topic) -> None:
-        self.scans = scans
-        self.states = states
-        self.sinks: list[Sink] = []
-        self.watchers: list[Sink] = []
+    def __init__(self) -> None:
+        self.scans: list[Take] = []
+        self.states: list[Take] = []
+        self.each_state: list[Take] = []
         self.next_full_ns = 0
 
 
 class RackStream:
-    """Observes a rack and streams it to ``sinks``. ``run_id`` is that of ``RackMessages``."""
+    """Observes a rack and streams it to sinks. ``run_id`` is that of ``RackMessages``."""
 
     def __init__(self, rack: Rack, run_id: int) -> None:
         """Prepare the topics; nothing flows before ``begin``."""
@@ -87,11 +91,10 @@ class RackStream:
             slot: Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN, slot) for slot in slots
         }
         self._values = self._value_topics(space)
-        self._sinks: list[Sink] = []
-        self._tasks = {
-            task: _TaskStream(self.scans_topics[task.slot], self.states_topics[task.slot]) for task in rack.tasks
-        }
-        self._encoders = {name: encoder(name) for name in NAMES.values() if name.startswith("automax_msgs/")}
+        self._tables: list[Take] = []
+        self._images: list[Take] = []
+        self._writes: list[Take] = []
+        self._tasks = {task: _TaskStream() for task in rack.tasks}
         self._encode_scan, self._encode_write = encoder(NAMES[Scan]), encoder(NAMES[CommonWrite])
         self._next_image_ns = SNAPSHOT_PERIOD_NS
         self._begun = False
@@ -112,17 +115,29 @@ class RackStream:
         value = self._values.get(view)
         return value.topic if value else None
 
-    def add_sink(self, sink: Sink, *, tasks: Collection[str] | None = None, every_state: bool = False) -> None:
-        """Hand every message to a further taker.
+    def add_sink(self, sink: Sink, *, tasks: Collection[str] | None = None, every_state: bool = False) -> Takes:
+        """Hand the messages of the topics that a sink takes to it; return what it takes.
 
-        With ``tasks`` it gets scans and states of these alone, with ``every_state`` a state behind each of these scans.
+        With ``tasks`` it gets scans and states of these alone, with ``every_state`` a state after each of these scans.
         """
-        self._sinks.append(sink)
+        takes = {topic: take for topic in self.topics if (take := sink(topic)) is not None}
+
+        def route(routed: list[Take], topic: Topic) -> None:
+            if topic in takes:
+                routed.append(takes[topic])
+
+        route(self._tables, self.variables_topic)
+        route(self._images, self.snapshot_topic)
+        route(self._writes, self.backplane_topic)
+        for value in self._values.values():
+            route(value.takes, value.topic)
         for task, stream in self._tasks.items():
             if tasks is None or task.name in tasks:
-                stream.sinks.append(sink)
+                route(stream.scans, self.scans_topics[task.slot])
+                route(stream.states, self.states_topics[task.slot])
                 if every_state:
-                    stream.watchers.append(sink)
+                    route(stream.each_state, self.states_topics[task.slot])
+        return takes
 
     def stamp(self, now_ns: int) -> int:
         """Return the stamp of an instant of rack time."""
@@ -134,7 +149,7 @@ class RackStream:
         ``epoch_ns`` is the wall clock at rack time 0; simulated time has none.
         """
         self._messages.epoch_ns = epoch_ns
-        self._put(self.variables_topic, self._messages.stamp(self._rack.now_ns), self._messages.table())
+        _send(self._messages.table(), self._tables, self._messages.stamp(self._rack.now_ns))
         self._send_image(self._rack.now_ns)
         self._send_values(self._values, self._rack.now_ns)
         self._rack.observe(self)
@@ -153,21 +168,22 @@ class RackStream:
                 self._send_state(task, now)
                 stream.next_full_ns = now
 
-    def repeat_facts(self, sink: Sink) -> None:
-        """Send one taker what stands now, between two scans: table, image, values of commons, states of its tasks.
+    def repeat_facts(self, takes: Takes) -> None:
+        """Send one sink what stands now, between two scans: table, image, values of commons, states of its tasks.
 
         The next scan of each task is a full one. So a recording can begin here, or a further file of one.
         """
         now = self._rack.now_ns
-        self._put(self.variables_topic, self._messages.stamp(now), self._messages.table(), [sink])
-        self._send_image(now, [sink])
+        own = set(takes.values())
+        _send(self._messages.table(), own.intersection(self._tables), self._messages.stamp(now))
+        self._send_image(now, own.intersection(self._images))
         for value in self._values.values():
             if value.last_payload:
-                sink(value.topic, self._messages.stamp(now), value.last_payload)
+                for take in own.intersection(value.takes):
+                    take(self._messages.stamp(now), value.last_payload)
         for task, stream in self._tasks.items():
             stream.next_full_ns = now
-            if sink in stream.sinks:
-                self._send_state(task, now, [sink])
+            self._send_state(task, now, own.intersection(stream.states))
 
     def end(self) -> None:
         """Send what is held back by rate limits and the final states."""
@@ -181,21 +197,21 @@ class RackStream:
     # RackObserver
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
-        """Send a scan, its writes and the values that changed; every now and then a snapshot behind them."""
+        """Send a scan, its writes and the values that changed; every now and then a snapshot after them."""
         stream = self._tasks[task]
         now = record.time_ns
         full = now >= stream.next_full_ns and record.scan > 0
-        if stream.sinks:
+        if stream.scans:
             message = self._messages.scan(task, record, full=full)
             payload = self._encode_scan(message)
-            for sink in stream.sinks:
-                sink(stream.scans, message[0], payload)
+            for take in stream.scans:
+                take(message[0], payload)
         if writes:
             self._send_writes(writes, now)
         if full or not record.scan:
             self._send_state(task, now)
-        elif stream.watchers:
-            self._send_state(task, now, stream.watchers)
+        elif stream.each_state:
+            self._send_state(task, now, stream.each_state)
         if full:
             stream.next_full_ns = (now // SNAPSHOT_PERIOD_NS + 1) * SNAPSHOT_PERIOD_NS
             if now >= self._next_image_ns:
@@ -225,24 +241,22 @@ class RackStream:
                 topics[view] = _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
         return topics
 
-    def _send_state(self, task: Task, now_ns: int, sinks: Sequence[Sink] | None = None) -> None:
-        stream = self._tasks[task]
-        takers = stream.sinks if sinks is None else sinks
-        if takers:
-            message = self._messages.state(task, now_ns)
-            self._put(stream.states, message.stamp, message, takers)
+    def _send_state(self, task: Task, now_ns: int, takes: Collection[Take] | None = None) -> None:
+        takes = self._tasks[task].states if takes is None else takes
+        if takes:
+            _send(self._messages.state(task, now_ns), takes)
 
-    def _send_image(self, now_ns: int, sinks: Sequence[Sink] | None = None) -> None:
-        self._put(self.snapshot_topic, self._messages.stamp(now_ns), self._messages.image(now_ns), sinks)
+    def _send_image(self, now_ns: int, takes: Collection[Take] | None = None) -> None:
+        _send(self._messages.image(now_ns), self._images if takes is None else takes)
         forces = self._messages.forces(now_ns)
         if forces is not None:
-            self._put(self.backplane_topic, forces.stamp, forces)
+            _send(forces, self._writes)
 
     def _send_writes(self, writes: list[Write], now_ns: int) -> None:
         for message in self._messages.writes(writes):
             payload = self._encode_write(message)
-            for sink in self._sinks:
-                sink(self.backplane_topic, message[0], payload)
+            for take in self._writes:
+                take(message[0], payload)
         self._send_values({entry[4]: None for entry in writes}, now_ns)
 
     def _send_values(self, views: Iterable[int], now_ns: int) -> None:
@@ -270,10 +284,12 @@ class RackStream:
         if payload != value.last_payload:
             value.last_ns, value.last_payload = now_ns, payload
             stamp = self._messages.stamp(now_ns)
-            for sink in self._sinks:
-                sink(value.topic, stamp, payload)
+            for take in value.takes:
+                take(stamp, payload)
 
-    def _put(self, topic: Topic, stamp: int, message: Message, sinks: Sequence[Sink] | None = None) -> None:
-        payload = self._encoders[topic.type_name](message)
-        for sink in self._sinks if sinks is None else sinks:
-            sink(topic, stamp, payload)
+
+def _send(message: Message, takes: Collection[Take], stamp: int | None = None) -> None:
+    """Send a message that does not go out with every scan, at its own stamp unless another is given."""
+    payload = encode(message)
+    for take in takes:
+        take(message[0] if stamp is None else stamp, payload)

@@ -214,7 +214,9 @@ def test_a_disk_that_refuses_the_last_sync_is_told(
     stream = RackStream(rack, 1)
     recorder: Recorder | LiveRecording = Recorder(rack, stream, tmp_path / "bag")
     table: list[bytes] = []
-    stream.add_sink(lambda topic, _, payload: table.append(payload) if topic.name.endswith("/variables") else None)
+    stream.add_sink(
+        lambda topic: (lambda _, payload: table.append(payload)) if topic is stream.variables_topic else None
+    )
     stream.begin()
     rack.start()
     rack.run(0.5)

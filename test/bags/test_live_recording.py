@@ -49,7 +49,7 @@ class Wire:
         self.stream = RackStream(self.rack, run_id)
         self.recorder = Recorder(self.rack, self.stream, own) if own else None
         self.sent: list[Sent] = []
-        self.stream.add_sink(lambda topic, _, payload: self.sent.append(Sent(topic.name, payload)))
+        self.stream.add_sink(lambda topic: lambda _, payload: self.sent.append(Sent(topic.name, payload)))
         self.stream.begin(epoch)
         self.rack.start()
 

@@ -49,7 +49,7 @@ def behaviour(folder: Path, text: str) -> Behaviour:
     rack = Rack(result.config)
     messages: list[tuple[str, Any]] = []
     stream = RackStream(rack, 1)
-    stream.add_sink(lambda topic, _, data: messages.append((topic.name, decode(topic.type_name, data))))
+    stream.add_sink(lambda topic: lambda _, data: messages.append((topic.name, decode(topic.type_name, data))))
     stream.begin()
     rack.start()
     rack.run(0.022)

@@ -32,8 +32,10 @@ class Stream:
         self.all: list[Sent] = []
         self.stream = RackStream(rack, 77)
         self.stream.add_sink(
-            lambda topic, stamp, data: self.all.append(
-                Sent(topic.name.removeprefix("/line1/"), stamp, decode(topic.type_name, data), topic.slot)
+            lambda topic: (
+                lambda stamp, data: self.all.append(
+                    Sent(topic.name.removeprefix("/line1/"), stamp, decode(topic.type_name, data), topic.slot)
+                )
             )
         )
         self.stream.begin(epoch_ns)
@@ -213,9 +215,53 @@ def test_late_joiners_get_a_fresh_image(started, tmp_path):
 def test_nothing_is_sent_before_the_beginning(tmp_path):
     stream = RackStream(build(tmp_path), 1)
     sent: list[Any] = []
-    stream.add_sink(lambda *message: sent.append(message))
+    stream.add_sink(lambda _: lambda *message: sent.append(message))
     stream.send_image()
     assert sent == []
+
+
+def test_sink_is_asked_once_for_each_topic_and_gets_what_it_takes(tmp_path):
+    rack = build(tmp_path)
+    stream = RackStream(rack, 1)
+    asked: list[Any] = []
+    taken: list[bytes] = []
+    everything: list[str] = []
+
+    def choose(topic):
+        asked.append(topic)
+        return (lambda _, data: taken.append(data)) if topic is stream.backplane_topic else None
+
+    takes = stream.add_sink(choose)
+    stream.add_sink(lambda topic: lambda *_: everything.append(topic.name))
+    stream.begin()
+    rack.start()
+    rack.run(0.1)
+    stream.end()
+    assert asked == stream.topics
+    assert list(takes) == [stream.backplane_topic]
+    assert len(taken) == everything.count("/line1/backplane") > 0
+    assert {decode("automax_msgs/msg/CommonWrite", data).run_id for data in taken} == {1}
+    before = len(everything)
+    stream.repeat_facts(takes)
+    assert len(everything) == before
+
+
+def test_facts_are_repeated_for_one_sink_alone(tmp_path):
+    rack = build(tmp_path)
+    stream = RackStream(rack, 1)
+    one, other = ([], [])
+    stream.add_sink(lambda topic: lambda *_: other.append(topic.name))
+    takes = stream.add_sink(lambda topic: lambda *_: one.append(topic.name), tasks={"SPEED"})
+    stream.begin()
+    rack.start()
+    rack.run(0.1)
+    one.clear()
+    before = len(other)
+    stream.repeat_facts(takes)
+    assert len(other) == before
+    assert one[:2] == ["/line1/variables", "/line1/backplane/snapshot"]
+    assert one[-1] == "/line1/states"
+    assert one.count("/line1/states") == 1
 
 
 # Scans and states
