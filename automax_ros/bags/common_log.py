@@ -1,90 +1,141 @@
-"""The write log of common memory as a recording tells it: one run of one rack, without gaps; the watched values."""
+"""The write log of common memory as a recording tells it: one run of one rack, its values in their variables' types."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.bags.run_facts import RunFacts
 from automax_ros.bags.variables import Watched, checked_table
+from automax_ros.bags.write_log import WriteLog
 from automax_ros.core.ticks import seconds_text
-from automax_ros.core.types import DataType
+from automax_ros.core.types import DataType, Value
 from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable
 
-Cell = float | str
-"""A value: booleans are 0 and 1."""
-NO_COMMON_MEMORY_HINT = "record the topics /<rack>/variables, /<rack>/backplane and /<rack>/backplane/snapshot"
-
+Key = tuple[int, int]
+"""A value of common memory: number of the variable, flat index of the element."""
+Entry = tuple[int, int, Value]
+"""Variable, element, value."""
+Cell = Value
+"""A value in a table."""
 
 class CommonLog:
-    """Checks that the messages are the write log of one run of one rack, without gaps."""
+    """Takes the messages of the write log of one run; what is of another run or known already tells nothing.
 
-    def __init__(self, bag: Path) -> None:
+    Writes that are missing are an error here, numbers that a variable cannot have are not: ``_bridge``, ``_odd``.
+
+    Raises:
+        BagError: the table of variables is not one that a rack sends.
+    """
+
+    def __init__(self, bag: Path, facts: RunFacts) -> None:
+        self.facts = facts
+        self.variables = variables_of(bag, facts.table)
         self._bag = bag
-        self._table: VariableTable | None = None
-        self._sequence: int | None = None
+        self._log = WriteLog(facts.table.run_id)
+        self._first_write = facts.first_write
+        self._kinds = {
+            item.id: (kind, kind.range, math.prod(item.dimensions), name)
+            for name, item in self.variables.items()
+            for kind in (DataType.numbered(item.type),)
+        }
 
-    def take_table(self, table: VariableTable) -> bool:
-        """Return whether this is the first table of variables.
+    def check_table(self, table: VariableTable) -> None:
+        """Make sure that a further table is of the same run.
 
         Raises:
             BagError: it is that of another run.
         """
-        if self._table is None:
-            self._table = table
-            return True
-        if (table.rack, table.run_id) != (self._table.rack, self._table.run_id):
-            raise BagError(
-                "AMX6822", self._bag, f"holds more than one run: of {self._table.rack[:40]} and {table.rack[:40]}"
-            )
-        return False
+        own = self.facts.table
+        if (table.rack, table.run_id) != (own.rack, own.run_id):
+            text = f"holds more than one run: of {own.rack[:40]} and {table.rack[:40]}"
+            raise BagError("AMX6822", self._bag, text)
 
-    def is_new(self, message: CommonImage | CommonWrite) -> bool:
-        """Return whether a message tells something new: not one of another run, nor older than what was seen.
+    def take(self, message: CommonImage | CommonWrite) -> list[Entry] | None:
+        """Return the entries of a message, None if it tells nothing new.
 
         Raises:
-            BagError: writes before it are missing, or it stands before the table.
+            BagError: writes before it are missing, or it does not fit the table of variables.
         """
-        if self._table is None:
-            hint = "record /<rack>/variables from the start"
-            raise BagError("AMX6820", self._bag, "values stand before the table of variables", hint)
-        if message.run_id != self._table.run_id:
-            return False
-        if self._sequence is not None:
-            if message.sequence < self._sequence or (
-                message.sequence == self._sequence and isinstance(message, CommonWrite)
-            ):
-                return False
-            if message.sequence > self._sequence + 1 and isinstance(message, CommonWrite):
-                raise self._gap(self._sequence + 1, message)
-        self._sequence = message.sequence
-        return True
+        image = isinstance(message, CommonImage)
+        log = self._log
+        if message.run_id != log.run_id or (image and message.sequence + 1 < self._first_write):
+            return None
+        missing = log.missing(message.sequence, image=image)
+        if missing < 0:
+            return None
+        if missing and not image:
+            self._bridge(missing, message)
+        log.sequence = message.sequence
+        return self.entries(message.values, message.stamp)
 
-    def _gap(self, first: int, message: CommonWrite) -> BagError:
-        return BagError(
+    def entries(self, values: Values, stamp: int) -> list[Entry]:
+        """Return the entries of a message, each in its variable's own type.
+
+        Raises:
+            BagError: they do not fit the table of variables.
+        """
+        if not values.variable:
+            return []
+        texts = iter(values.text)
+        found: list[Entry] = []
+        kinds = self._kinds
+        try:
+            for number, element, value in zip(values.variable, values.element, values.value, strict=True):
+                kind, (least, greatest), elements, name = kinds[number]
+                if element >= elements:
+                    raise ValueError(f"{name} has no element {element}")
+                if kind is _STRING:
+                    found.append((number, element, next(texts)))
+                elif not least <= value <= greatest:
+                    found.append((number, element, self._odd(name, value)))
+                elif kind is _REAL:
+                    found.append((number, element, value))
+                elif value == int(value):
+                    found.append((number, element, bool(value) if kind is _BOOLEAN else int(value)))
+                else:
+                    found.append((number, element, self._odd(name, value)))
+        except KeyError as error:
+            raise self._wrong(stamp, f"there is no variable {error}") from error
+        except StopIteration as error:
+            raise self._wrong(stamp, "a string variable without its text") from error
+        except ValueError as error:
+            raise self._wrong(stamp, str(error)) from error
+        return found
+
+    def _odd(self, name: str, value: float) -> Value:  # noqa: ARG002
+        """Return a number that the variable cannot have, as it stands; ValueError where that does harm."""
+        return value
+
+    def _bridge(self, missing: int, message: CommonImage | CommonWrite) -> None:
+        text = f"writes {message.sequence - missing} to {message.sequence - 1} are missing"
+        raise BagError(
             "AMX6823",
             self._bag,
-            f"writes {first} to {message.sequence - 1} are missing before {seconds_text(message.stamp)} s",
+            f"{text} before {seconds_text(max(0, message.stamp))} s",
             "the recorder lost messages; `automax run --record` loses none",
         )
+
+    def _wrong(self, stamp: int, reason: str) -> BagError:
+        return BagError("AMX6813", self._bag, f"wrong values at {seconds_text(max(0, stamp))} s: {reason}")
+
+
+_STRING, _REAL, _BOOLEAN = DataType.STRING, DataType.REAL, DataType.BOOLEAN
 
 
 class WatchedValues:
     """The watched variables as messages tell them, by the index of their column."""
 
-    def __init__(self, watched: Sequence[Watched], strings: Collection[int]) -> None:
-        self._strings = strings
+    def __init__(self, watched: Sequence[Watched]) -> None:
         self._columns = {(item.variable, item.element): index for index, item in enumerate(watched)}
         self._shown: dict[int, Cell] = {}
         self._told: dict[int, Cell] = {}
 
-    def take(self, values: Values) -> None:
-        """Take over the values of one message.
-
-        Raises:
-            ValueError: its lists do not fit together.
-        """
-        for variable, element, value in entries(values, self._strings):
+    def take(self, entries: Iterable[Entry]) -> None:
+        """Take over the values of one message."""
+        for variable, element, value in entries:
             index = self._columns.get((variable, element))
             if index is not None:
                 self._told[index] = value
@@ -104,25 +155,6 @@ class WatchedValues:
         return changed
 
 
-def entries(values: Values, strings: Collection[int]) -> Iterator[tuple[int, int, Cell]]:
-    """Return the (variable, element, value) of a Values message; ``strings`` are the numbers of the string variables.
-
-    Raises:
-        ValueError: its lists do not fit together.
-    """
-    if not len(values.variable) == len(values.element) == len(values.value):
-        raise ValueError("lists of different length")
-    texts = iter(values.text)
-    for variable, element, number in zip(values.variable, values.element, values.value, strict=True):
-        if variable not in strings:
-            yield variable, element, number
-            continue
-        text = next(texts, None)
-        if text is None:
-            raise ValueError("a string variable without its text")
-        yield variable, element, text
-
-
 def variables_of(bag: Path, table: VariableTable) -> dict[str, Variable]:
     """Return the variables of a recording's table by name.
 
@@ -136,8 +168,3 @@ def variables_of(bag: Path, table: VariableTable) -> dict[str, Variable]:
 
 
 _WRONG_TABLE_HINT = "no rack has sent it so; what it numbers cannot be told apart"
-
-
-def strings_of(variables: dict[str, Variable]) -> frozenset[int]:
-    """Return the numbers of the string variables."""
-    return frozenset(entry.id for entry in variables.values() if entry.type == DataType.STRING.number)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,18 +16,22 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import TRUNCATED_HINT, McapFile, RawMessage
 from automax_ros.bags.opening import NO_BAG_HINT, size_of
 from automax_ros.bags.reader import BagReader
+from automax_ros.bags.run_facts import run_facts
 from automax_ros.bags.series import Progress
 from automax_ros.bags.unpacking import DAMAGED_HINT
 from automax_ros.core.ticks import seconds_text
 from automax_ros.wire.cdr import CdrError, decoder
 from automax_ros.wire.definitions import message_types
 from automax_ros.wire.heads import scan_head
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, ScanError, VariableTable
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, ScanError, String, VariableTable
+from automax_ros.wire.rack_files import RackFilesError, files_from_text
 
 MOST_KEPT = 1000
 """Most attachments, tasks and kinds of errors that `bag info` lists (decision): a recording may lie about them."""
 _TABLE = "automax_msgs/msg/VariableTable"
 _SCAN = "automax_msgs/msg/Scan"
+_STRING = "std_msgs/msg/String"
+_FILES_TOPIC = "/config"
 _NO_ERRORS = bytes(4)
 """How a Scan ends that has no errors: with the length of an empty list."""
 _PROGRESS_MASK = 0x3FF
@@ -214,6 +218,8 @@ def _count(info: BagInfo, record: object) -> None:
             _count_scan(info, record)
         elif name == _TABLE and info.table is None:
             _keep_table(info, record)
+        elif name == _STRING and record.channel.topic.endswith(_FILES_TOPIC) and not info.texts:
+            _keep_sent_files(info, record)
     elif isinstance(record, Attachment):
         _count_attachment(info, record)
 
@@ -244,6 +250,14 @@ def _keep_table(info: BagInfo, record: RawMessage) -> None:
     info.table = table
 
 
+def _keep_sent_files(info: BagInfo, record: RawMessage) -> None:
+    """Keep the files that a rack has sent, for a recording that has none stored inside."""
+    with contextlib.suppress(CdrError, RackFilesError):  # another program's topic of that name
+        message = decoder(_STRING)(record.data)
+        assert isinstance(message, String)
+        info.texts.update((file.name, file.text) for file in files_from_text(message.data))
+
+
 def _decoded(info: BagInfo, type_name: str, record: RawMessage) -> object:
     try:
         return decoder(type_name)(record.data)
@@ -272,32 +286,32 @@ def _check(info: BagInfo, progress: Progress | None) -> None:
     if progress is not None:
         reader.on_progress = lambda share: progress((1 + share) / 2)
     try:
-        for _ in _checked(CommonLog(info.path), reader):
-            pass
+        _check_order(info, reader)
     except BagError as error:
         info.problems.append(error)
 
 
-def _checked(log: CommonLog, reader: BagReader) -> Iterator[None]:
-    # Recordings of others may hold messages of one file in any order; in ours log times increase.
-    ours = "version" in reader.custom_data
+def _check_order(info: BagInfo, reader: BagReader) -> None:
+    # A recording of others may hold messages in any order, and those of no rack; in ours log times increase.
+    log: CommonLog | None = None
     last_log = -1
     last_write = (0, -1)
     for entry in reader.messages(types=frozenset(message_types())):
         message = entry.message
-        if ours and entry.log_time <= last_log:
-            text = f"log times go backwards: {entry.log_time} ns on {entry.topic[:247]} behind {last_log} ns"
+        if reader.is_ours and entry.log_time <= last_log:
+            text = f"log times go backwards: {entry.log_time} ns on {entry.topic[:247]} after {last_log} ns"
             raise BagError("AMX6813", reader.path, text)
         last_log = entry.log_time
         if isinstance(message, CommonWrite):
             run, sequence = last_write
             if message.run_id == run and message.sequence <= sequence:
                 place = seconds_text(max(0, message.stamp))
-                text = f"the write log goes backwards at {place} s: write {message.sequence} behind write {sequence}"
+                text = f"the write log goes backwards at {place} s: write {message.sequence} after write {sequence}"
                 raise BagError("AMX6813", reader.path, text)
             last_write = message.run_id, message.sequence
-        if isinstance(message, VariableTable):
-            log.take_table(message)
-        elif isinstance(message, (CommonImage, CommonWrite)):
-            log.is_new(message)
-        yield
+        if isinstance(message, (CommonImage, CommonWrite, VariableTable)):
+            log = log or CommonLog(info.path, run_facts(reader))
+            if isinstance(message, VariableTable):
+                log.check_table(message)
+            else:
+                log.take(message)

@@ -10,9 +10,8 @@ from pathlib import Path
 from mcap.records import Channel, Schema
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.opening import size_of
-from automax_ros.bags.reader import BagReader, FileOrder
+from automax_ros.bags.mcap_file import RawMessage
+from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorded_qos import recorded_qos
 from automax_ros.bags.schemas import is_known
 from automax_ros.wire.cdr import CdrError, decode, encode
@@ -54,7 +53,7 @@ class Survey:
     topics before the span.
     """
 
-    files: list[Path]
+    bag: BagReader
     topics: dict[str, PlayTopic] = field(default_factory=dict)
     spaces: list[str] = field(default_factory=list)
     latched: dict[str, RawMessage] = field(default_factory=dict)
@@ -70,7 +69,7 @@ class Survey:
         Raises:
             BagError: the recording has changed since and is damaged now.
         """
-        for record in _records(self.files):
+        for record in self.bag.records():
             topic = self.topics.get(record.channel.topic)
             if self.begin <= record.log_time <= self.end and topic is not None and not topic.fault:
                 yield record
@@ -90,10 +89,9 @@ def survey(
     Raises:
         BagError: it is none, is damaged, or is empty in the span.
     """
-    found = Survey(BagReader(path).files)
-    latched_bytes = 0
-    total = sum(map(size_of, found.files))
-    for number, record in enumerate(_records(found.files, lambda done: on_progress(min(1.0, done / total)))):
+    found = Survey(BagReader(path))
+    found.bag.on_progress = on_progress
+    for number, record in enumerate(found.bag.records()):
         if not number & _PROGRESS_MASK and stopping():
             return found
         topic = _topic(found, path, record)
@@ -102,20 +100,12 @@ def survey(
         found.last = max(found.last, record.log_time)
         if topic.type_name == TABLE_TYPE and not topic.fault:
             _take_table(found, path, record)
-        start = found.run_start if found.run_start is not None else found.first
-        if begin_ns is not None and topic.is_latched and record.log_time < start + begin_ns:
-            before = found.latched.get(record.channel.topic)
-            latched_bytes += len(record.data) - (len(before.data) if before else 0)
-            if latched_bytes > MAX_LATCHED_BYTES:
-                raise BagError(
-                    "AMX6814", path, f"more than {MAX_LATCHED_BYTES} bytes on latched topics before the span"
-                )
-            found.latched[record.channel.topic] = record
+    found.bag.on_progress = None
     if found.first is None:
         raise BagError("AMX6840", path, "holds no message")
     start = found.run_start if found.run_start is not None else found.first
     found.run_start = start
-    found.begin = found.first if begin_ns is None else start + begin_ns
+    found.begin = start + (begin_ns or 0)
     found.end = found.last if end_ns is None else start + end_ns
     if found.begin > found.last or found.end < found.first or found.end < found.begin:
         raise BagError(
@@ -124,8 +114,26 @@ def survey(
             "holds no message in the span that is asked for",
             f"it lasts from {(found.first - start) / 1e9:.3f} to {(found.last - start) / 1e9:.3f} s of the run",
         )
+    if found.begin > found.first:
+        _keep_latched(found, path, stopping)
     found.begin, found.end = max(found.begin, found.first), min(found.end, found.last)
     return found
+
+
+def _keep_latched(found: Survey, path: Path, stopping: Callable[[], bool]) -> None:
+    """Keep the last message of each latched topic before the span: late joiners of the run have got it too."""
+    size = 0
+    for number, record in enumerate(found.bag.records()):
+        if not number & _PROGRESS_MASK and stopping():
+            return
+        topic = found.topics[record.channel.topic]
+        if not topic.is_latched or record.log_time >= found.begin:
+            continue
+        before = found.latched.get(topic.name)
+        size += len(record.data) - (len(before.data) if before else 0)
+        if size > MAX_LATCHED_BYTES:
+            raise BagError("AMX6814", path, f"more than {MAX_LATCHED_BYTES} bytes on latched topics before the span")
+        found.latched[topic.name] = record
 
 
 def choose(found: Survey, patterns: Collection[str]) -> list[str]:
@@ -171,24 +179,6 @@ class Renaming:
         assert isinstance(table, VariableTable)
         variables = [item._replace(topic=self.topic(item.topic) if item.topic else "") for item in table.variables]
         return encode(table._replace(variables=variables))
-
-
-def _records(files: Collection[Path], on_progress: Callable[[int], None] = lambda _: None) -> Iterator[RawMessage]:
-    before = 0
-    order = FileOrder()
-    for path in files:
-        file = McapFile(path)
-        last_log: int | None = None
-        for number, record in enumerate(file.records()):
-            if not number & _PROGRESS_MASK:
-                on_progress(before + file.position)
-            if isinstance(record, RawMessage):
-                if last_log is None:
-                    order.begin(path, record.log_time)
-                last_log = record.log_time
-                yield record
-        before += file.position
-        order.end(last_log)
 
 
 def _topic(found: Survey, path: Path, record: RawMessage) -> PlayTopic:

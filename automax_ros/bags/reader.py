@@ -16,6 +16,7 @@ from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE
 from automax_ros.bags.opening import no_recording, opened, size_of
 from automax_ros.bags.schemas import require_known
+from automax_ros.bags.sent_order import HOLD_NS, in_sent_order
 from automax_ros.core.text import printable
 from automax_ros.wire.cdr import CdrError, Message, decoder
 
@@ -77,21 +78,50 @@ class BagReader:
                 information = {}
         return custom_data_of(information)
 
+    @cached_property
+    def is_ours(self) -> bool:
+        """Whether a recorder of ours made it: then the order of the file is the order of sending."""
+        return "version" in self.custom_data
+
     def messages(
         self, *, topics: Collection[str] | None = None, types: Collection[str] | None = None
     ) -> Iterator[BagMessage]:
-        """Return the decoded messages in the order of the file, of all topics and types or only of those given.
+        """Return the decoded messages in the order of sending, of all topics and types or only of those given.
 
         Raises:
             BagError: the recording is truncated, damaged or beyond the limits, its files do not follow each other in
                 time, or it holds a wanted message of a type that we do not know or that was recorded with another
                 definition.
         """
+        records = self._sourced()
+        for source, record in records if self.is_ours else in_sent_order(records):
+            self.last_stamp = record.publish_time
+            channel = source.channels.get(record.channel.id)
+            if channel is None:
+                wanted = _is_wanted(record, topics, types)
+                channel = _ChannelReader(source.path, record.channel, record.schema, wanted)
+                source.channels[record.channel.id] = channel
+            if channel.wanted:
+                yield BagMessage(
+                    channel.topic, channel.type_name, record.publish_time, record.log_time, channel.decoded(record)
+                )
+
+    def records(self) -> Iterator[RawMessage]:
+        """Return the messages as they stand in the files.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits, or its files overlap in time.
+        """
+        for _, record in self._sourced():
+            yield record
+
+    def _sourced(self) -> Iterator[tuple[_Source, RawMessage]]:
+        """The messages as they stand in the files, each with its file."""
         total = sum(size_of(file) for file in self.files)
         before = 0
-        order = FileOrder()
+        order = FileOrder(0 if self.is_ours else HOLD_NS)
         for file in self.files:
-            channels: dict[int, _ChannelReader] = {}
+            source = _Source(file)
             last_log: int | None = None
             data = McapFile(file)
             for number, record in enumerate(data.records()):
@@ -99,18 +129,10 @@ class BagReader:
                     self.on_progress(min(1.0, (before + data.position) / total))
                 if not isinstance(record, RawMessage):
                     continue
-                self.last_stamp = record.publish_time
                 if last_log is None:
                     order.begin(file, record.log_time)
                 last_log = record.log_time
-                channel = channels.get(record.channel.id)
-                if channel is None:
-                    wanted = _is_wanted(record, topics, types)
-                    channel = channels[record.channel.id] = _ChannelReader(file, record.channel, record.schema, wanted)
-                if channel.wanted:
-                    yield BagMessage(
-                        channel.topic, channel.type_name, record.publish_time, record.log_time, channel.decoded(record)
-                    )
+                yield source, record
             before += data.position
             order.end(last_log)
 
@@ -140,7 +162,9 @@ class BagReader:
 class FileOrder:
     """Checks that the files of a recording follow each other in time: only then they can be read as one stream."""
 
-    def __init__(self) -> None:
+    def __init__(self, slack_ns: int) -> None:
+        """Let a file begin by ``slack_ns`` before the end of the one before it."""
+        self._slack_ns = slack_ns
         self._name = ""
         self._first = self._last = 0
 
@@ -150,7 +174,7 @@ class FileOrder:
         Raises:
             BagError: the file before ends later.
         """
-        if self._name and log_time < self._last:
+        if self._name and log_time < self._last - self._slack_ns:
             if log_time < self._first:
                 text = f"is out of order: its messages begin before those of {self._name}, which is listed before it"
                 hint = "`automax bag repair` writes a metadata.yaml that lists the files in the order of their times"
@@ -164,6 +188,16 @@ class FileOrder:
         """Take the log time of the last message of that file; None where it holds none."""
         if log_time is not None:
             self._last = log_time
+
+
+class _Source:
+    """One file of a recording, with the readers of its channels by their numbers."""
+
+    __slots__ = ("channels", "path")
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.channels: dict[int, _ChannelReader] = {}
 
 
 class _ChannelReader:

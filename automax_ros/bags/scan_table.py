@@ -6,14 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from automax_ros.bags.columns import Column, column, count_column
-from automax_ros.bags.common_log import NO_COMMON_MEMORY_HINT, Cell, entries, strings_of, variables_of
+from automax_ros.bags.common_log import Cell, CommonLog
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagReader
+from automax_ros.bags.run_facts import run_facts
 from automax_ros.bags.series import WHOLE_RUN, Progress, Window
 from automax_ros.core.text import did_you_mean
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
-from automax_ros.wire.messages import Scan, Values, Variable, VariableTable
+from automax_ros.wire.messages import Scan, VariableTable
 
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("Scan", "VariableTable"))
 _OWN = (
@@ -44,9 +45,8 @@ class ScanTable:
         self._window = window
         self._task = task.upper()
         self._progress = progress
-        self._variables: dict[int, Variable] = {}
-        self._strings: frozenset[int] = frozenset()
-        self._origin = 0
+        self._log = CommonLog(bag, run_facts(BagReader(bag)))
+        self._variables = {item.id: item for item in self._log.variables.values()}
         self._columns: list[Column] = list(_OWN)
         self._latched: dict[tuple[int, int], int] = {}
         self._committed: dict[tuple[int, int], int] = {}
@@ -68,14 +68,10 @@ class ScanTable:
         found = False
         last = 0
         for last, scan in self._scans(first_half=False):
-            try:
-                if before is not None and scan.scan > before + 1 and not scan.full:
-                    held.update((index, None) for index in self._latched.values())
-                held.update(self._cells(self._latched, scan.latched))
-                held.update(self._cells(self._committed, scan.committed))
-            except ValueError as error:
-                text = f"wrong values at {seconds_text(max(0, scan.stamp))} s: {error}"
-                raise BagError("AMX6813", self._bag, text) from error
+            if before is not None and scan.scan > before + 1 and not scan.full:
+                held.update((index, None) for index in self._latched.values())
+            for columns, values in ((self._latched, scan.latched), (self._committed, scan.committed)):
+                held.update((columns[entry[:2]], entry[2]) for entry in self._log.entries(values, scan.stamp))
             before = scan.scan
             if scan.scan and last >= self._window.start_ns:
                 found = True
@@ -95,17 +91,14 @@ class ScanTable:
         tasks: set[str] = set()
         for entry in reader.messages(types=_TYPES):
             message = entry.message
-            if isinstance(message, VariableTable) and not self._variables:
-                variables = variables_of(self._bag, message)
-                self._variables = {item.id: item for item in variables.values()}
-                self._strings = strings_of(variables)
-                self._origin = message.stamp
+            if isinstance(message, VariableTable):
+                self._log.check_table(message)
             elif isinstance(message, Scan):
                 if len(tasks) < _MOST_NAMES:
                     tasks.add(message.task)
                 if message.task != self._task:
                     continue
-                time = max(0, message.stamp - self._origin)
+                time = max(0, message.stamp - self._log.facts.table.stamp)
                 if self._window.end_ns is not None and time > self._window.end_ns:
                     break
                 yield time, message
@@ -118,10 +111,6 @@ class ScanTable:
         for _, scan in self._scans(first_half=True):
             latched.update(dict.fromkeys(zip(scan.latched.variable, scan.latched.element, strict=False)))
             committed.update(dict.fromkeys(zip(scan.committed.variable, scan.committed.element, strict=False)))
-        if not self._variables:
-            raise BagError(
-                "AMX6820", self._bag, "has no table of variables (topic .../variables)", NO_COMMON_MEMORY_HINT
-            )
         self._latched = self._add("in", latched)
         self._committed = self._add("out", committed)
 
@@ -137,12 +126,6 @@ class ScanTable:
             label = f"{direction}.{variable.name}"
             self._columns.append(column(label, DataType.numbered(variable.type), variable.unit))
         return indices
-
-    def _cells(self, columns: Mapping[tuple[int, int], int], values: Values) -> dict[int, Cell | None]:
-        cells: dict[int, Cell | None] = {}
-        for number, element, value in entries(values, self._strings):
-            cells[columns[number, element]] = value
-        return cells
 
     def _unknown_task(self, tasks: set[str]) -> BagError:
         names = sorted(tasks)

@@ -6,17 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.bags.common_log import (
-    NO_COMMON_MEMORY_HINT,
-    Cell,
-    CommonLog,
-    WatchedValues,
-    strings_of,
-    variables_of,
-)
+from automax_ros.bags.common_log import Cell, CommonLog, WatchedValues
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.locals import WatchedLocals, is_local
 from automax_ros.bags.reader import BagMessage, BagReader
+from automax_ros.bags.run_facts import run_facts
 from automax_ros.bags.span import span_of
 from automax_ros.bags.variables import Watched, watched_by_default, watched_by_name
 from automax_ros.core.names import NameFault
@@ -81,15 +75,14 @@ class Series:
         if any(map(is_local, watch or ())):
             types |= {_STATE}
         self._messages = self._reader.messages(types=types)
-        self._log = CommonLog(bag)
-        table = self._first_table()
-        variables = variables_of(bag, table)
+        self._log = CommonLog(bag, run_facts(self._reader))
+        table, variables = self._log.facts.table, self._log.variables
         self._locals = WatchedLocals(bag)
         self.columns: tuple[Watched, ...] = tuple(self._watched(variables, watch))
         self.rack = table.rack
         self.origin_ns = table.stamp
         self.end_ns = 0
-        self._values = WatchedValues(self.columns, strings_of(variables))
+        self._values = WatchedValues(self.columns)
         self._require_few_rows(progress)
 
     def changes(self) -> Iterator[Change]:
@@ -126,34 +119,25 @@ class Series:
             raise BagError("AMX6821", self._bag, error.message, error.hint) from error
         return list(watched.values())
 
-    def _first_table(self) -> VariableTable:
-        for entry in self._messages:
-            if isinstance(entry.message, VariableTable):
-                self._log.take_table(entry.message)
-                return entry.message
-            if isinstance(entry.message, (CommonImage, CommonWrite)):
-                self._log.is_new(entry.message)
-        raise BagError(
-            "AMX6820",
-            self._bag,
-            "has no common memory: no table of variables (topic .../variables)",
-            NO_COMMON_MEMORY_HINT,
-        )
-
     def _all_changes(self) -> Iterator[Change]:
         """Each instant of the recording with a change; the writes of one instant together."""
         values, instant = self._values, self.origin_ns
         for entry in self._messages:
             message = entry.message
             if isinstance(message, (CommonImage, CommonWrite, TaskState)):
-                if not isinstance(message, TaskState) and not self._log.is_new(message):
+                entries = None if isinstance(message, TaskState) else self._log.take(message)
+                if entries is None and not isinstance(message, TaskState):
                     continue
                 if message.stamp != instant:
                     changed = values.changes()
                     if changed:
                         yield max(0, instant - self.origin_ns), changed
                     instant = message.stamp
-                self._take(message)
+                if isinstance(message, TaskState):
+                    for column, value in self._locals.values(message):
+                        values.tell(column, value)
+                else:
+                    values.take(entries or ())
             else:
                 self._take_other(entry)
         changed = values.changes()
@@ -161,21 +145,10 @@ class Series:
             yield max(0, instant - self.origin_ns), changed
         self.end_ns = max(0, instant - self.origin_ns, (self._reader.last_stamp or 0) - self.origin_ns)
 
-    def _take(self, message: CommonImage | CommonWrite | TaskState) -> None:
-        if isinstance(message, TaskState):
-            for column, value in self._locals.values(message):
-                self._values.tell(column, value)
-            return
-        try:
-            self._values.take(message.values)
-        except ValueError as error:
-            text = f"wrong values at {seconds_text(max(0, message.stamp))} s: {error}"
-            raise BagError("AMX6813", self._bag, text) from error
-
     def _take_other(self, entry: BagMessage) -> None:
         message = entry.message
         if isinstance(message, VariableTable):
-            self._log.take_table(message)
+            self._log.check_table(message)
         elif isinstance(message, Scan) and self._take_scan is not None:
             time = max(0, message.stamp - self.origin_ns)
             if time >= self._window.start_ns and (self._window.end_ns is None or time <= self._window.end_ns):
@@ -236,7 +209,8 @@ class Series:
         start, end, step = self._window.start_ns, self._window.end_ns, self._window.step_ns
         if not step or (end is not None and (end - start) // step < MAX_GRID_ROWS):
             return
-        span = span_of(self._bag, progress=(lambda share: progress(share / 2)) if progress is not None else None)
+        first_half = (lambda share: progress(share / 2)) if progress is not None else None
+        span = span_of(self._bag, self.origin_ns, progress=first_half)
         if progress is not None:
             self._reader.on_progress = lambda share: progress((1 + share) / 2)
         first, last = (max(0, stamp - self.origin_ns) for stamp in (span.first, span.last))

@@ -149,7 +149,7 @@ class _Show:
         player.open()
         playable = self._tell_skipped()
         if not playable:
-            raise BagError("AMX6840", self._found.files[0], "no topic of the recording can be played")
+            raise BagError("AMX6840", self._found.bag.path, "no topic of the recording can be played")
         for space in player.look_around(lambda: self._stop.requested, for_racks=not arguments.force):
             raise UsageError(f"rack {space} is live in ROS domain {self._domain}", _LIVE_HINT)
         if player.clock_taken:

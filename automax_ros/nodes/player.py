@@ -239,7 +239,7 @@ class Player:
             outlet.check(record.data)
             outlet.publisher.publish(self._renaming.payload(outlet.topic.type_name, record.data))
         except CdrError as error:
-            place = ", ".join(str(file) for file in self._survey.files[:1])
+            place = ", ".join(str(file) for file in self._survey.bag.files[:1])
             text = f"the message on {outlet.topic.name[:247]} at {record.log_time} ns is malformed: {error}"
             raise BagError("AMX6816", place, text) from error
 

@@ -15,11 +15,12 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagMessage, BagReader
+from automax_ros.bags.run_facts import RunFacts, run_facts
 from automax_ros.bags.span import require_scans
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.kinds import WriterKind
+from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Tallies
-from automax_ros.replay.inputs import RecordedCommons
 from automax_ros.replay.report import ReplayReport
 from automax_ros.replay.stored_rack import ReplaySource, StoredRack, stored_rack
 from automax_ros.replay.task import TaskReplay
@@ -30,7 +31,7 @@ DEFAULT_MAX_DIFFERENCES = 50
 _TYPES = frozenset(
     f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "Scan", "TaskState", "VariableTable")
 )
-_STATES = frozenset({"automax_msgs/msg/TaskState", "automax_msgs/msg/VariableTable"})
+_STATES = frozenset({"automax_msgs/msg/TaskState"})
 
 Watcher = Callable[[TaskReplay, Scan], None]
 """Is told of each scan that was executed again, behind it."""
@@ -78,7 +79,10 @@ class Replay:
             SourceRefused: a source has errors.
         """
         self.options = options
-        self.rack: StoredRack = stored_rack(bag, BagReader(bag).files)
+        reader = BagReader(bag)
+        self.rack: StoredRack = stored_rack(reader)
+        self.facts = run_facts(reader)
+        self.rack.check_table(self.facts.table)
         names = self.rack.task_names
         self.rack.require_tasks(options.only or ())
         chosen = [name for name in names if options.only is None or name in options.only]
@@ -105,14 +109,14 @@ class Replay:
         options = self.options if to_ns is None else replace(self.options, to_ns=to_ns)
         starts: Mapping[str, int] = {}
         if options.from_ns:
-            starts = _last_states(reader, options.from_ns)
+            starts = _last_states(reader, self.facts.table.stamp + options.from_ns)
         reader.on_progress = on_progress
-        run = _Run(self._bag, self.rack, self.sources, options, starts, watcher)
+        run = _Run(self._bag, self.rack, self.facts, self.sources, options, starts, watcher)
         run.take_all(reader)
         doubtful = run.ends_in_doubt()
         if doubtful:
             sources = self.rack.replay_sources([task.name for task in doubtful], {})
-            recorded = _Run(self._bag, self.rack, sources, options, starts, None)
+            recorded = _Run(self._bag, self.rack, self.facts, sources, options, starts, None)
             reader.on_progress = None
             recorded.take_all(reader)
             for task in doubtful:
@@ -127,24 +131,33 @@ class _Run:
         self,
         bag: Path,
         rack: StoredRack,
+        facts: RunFacts,
         sources: list[ReplaySource],
         options: ReplayOptions,
         starts: Mapping[str, int],
         watcher: Watcher | None,
     ) -> None:
         self._bag, self._rack, self._sources, self._options = bag, rack, sources, options
-        self._starts = starts
         self._watcher = watcher
-        self._commons = RecordedCommons(bag, rack.config.variables)
+        self._start = facts.table.stamp
+        self._commons = RecordedCommons(bag, facts, rack.config.variables)
         self._all_tasks = frozenset(rack.task_names)
-        self._table: VariableTable | None = None
-        self._tallies = Tallies(0, options.max_differences)
+        self._tallies = Tallies(self._start, options.max_differences)
+        self._begin = self._start + options.from_ns
+        self._end = None if options.to_ns is None else self._start + options.to_ns
+        self._first_stamp: int | None = None
+        self._last_stamp = self._start
         self._tasks: dict[str, TaskReplay] = {}
         self._writers: dict[int, TaskReplay] = {}
-        self._begin = 0
-        self._end: int | None = None
-        self._first_stamp: int | None = None
-        self._last_stamp = 0
+        writers = {writer.name: writer.id for writer in facts.table.writers if writer.kind == WriterKind.TASK}
+        for source in sources:
+            starts_at = starts.get(source.name)
+            task = TaskReplay(
+                bag, source, self._commons, self._tallies, tolerance=options.tolerance, starts_at=starts_at
+            )
+            self._tasks[source.name] = task
+            if source.name in writers:
+                self._writers[writers[source.name]] = task
 
     def take_all(self, reader: BagReader) -> None:
         """Take the messages of a recording, up to the end of the range."""
@@ -163,22 +176,16 @@ class _Run:
     def take(self, entry: BagMessage) -> bool:
         """Take one message; return whether there may be more of interest."""
         message = entry.message
-        table = self._table
-        if table is None and not isinstance(message, VariableTable):
-            hint = "record /<rack>/variables from the start"
-            raise BagError("AMX6820", self._bag, "scans or values stand before the table of variables", hint)
-        if self._first_stamp is None and table is not None:
+        if self._first_stamp is None:
             self._first_stamp = entry.stamp
         if isinstance(message, Scan):
             return self._take_scan(message)
         if isinstance(message, CommonWrite):
-            if table is not None and message.run_id == table.run_id:
-                self._take_write(message)
+            self._take_write(message)
         elif isinstance(message, VariableTable):
-            self._take_table(message)
+            self._commons.check_table(message)
         elif isinstance(message, CommonImage):
-            if table is not None and message.run_id == table.run_id:
-                self._commons.take_image(message)
+            self._commons.take(message)
         elif isinstance(message, TaskState):
             if self._end is not None and message.stamp > self._end:
                 return False
@@ -193,11 +200,6 @@ class _Run:
         Raises:
             BagError: there was nothing to compare.
         """
-        if self._table is None:
-            hint = (
-                "record the topics /<rack>/variables, /<rack>/backplane/snapshot, /<rack>/backplane and /<rack>/scans"
-            )
-            raise BagError("AMX6820", self._bag, "has no common memory: no table of variables", hint)
         tasks = tuple(task.report() for task in self._tasks.values())
         report = ReplayReport(
             bag=str(self._bag),
@@ -212,7 +214,7 @@ class _Run:
             more=self._tallies.more,
         )
         if not report.scans and report.identical and (self._options.from_ns or self._options.to_ns is not None):
-            require_scans(self._bag, tuple(self._tasks), self._options.from_ns, self._options.to_ns)
+            require_scans(self._bag, self._start, tuple(self._tasks), self._options.from_ns, self._options.to_ns)
         self._require_compared(report)
         if not report.scans and report.identical:
             notes = "; ".join(f"{task.name}: {note}" for task in tasks for note in task.notes)
@@ -229,31 +231,6 @@ class _Run:
                 what = f"no scan of task {task.name} was executed again{notes}"
                 raise BagError("AMX6832", self._bag, what, "see `automax bag info`, or choose another range")
 
-    def _take_table(self, table: VariableTable) -> None:
-        if self._table is not None:
-            if (table.rack, table.run_id) != (self._table.rack, self._table.run_id):
-                raise BagError("AMX6822", self._bag, "holds more than one run")
-            return
-        self._rack.check_table(table)
-        self._table = table
-        self._tallies.origin = table.stamp
-        self._begin = table.stamp + self._options.from_ns
-        self._end = None if self._options.to_ns is None else table.stamp + self._options.to_ns
-        self._last_stamp = table.stamp
-        writers = {writer.name: writer.id for writer in table.writers if writer.kind == WriterKind.TASK}
-        for source in self._sources:
-            task = TaskReplay(
-                self._bag,
-                source,
-                self._commons,
-                self._tallies,
-                tolerance=self._options.tolerance,
-                starts_at=self._starts.get(source.name),
-            )
-            self._tasks[source.name] = task
-            if source.name in writers:
-                self._writers[writers[source.name]] = task
-
     def _take_scan(self, scan: Scan) -> bool:
         if self._end is not None and scan.stamp > self._end:
             return False
@@ -266,7 +243,7 @@ class _Run:
         return True
 
     def _take_write(self, write: CommonWrite) -> None:
-        entries = self._commons.take_write(write)
+        entries = self._commons.take(write) or ()
         for task in self._tasks.values():
             if task.memory.apart and self._writers.get(write.writer) is not task:
                 task.memory.overwritten(entries)
@@ -280,15 +257,12 @@ class _Run:
         return task
 
 
-def _last_states(reader: BagReader, from_ns: int) -> dict[str, int]:
-    """Return the log time of each task's last state that is earlier than ``from_ns`` since the start of the run."""
+def _last_states(reader: BagReader, latest: int) -> dict[str, int]:
+    """Return the log time of each task's last state that is earlier than a stamp."""
     found: dict[str, int] = {}
-    latest: int | None = None
     for entry in reader.messages(types=_STATES):
         message = entry.message
-        if isinstance(message, VariableTable):
-            latest = message.stamp + from_ns if latest is None else latest
-        elif isinstance(message, TaskState) and latest is not None:
+        if isinstance(message, TaskState):
             if message.stamp >= latest:  # a state of that very instant may contain the scan of the instant
                 break
             found[message.task] = entry.log_time

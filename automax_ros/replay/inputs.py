@@ -7,32 +7,15 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 
-from automax_ros.bags.errors import BagError
+from automax_ros.bags.common_log import Entry, Key
 from automax_ros.core.kinds import WriteKind
-from automax_ros.core.ticks import seconds_text
-from automax_ros.core.types import DataType, Latched, Value
-from automax_ros.rack.config import CommonVariable
-from automax_ros.rack.views import view_specs
-from automax_ros.running.registers import RegisterMap
+from automax_ros.core.types import Latched, Value
+from automax_ros.replay.commons import RecordedCommons
 from automax_ros.running.views import LatchPlan, latch_plan
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, Values
-
-Key = tuple[int, int]
-"""A value of common memory: number of the variable, flat index of the element."""
-Entry = tuple[int, int, Value]
-"""Variable, element, value."""
+from automax_ros.wire.messages import Scan
 
 _DOUBLE = struct.Struct("<d")
-
-
-class UnknownValue(Exception):
-    """A scan asked for a value that the recording has not told; ``key`` says which."""
-
-    def __init__(self, key: Key) -> None:
-        super().__init__(key)
-        self.key = key
 
 
 def same_bits(one: Value, other: Value) -> bool:
@@ -40,122 +23,6 @@ def same_bits(one: Value, other: Value) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         return (one == other and one != 0.0) or _DOUBLE.pack(one) == _DOUBLE.pack(other)
     return one == other and type(one) is type(other)
-
-
-class RecordedCommons:
-    """All of common memory as the recording has told it so far.
-
-    ``gaps`` counts places where writes are missing; after one nothing is known until the next image. ``forced`` are the
-    values that a force holds; ``on_forces`` are called when they change.
-    """
-
-    def __init__(self, bag: Path, variables: Sequence[CommonVariable]) -> None:
-        self.variables = tuple(variables)
-        self.registers = RegisterMap(view_specs(variables))
-        self.gaps = 0
-        self.forced: frozenset[Key] = frozenset()
-        self.on_forces: list[Callable[[], None]] = []
-        self._bag = bag
-        self._sequence: int | None = None
-        self._kinds = [(item.type, item.type.range, item.elements) for item in variables]
-        self._start: list[int] = []
-        size = 0
-        for item in variables:
-            self._start.append(size)
-            size += item.elements
-        self._cells: list[Value | None] = [None] * size
-
-    def entries(self, values: Values, stamp: int) -> list[Entry]:
-        """Return the entries of a message, each in its variable's own type.
-
-        Raises:
-            BagError: they do not fit the variables of the rack.
-        """
-        if not values.variable:
-            return []
-        texts = iter(values.text)
-        found: list[Entry] = []
-        kinds = self._kinds
-        try:
-            for view, element, number in zip(values.variable, values.element, values.value, strict=True):
-                kind, limits, elements = kinds[view]
-                if element >= elements:
-                    raise ValueError(f"{self.variables[view].name} has no element {element}")
-                if kind is DataType.STRING:
-                    found.append((view, element, next(texts)))
-                elif not limits[0] <= number <= limits[1]:
-                    raise ValueError(f"{self.variables[view].name} cannot be {number!r}")
-                elif kind is DataType.REAL:
-                    found.append((view, element, number))
-                elif number == int(number):
-                    found.append((view, element, bool(number) if kind is DataType.BOOLEAN else int(number)))
-                else:
-                    raise ValueError(f"{self.variables[view].name} cannot be {number!r}")
-        except (ValueError, IndexError, StopIteration) as error:
-            reason = str(error) or "a string variable without its text"
-            raise BagError(
-                "AMX6813", self._bag, f"wrong values at {seconds_text(max(stamp, 0))} s: {reason}"
-            ) from error
-        return found
-
-    def take_image(self, image: CommonImage) -> None:
-        """Take all of memory over.
-
-        Raises:
-            BagError: it does not fit the variables of the rack.
-        """
-        if self._sequence is None or image.sequence >= self._sequence:
-            self._sequence = image.sequence
-            self._put(self.entries(image.values, image.stamp))
-            self._hold(frozenset())
-
-    def take_write(self, write: CommonWrite) -> list[Entry]:
-        """Take one message of the write log over; return its entries, none if they were known already.
-
-        Raises:
-            BagError: it does not fit the variables of the rack.
-        """
-        if self._sequence is not None:
-            if write.sequence <= self._sequence:
-                return []
-            if write.sequence > self._sequence + 1:
-                self.gaps += 1
-                self._cells = [None] * len(self._cells)
-        self._sequence = write.sequence
-        entries = self.entries(write.values, write.stamp)
-        self._put(entries)
-        self._follow_forces(write)
-        return entries
-
-    def value(self, key: Key) -> Value:
-        """Return a value as it is now.
-
-        Raises:
-            UnknownValue: the recording has not told it.
-        """
-        value = self._cells[self._start[key[0]] + key[1]]
-        if value is None:
-            raise UnknownValue(key)
-        return value
-
-    def _follow_forces(self, write: CommonWrite) -> None:
-        """Take over which values are held: a force tells it, and after an image it is told again."""
-        keys = zip(write.values.variable, write.values.element, strict=False)
-        if write.kind == WriteKind.FORCE:
-            self._hold(self.forced.union(keys))
-        elif write.kind == WriteKind.RELEASE:
-            self._hold(self.forced.difference(keys))
-
-    def _hold(self, forced: frozenset[Key]) -> None:
-        if forced != self.forced:
-            self.forced = forced
-            for changed in self.on_forces:
-                changed()
-
-    def _put(self, entries: Iterable[Entry]) -> None:
-        cells, start = self._cells, self._start
-        for view, element, value in entries:
-            cells[start[view] + element] = value
 
 
 class ScanMemory:
@@ -174,7 +41,7 @@ class ScanMemory:
         self._edited = edited
         self.apart: dict[Key, Value] = {}
         self._commons = commons
-        self._index = {variable.name: view for view, variable in enumerate(commons.variables)}
+        self._index = {variable.name: view for view, variable in enumerate(commons.rack)}
         self._views: tuple[int, ...] = ()
         self._positions: dict[int, int] = {}
         self._recorded: list[Value] = []

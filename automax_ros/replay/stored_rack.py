@@ -14,6 +14,8 @@ from mcap.records import Attachment
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile
+from automax_ros.bags.reader import BagReader
+from automax_ros.bags.run_facts import sent_files
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.text import did_you_mean
@@ -134,22 +136,29 @@ class StoredRack:
             raise BagError("AMX6831", self.bag, "its table of variables is not that of the rack.yaml stored in it")
 
 
-def stored_rack(bag: Path, files: Sequence[Path]) -> StoredRack:
-    """Read what a recording stores inside; ``files`` are its data files, of which each holds everything.
+def stored_rack(reader: BagReader) -> StoredRack:
+    """Read what a recording stores inside: as attachments, of which each file has all, or as the rack's own message.
 
     Raises:
         BagError: there is no rack file inside, or it is too large, or the recording cannot be read.
         SourceRefused: the rack file has errors.
     """
+    bag = reader.path
     texts: dict[str, str] = {}
-    for file in files:
-        for record in McapFile(file).records(messages=False):
+    for path in reader.files:
+        for record in McapFile(path).records(messages=False):
             if isinstance(record, Attachment):
-                _keep(bag, texts, record)
+                _keep(bag, texts, record.name, record.data)
         if _RACK_FILE in texts:
             break
     if _RACK_FILE not in texts:
-        hint = "`automax run --record` and `automax record` store rack file and sources; `ros2 bag record` does not"
+        for file in sent_files(reader):
+            _keep(bag, texts, file.name, file.data)
+    if _RACK_FILE not in texts:
+        hint = (
+            "`automax run --record` and `automax record` store rack file and sources; for `ros2 bag record` name the "
+            "topic /<rack>/config too"
+        )
         raise BagError("AMX6830", bag, "has no rack.yaml inside, so its tasks cannot be executed again", hint)
     source = SourceText(f"{bag.name}:{_RACK_FILE}", texts.pop(_RACK_FILE))
     result = load_stored(source, Path(_RACK_FILE))
@@ -159,15 +168,15 @@ def stored_rack(bag: Path, files: Sequence[Path]) -> StoredRack:
     return StoredRack(bag, result.config, sources)
 
 
-def _keep(bag: Path, texts: dict[str, str], record: Attachment) -> None:
+def _keep(bag: Path, texts: dict[str, str], name: str, data: bytes) -> None:
     """Keep the rack file or a task's source; the first of a name counts."""
-    match = _SOURCE.fullmatch(record.name)
-    key = _RACK_FILE if record.name == _RACK_FILE else match[1] if match else None
+    match = _SOURCE.fullmatch(name)
+    key = _RACK_FILE if name == _RACK_FILE else match[1] if match else None
     if key is None or key in texts or len(texts) > _MOST_SOURCES:
         return
-    if len(record.data) > MAX_BYTES:
-        raise BagError("AMX6814", bag, f"{record.name} inside has more than {MAX_BYTES} bytes")
-    texts[key] = record.data.decode("utf-8", "replace")
+    if len(data) > MAX_BYTES:
+        raise BagError("AMX6814", bag, f"{name} inside has more than {MAX_BYTES} bytes")
+    texts[key] = data.decode("utf-8", "replace")
 
 
 def lines_that_write(program: Program) -> dict[str, tuple[int, ...]]:

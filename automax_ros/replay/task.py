@@ -7,14 +7,16 @@ from collections.abc import Hashable, Sequence
 from pathlib import Path
 from typing import cast
 
+from automax_ros.bags.common_log import Entry, Key
 from automax_ros.bags.errors import BagError
 from automax_ros.core.names import element_name
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 from automax_ros.rack.config import CommonVariable
+from automax_ros.replay.commons import RecordedCommons, UnknownValue
 from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
-from automax_ros.replay.inputs import Entry, Key, RecordedCommons, ScanMemory, UnknownValue, same_bits
+from automax_ros.replay.inputs import ScanMemory, same_bits
 from automax_ros.replay.report import Kind, NamedValue, TaskReport, errors_text
 from automax_ros.replay.state import (
     fitting_state,
@@ -376,7 +378,7 @@ class TaskReplay:
         return f"{element_name(self._variable(entry[:2]), entry[1])} = {source_text(entry[2])}"
 
     def _variable(self, key: Key) -> CommonVariable:
-        return self._commons.variables[key[0]]
+        return self._commons.rack[key[0]]
 
     def _when(self, stamp: int) -> str:
         return seconds_text(max(0, stamp - self._tallies.origin))

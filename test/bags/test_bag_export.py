@@ -28,7 +28,8 @@ START = image_of(0, 0, {REF: 0, COUNT: 0, GAIN: 0, RUN: 0, NOTE: 0, **{(5, i): 0
 
 
 def exported(tmp_path: Path, messages: list[tuple[str, Any]], watch: list[str] | None = None) -> list[str]:
-    bag = record(tmp_path / "bag", messages)
+    tmp_path.mkdir(exist_ok=True)
+    bag = record(tmp_path / "bag", messages, custom_data={"version": "0.1.0"})
     rows = export_csv(bag, tmp_path / "out.csv", watch)
     lines = (tmp_path / "out.csv").read_text().splitlines()
     assert len(lines) == rows + 1
@@ -155,8 +156,12 @@ def test_recordings_without_common_memory(tmp_path: Path) -> None:
     assert failure(tmp_path, [("/a", Int16(1))]).startswith("AMX6820 has no common memory")
 
 
-def test_writes_before_the_table(tmp_path: Path) -> None:
-    assert failure(tmp_path, [LOG[2], LOG[0]]).startswith("AMX6820 values stand before")
+def test_values_without_a_table(tmp_path: Path) -> None:
+    assert failure(tmp_path, LOG[1:]).startswith("AMX6820 has no common memory")
+
+
+def test_the_table_may_stand_anywhere(tmp_path: Path) -> None:
+    assert exported(tmp_path / "a", [*LOG[1:3], LOG[0], *LOG[3:]]) == exported(tmp_path / "b", LOG)
 
 
 def test_a_gap_in_the_write_log(tmp_path: Path) -> None:

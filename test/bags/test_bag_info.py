@@ -177,7 +177,7 @@ def test_a_write_log_that_goes_backwards_is_found_by_check(tmp_path: Path, seque
     assert bag_info(bag).problems == []
     (problem,) = bag_info(bag, check=True).problems
     assert problem.code == "AMX6813"
-    assert f"write {sequences[-1]} behind write {sequences[-2]}" in problem.message
+    assert f"write {sequences[-1]} after write {sequences[-2]}" in problem.message
 
 
 def test_the_same_file_under_two_names_is_found_by_check(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def test_no_recording(tmp_path):
 def test_recording_without_a_rack_file(bag, tmp_path):
     error = refusal(rewritten(bag, tmp_path / "bag", attachments=without("rack.yaml")))
     assert error.code == "AMX6830"
-    assert "`ros2 bag record` does not" in error.hint
+    assert "for `ros2 bag record` name the topic /<rack>/config too" in error.hint
 
 
 def test_recording_without_a_source(bag, tmp_path):

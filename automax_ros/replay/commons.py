@@ -1,0 +1,97 @@
+"""Common memory as a recording has told it so far: what every task's scans stand on in a replay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from automax_ros.bags.common_log import CommonLog, Entry, Key
+from automax_ros.bags.run_facts import RunFacts
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.types import Value
+from automax_ros.rack.config import CommonVariable
+from automax_ros.rack.views import view_specs
+from automax_ros.running.registers import RegisterMap
+from automax_ros.wire.messages import CommonImage, CommonWrite
+
+
+class UnknownValue(Exception):
+    """A scan asked for a value that the recording has not told; ``key`` says which."""
+
+    def __init__(self, key: Key) -> None:
+        super().__init__(key)
+        self.key = key
+
+
+class RecordedCommons(CommonLog):
+    """All of common memory as the recording has told it so far; ``rack`` are the variables of the recorded rack's file.
+
+    ``gaps`` counts places where writes are missing; after one nothing is known until the next image. ``forced`` are the
+    values that a force holds; ``on_forces`` are called when they change.
+    """
+
+    def __init__(self, bag: Path, facts: RunFacts, rack: Sequence[CommonVariable]) -> None:
+        super().__init__(bag, facts)
+        self.rack = tuple(rack)
+        self.registers = RegisterMap(view_specs(rack))
+        self.gaps = 0
+        self.forced: frozenset[Key] = frozenset()
+        self.on_forces: list[Callable[[], None]] = []
+        self._start: list[int] = []
+        size = 0
+        for item in rack:
+            self._start.append(size)
+            size += item.elements
+        self._cells: list[Value | None] = [None] * size
+
+    def take(self, message: CommonImage | CommonWrite) -> list[Entry] | None:
+        """Take a message of the write log over; return its entries, None if they were known already.
+
+        Raises:
+            BagError: it does not fit the variables of the rack.
+        """
+        entries = super().take(message)
+        if entries is not None:
+            self._put(entries)
+            self._follow_forces(message)
+        return entries
+
+    def value(self, key: Key) -> Value:
+        """Return a value as it is now.
+
+        Raises:
+            UnknownValue: the recording has not told it.
+        """
+        value = self._cells[self._start[key[0]] + key[1]]
+        if value is None:
+            raise UnknownValue(key)
+        return value
+
+    def _odd(self, name: str, value: float) -> Value:
+        raise ValueError(f"{name} cannot be {value!r}")
+
+    def _bridge(self, missing: int, message: CommonImage | CommonWrite) -> None:  # noqa: ARG002
+        self.gaps += 1
+        self._cells = [None] * len(self._cells)
+
+    def _follow_forces(self, message: CommonImage | CommonWrite) -> None:
+        """Take over which values are held: a force tells it, and after an image it is told again."""
+        if isinstance(message, CommonImage):
+            self._hold(frozenset())
+            return
+        keys = zip(message.values.variable, message.values.element, strict=False)
+        if message.kind == WriteKind.FORCE:
+            self._hold(self.forced.union(keys))
+        elif message.kind == WriteKind.RELEASE:
+            self._hold(self.forced.difference(keys))
+
+    def _hold(self, forced: frozenset[Key]) -> None:
+        if forced != self.forced:
+            self.forced = forced
+            for changed in self.on_forces:
+                changed()
+
+    def _put(self, entries: Iterable[Entry]) -> None:
+        cells, start = self._cells, self._start
+        for view, element, value in entries:
+            cells[start[view] + element] = value
