@@ -21,6 +21,7 @@ Entry = tuple[int, int, Value]
 Cell = Value
 """A value in a table."""
 
+
 class CommonLog:
     """Takes the messages of the write log of one run; what is of another run or known already tells nothing.
 

@@ -169,6 +169,9 @@ def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None
             info.problems.append(_with_repair(error))
         entry.chunks, entry.stored_bytes, entry.unpacked_bytes = data.chunks, data.stored_bytes, data.unpacked_bytes
         before += entry.size
+    if info.table is not None and info.first_stamp is not None and info.last_stamp is not None:
+        # A rack sends its files before its run begins; the recording of a run does not begin earlier.
+        info.first_stamp = min(max(info.first_stamp, info.table.stamp), info.last_stamp)
     if check and not info.problems:
         _check(info, progress)
     return info
