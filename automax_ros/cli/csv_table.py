@@ -38,7 +38,11 @@ class CsvFault(Exception):
 
 
 class CsvTable:
-    """An open table, closed at the end of a ``with``. ``header`` has the cells of its first line, at least one."""
+    """An open table, closed at the end of a ``with``. ``header`` has the cells of its first line, at least one.
+
+    Cells are separated by commas, or by semicolons where the header has one (decision: no variable's name has): so
+    spreadsheets write them where the decimal point is a comma.
+    """
 
     def __init__(self, path: Path) -> None:
         """Open a table and read its header.
@@ -48,6 +52,7 @@ class CsvTable:
             CsvFault: the header is no line of CSV.
         """
         self.path = path
+        self.separator = ","
         self._line = 0
         try:
             self._stream = path.open("rb")
@@ -108,7 +113,10 @@ class CsvTable:
         """Return the empty lines between two rows, as rows."""
         if lines and len(self.header) > 1:
             raise CsvFault(
-                "AMX6914", lines[0], "the line is empty, and rows follow", "write the commas of an empty row"
+                "AMX6914",
+                lines[0],
+                "the line is empty, and rows follow",
+                f"write every {self.separator} of an empty row",
             )
         return lines
 
@@ -141,10 +149,12 @@ class CsvTable:
             raise CsvFault("AMX6910", self._line, message, "save the table as UTF-8") from error
         if not text.strip():
             return []
+        if self._line == 1 and ";" in text:
+            self.separator = ";"
         try:
             if "\0" in text:
                 raise csv.Error("a NUL character")
-            return next(csv.reader((text,), strict=True, skipinitialspace=True))
+            return next(csv.reader((text,), delimiter=self.separator, strict=True, skipinitialspace=True))
         except csv.Error as error:
             hint = "a cell with quotes begins and ends with them on one line"
             raise CsvFault("AMX6910", self._line, f"not CSV: {printable(str(error))}", hint) from error

@@ -24,10 +24,11 @@ from automax_ros.cli.watch import add_watch_argument, watch_list
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import seconds_ns
-from automax_ros.core.types import Value
+from automax_ros.core.types import Value, bare_name
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import RackError
 from automax_ros.rack.settings import CommonElement, setting, watched
+from automax_ros.rack.tasks_check import check_tasks
 
 WITHOUT_ROS = "or run with --simulated, which needs no ROS"
 
@@ -108,10 +109,27 @@ def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:
 
 
 def _settings(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
-    try:
-        return [setting(config, text) for text in texts]
-    except Fault as error:
-        raise UsageError(f"--set: {error.message}", error.hint) from error
+    settings = []
+    for text in texts:
+        try:
+            settings.append(setting(config, text))
+        except Fault as error:
+            raise UsageError(f"--set: {error.message}", _tunable_hint(config, text) or error.hint) from error
+    return settings
+
+
+def _tunable_hint(config: RackConfig, text: str) -> str | None:
+    """Return what to do where NAME=VALUE, or TASK.NAME=VALUE, names a tunable of a task; None where it does not."""
+    name, _, value = (part.strip().upper() for part in text.partition("="))
+    for task, _, result in check_tasks(config):
+        symbol = result.program.symbols.get(name.removeprefix(f"{task.name}.")) if result.program is not None else None
+        if symbol is not None and symbol.tuning is not None:
+            slot = next(item.slot for item in config.processors if task in item.tasks)
+            command = (
+                f"ros2 param set /{config.namespace}/processor_{slot} {task.name}.{bare_name(symbol.name)} {value}"
+            )
+            return f"{symbol.name} is a tunable of task {task.name}: change CURRENT= in it, or while it runs: {command}"
+    return None
 
 
 def _watched(config: RackConfig, texts: list[str] | None) -> list[CommonElement]:

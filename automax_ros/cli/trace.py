@@ -3,6 +3,8 @@
 The header of IN.csv names variables with their type character: REF%, RUN@, GAIN, TABLE%(3). A cell sets its variable
 before the scan latches; an empty cell leaves it as it is. Commons, locals and tunables can be set. What stands before
 SCAN_LOOP runs once before the first row. The task's own COMMON statements define the common memory, all 0 at first.
+Cells are separated by commas or by semicolons. A table of `automax export` can be read: its column time_s is passed
+over, for each row is a scan; so export --every the task's scan time.
 """
 
 from __future__ import annotations

@@ -13,9 +13,12 @@ from automax_ros.core.types import DataType
 from automax_ros.core.values import is_number, value_of, value_text, wanted
 from automax_ros.language.program import Symbol
 
+_NOT_SET = ("scan", "time_s")
+"""Columns that tables of ``trace`` and ``export`` have: a row is a scan whatever they say."""
+
 
 class InputTable(CsvTable):
-    """An open table. ``columns`` are the variables that the header names, in its order."""
+    """An open table. ``columns`` are the variables that the header names, in its order; None is not looked at."""
 
     def __init__(self, path: Path, task: LoneTask) -> None:
         """Open a table and read its header.
@@ -42,16 +45,23 @@ class InputTable(CsvTable):
         """
         for line, cells in self.numbered_rows():
             for variable, cell in zip(self.columns, cells, strict=True):
-                if cell:
-                    _set(variable, cell, line)
+                if cell and variable is not None:
+                    _set(variable, self._decimal(cell, variable), line)
             yield line
 
-    def _columns(self, task: LoneTask) -> list[LoneVariable]:
-        columns: dict[str, LoneVariable] = {}
+    def _decimal(self, cell: str, variable: LoneVariable) -> str:
+        """Return a cell with a decimal point, where the table may have a comma."""
+        return cell.replace(",", ".") if self.separator == ";" and variable.symbol.type is DataType.REAL else cell
+
+    def _columns(self, task: LoneTask) -> list[LoneVariable | None]:
+        columns: dict[str, LoneVariable | None] = {}
         for name in self.header:
             try:
                 variable = task.variable(name)
             except NameFault as fault:
+                if name.strip() in _NOT_SET and name not in columns:
+                    columns[name] = None
+                    continue
                 code = "AMX6911" if isinstance(fault, UnknownName) else "AMX6913"
                 raise CsvFault(code, 1, fault.message, _header_hint(name) or fault.hint) from fault
             if variable.label in columns:
@@ -87,4 +97,4 @@ def _wanted(symbol: Symbol, *, tuned: bool) -> str:
 def _header_hint(name: str) -> str | None:
     if "(" in name and ")" not in name:
         return 'a name with several subscripts needs quotes in a CSV table: "TABLE%(1,2)"'
-    return "columns are separated by commas" if ";" in name or "\t" in name else None
+    return "columns are separated by commas or semicolons" if "\t" in name else None

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+from pathlib import Path
 
 import pytest
 from core.problem_pages import read_page
@@ -27,7 +28,10 @@ FAULTS = [code for code in PROBLEMS if "AMX6910" <= code < "AMX6950"]
     [
         ("REV%\n", "1: error[AMX6911]", "no variable 'REV%'\n  hint: did you mean REF%?"),
         ("REF\n", "1: error[AMX6911]", "did you mean REF%?"),
-        ("REF%;RUN@\n", "1: error[AMX6911]", "columns are separated by commas"),
+        ("REF%\tRUN@\n", "1: error[AMX6911]", "columns are separated by commas or semicolons"),
+        ("REF%;RUN@\n1;1\n1,1\n", "3: error[AMX6914]", "1 cells, the header 2"),
+        ("time_s,TIME_S\n", "1: error[AMX6911]", "no variable 'TIME_S'"),
+        ("time_s,time_s\n", "1: error[AMX6911]", "no variable 'time_s'"),
         ("GRID%(1,2)\n", "1: error[AMX6911]", 'needs quotes in a CSV table: "TABLE%(1,2)"'),
         ("REF%,\n", "1: error[AMX6911]", "no variable ''"),
         ("REF%,RUN@,ref%\n", "1: error[AMX6912]", "two columns for REF%"),
@@ -201,3 +205,36 @@ def test_rows_set_exactly_their_cells(lone, values):
     with InputTable(path, task) as table:
         for _, row in zip(table.rows(), values, strict=True):
             assert tuple(task.variable(name).read() for name in names) == row
+
+
+def test_semicolons_separate_where_the_header_has_one(automax):
+    result = automax.trace("REF%;SCALED;GRID%(1,2)\n5;0,5;7\n;;\n", "--watch", "REF%,SCALED,GRID%(1,2)")
+    assert (result.code, result.err) == (0, "")
+    rows = table_of(result.out)
+    assert [row[2] for row in rows] == ["REF%", "5", "5"]
+    assert [row[4] for row in rows] == ["GRID%(1,2)", "7", "7"]
+    assert automax.trace("REF%;GAIN\n5;2,5\n", "--watch", "GAIN").out.splitlines()[1].endswith(",2.5")
+
+
+def test_what_export_and_trace_write_can_be_traced(automax):
+    automax.write("TASK.BLK", TASK)
+    automax.write(
+        "rack.yaml",
+        """\
+rack: LINE1
+slots:
+  0: {module: 57C435, tasks: {TASK: {priority: 5}}}
+common:
+  REF%: {preset: 5}
+  RUN@:
+  SCALED:
+  COUNT!:
+""",
+    )
+    assert automax("run", "rack.yaml", "--simulated", "--duration", "0.1", "--record", "bag").code == 0
+    assert automax("export", "bag", "-o", "out.csv", "--every", "0.011").code == 0
+    assert Path("out.csv").read_text().startswith("time_s,REF%,")
+    result = automax("trace", "TASK.BLK", "--input", "out.csv")
+    assert (result.code, result.err) == (0, "")
+    automax.write("again.csv", result.out)
+    assert automax("trace", "TASK.BLK", "--input", "again.csv").code == 0

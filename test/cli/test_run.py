@@ -120,6 +120,23 @@ def test_bad_setting_is_wrong_usage(run, text, words):
     assert result.out == ""
 
 
+@pytest.mark.parametrize("name", ["KP%", "task.kp%"])
+def test_setting_of_a_tunable_says_how_to_tune(automax, name):
+    automax.write("rack.yaml", RACK)
+    automax.write("TASK.BLK", TASK.replace("20 LOCAL NIL%,", "20 LOCAL KP% [CURRENT=3], NIL%,"))
+    result = automax("run", "rack.yaml", "--simulated", "--duration", "1", "--set", f"{name}=5")
+    assert (result.code, result.out) == (2, "")
+    assert "no common variable" in result.err
+    assert "hint: KP% is a tunable of task TASK: change CURRENT= in it" in result.err
+    assert result.err.endswith("ros2 param set /line1/processor_0 TASK.KP 5\n")
+
+
+def test_elements_of_arrays_are_set(run):
+    result = run("--duration", "0.001", "--set", "TABLE%(2,1)=-7", "--watch", "TABLE%(2,1),TABLE%(2,2)")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.splitlines()[-1].strip() == "TABLE%(2,1)=-7  TABLE%(2,2)=10"
+
+
 @pytest.mark.parametrize(
     ("watch", "shown"),
     [
