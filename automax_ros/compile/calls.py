@@ -29,7 +29,7 @@ from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.expressions import SUBSCRIPT, lower_element, lower_index
 from automax_ros.compile.folding import TableReader
 from automax_ros.compile.inline import Binding, inline
-from automax_ros.compile.layout import Field, Role
+from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.pynames import forced_name, latched_name, structure_prefix, variable_name
 from automax_ros.compile.simplify import log_in_place
 from automax_ros.core.ticks import NS_PER_S
@@ -68,18 +68,18 @@ class BlockInstance:
         return {name: structure_prefix(structure.name) + name for name in STRUCTURE_STATES}
 
     @property
-    def fields(self) -> list[tuple[str, Field]]:
+    def fields(self) -> list[tuple[str, StateField]]:
         """The state fields with their Python names: the block's states, then those of evaluated coefficients."""
         entries = [(self.states[state.name], self._state_field(state)) for state in self.bound.block.states]
         return [*entries, *((self.prefix + name, field) for name, field in self._coefficient_fields())]
 
-    def _state_field(self, state: State) -> Field:
+    def _state_field(self, state: State) -> StateField:
         structure = self.bound.structure
         label = self.label if structure is None else structure.name
         facts = self.bound.facts
         size = 1 if state.size is None else state.size(facts)
         dimensions = () if state.size is None else (size,)
-        return Field(
+        return StateField(
             f"{label}.{state.name}",
             state.type,
             Role.BLOCK,
@@ -90,7 +90,7 @@ class BlockInstance:
             below=0 if state.below is None else state.below(facts),
         )
 
-    def _coefficient_fields(self) -> Iterator[tuple[str, Field]]:
+    def _coefficient_fields(self) -> Iterator[tuple[str, StateField]]:
         declared = self.bound.block.coefficients
         if declared is None or not self.evaluated:
             return
@@ -101,7 +101,7 @@ class BlockInstance:
             ("limited", DataType.DOUBLE, 0),
         ]
         for name, kind, initial in kinds:
-            yield name, Field(f"{self.label}.{name}", kind, Role.BLOCK, initial)
+            yield name, StateField(f"{self.label}.{name}", kind, Role.BLOCK, initial)
 
 
 def kept_names(declared: Coefficients) -> list[str]:

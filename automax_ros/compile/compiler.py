@@ -34,14 +34,14 @@ from automax_ros.compile.calls import BlockInstance, instance_of
 from automax_ros.compile.cost import CostModel
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.functions import BUILTINS, OPERATIONS
-from automax_ros.compile.layout import Field, Layout, Role, StateValue
+from automax_ros.compile.layout import Layout, Role, StateField, StateValue
 from automax_ros.compile.pynames import block_prefix, forced_name, latched_name, variable_name
 from automax_ros.compile.statements import STOPPED, StatementLowering
 from automax_ros.core.types import Latched, Value
 from automax_ros.language.program import Program, Symbol
 from automax_ros.language.syntax.tree import Call, For, If, Scope, Statement, Variable
 
-State = list[StateValue]
+StateValues = list[StateValue]
 
 
 class ScanTooLong(Exception):
@@ -101,9 +101,9 @@ class ScanIo(Protocol):
         ...
 
 
-Startup = Callable[[State, ScanIo], bool]
-Scans = Callable[[State, ScanIo], Generator[bool, None, None]]
-ScanSteps = Callable[[State, ScanIo], Generator[int, None, bool]]
+Startup = Callable[[StateValues, ScanIo], bool]
+Scans = Callable[[StateValues, ScanIo], Generator[bool, None, None]]
+ScanSteps = Callable[[StateValues, ScanIo], Generator[int, None, bool]]
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class _Compilation:
         self._cost = cost_model
         self._instances = _instances(program)
         self._latched = tuple(symbol.name for symbol in program.symbols.values() if symbol.latched)
-        self._fields: dict[str, Field] = {
+        self._fields: dict[str, StateField] = {
             variable_name(symbol.name): _local_field(symbol)
             for symbol in program.symbols.values()
             if symbol.scope is Scope.LOCAL
@@ -327,10 +327,10 @@ def _called(emitter: Emitter) -> dict[str, object]:
     return {**HELPERS, **{name: functions[name] for name in sorted(emitter.calls)}}
 
 
-def _local_field(symbol: Symbol) -> Field:
+def _local_field(symbol: Symbol) -> StateField:
     if symbol.tuning is not None:
-        return Field(symbol.name, symbol.type, Role.TUNABLE, symbol.tuning.current)
-    return Field(
+        return StateField(symbol.name, symbol.type, Role.TUNABLE, symbol.tuning.current)
+    return StateField(
         symbol.name,
         symbol.type,
         Role.LOCAL,

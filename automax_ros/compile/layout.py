@@ -37,7 +37,7 @@ def _in_range(kind: DataType, value: float) -> bool:
 
 
 @dataclass(frozen=True)
-class Field:
+class StateField:
     """One field: ``name`` is the variable's full name, or line, block and state as in ``1030 LAG.y1``.
 
     ``initial`` is the value at installation (locals), or at the block's first execution since RUN; ``dimensions`` are
@@ -83,7 +83,7 @@ class Field:
 class Layout:
     """The fields of a task's state, in the order in which compiled code loads and stores them."""
 
-    fields: tuple[Field, ...]
+    fields: tuple[StateField, ...]
 
     @property
     def hash(self) -> str:

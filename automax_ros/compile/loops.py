@@ -12,7 +12,7 @@ from automax_ros.compile import build
 from automax_ros.compile.emitter import OVER, Emitter
 from automax_ros.compile.expressions import Lowered, lower, of_type
 from automax_ros.compile.folding import value_of
-from automax_ros.compile.layout import Field, Role
+from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.stores import converted, store
 from automax_ros.core.types import DataType
 from automax_ros.language.syntax.tree import (
@@ -89,13 +89,13 @@ def _kept(emitter: Emitter, name: str, node: ast.expr) -> ast.expr:
     return build.name(name)
 
 
-def loop_fields(loop: Loop) -> dict[str, Field]:
+def loop_fields(loop: Loop) -> dict[str, StateField]:
     """Return the state fields of a loop's limit and step, by their Python names."""
     fields = {}
     for word, node, kind in (("stop", loop.stop, loop.stop_type), ("step", loop.step, loop.step_type)):
         if isinstance(node, ast.Name):
             stored = DataType.REAL if kind is DataType.REAL else DataType.DOUBLE
-            fields[node.id] = Field(f"{loop.place} FOR.{word}", stored, Role.STACK, stored.zero)
+            fields[node.id] = StateField(f"{loop.place} FOR.{word}", stored, Role.STACK, stored.zero)
     return fields
 
 

@@ -13,7 +13,7 @@ from automax_ros.compile.expressions import lower, of_type
 from automax_ros.compile.flow import PC, STEPS, Flow, count_statements, is_jumping, jump_targets
 from automax_ros.compile.folding import value_of
 from automax_ros.compile.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
-from automax_ros.compile.layout import Field, Role
+from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.loops import Loop, begin_loop, end_turn, loop_fields, loop_test
 from automax_ros.compile.stores import store
 from automax_ros.core.types import DataType
@@ -56,7 +56,7 @@ class StatementLowering:
 
     emitter: Emitter
     instances: dict[object, BlockInstance]
-    fields: dict[str, Field] = field(default_factory=dict)
+    fields: dict[str, StateField] = field(default_factory=dict)
     counts_steps: bool = False
     can_stop: bool = False
     block_lines: tuple[int, ...] = ()
@@ -251,8 +251,10 @@ class StatementLowering:
         self._next_block(flow, build.when(in_list, taken, [flow.to_next()]))
 
     def _gosub(self, flow: Flow, jump: ast.stmt) -> list[ast.stmt]:
-        self.fields["gosub_lines"] = Field("GOSUB.blocks", DataType.DOUBLE, Role.STACK, 0, GOSUB_DEPTH, is_array=True)
-        self.fields["gosub_depth"] = Field("GOSUB.depth", DataType.DOUBLE, Role.STACK, 0)
+        self.fields["gosub_lines"] = StateField(
+            "GOSUB.blocks", DataType.DOUBLE, Role.STACK, 0, GOSUB_DEPTH, is_array=True
+        )
+        self.fields["gosub_depth"] = StateField("GOSUB.depth", DataType.DOUBLE, Role.STACK, 0)
         depth = build.name("gosub_depth")
         call = [
             build.set_item("gosub_lines", depth, build.constant(flow.current + 1)),
@@ -342,7 +344,7 @@ class StatementLowering:
         self.emitter.emit(build.assign("data_pointer", build.constant(first if statement.line is not None else 0)))
 
     def _use_data(self) -> None:
-        self.fields["data_pointer"] = Field(
+        self.fields["data_pointer"] = StateField(
             "DATA.pointer", DataType.DOUBLE, Role.STACK, 0, below=len(self.emitter.program.data) + 1
         )
         self.emitter.extra_globals["data"] = self.emitter.program.data

@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
-from automax_ros.compile.layout import Field, Layout, Role
+from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import Value
 from automax_ros.language.program import Program
@@ -87,7 +87,7 @@ def fitting_state(
     return Takeover(values, tuple(initial))
 
 
-def _fitting(field: Field, values: tuple[Value, ...] | None, old: Field | None) -> list[Value] | None:
+def _fitting(field: StateField, values: tuple[Value, ...] | None, old: StateField | None) -> list[Value] | None:
     """The recorded values of a field in its own type, None if they do not fit it."""
     if values is None or len(values) != field.size:
         return None
@@ -99,7 +99,7 @@ def _fitting(field: Field, values: tuple[Value, ...] | None, old: Field | None) 
         return None
 
 
-def _typed(bag: Path, state: TaskState, field: Field, values: Sequence[Value]) -> Iterator[Value]:
+def _typed(bag: Path, state: TaskState, field: StateField, values: Sequence[Value]) -> Iterator[Value]:
     try:
         yield from [field.typed(value) for value in values]
     except (ValueError, OverflowError) as error:

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import cast
 
-from automax_ros.compile.compiler import CompiledTask, ScanTooLong, State
+from automax_ros.compile.compiler import CompiledTask, ScanTooLong, StateValues
 from automax_ros.compile.functions import text_of
-from automax_ros.compile.layout import Field, Layout, Role
+from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Latched, Value
@@ -176,7 +176,7 @@ class Task:
         self.backplane = backplane
         self.plan = memory.plan([memory.view(name) for name in compiled.latched])
         self.written = tuple(memory.view(name) for name in compiled.written)
-        self._state: State = compiled.layout.fresh()
+        self._state: StateValues = compiled.layout.fresh()
         self._scans: Generator[bool, None, None] | None = None
         self.errors = ErrorLog()
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
@@ -200,11 +200,11 @@ class Task:
     @property
     def layout(self) -> Layout:
         """The layout of a snapshot: the state, then the error log."""
-        log = Field("ERROR LOG", DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
+        log = StateField("ERROR LOG", DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
         return Layout((*self.compiled.layout.fields, log))
 
     @property
-    def state(self) -> State:
+    def state(self) -> StateValues:
         """The state, field by field as ``compiled.layout`` has it.
 
         Between scans the compiled scan holds it, so ask again after each scan: a list got earlier is out of date.

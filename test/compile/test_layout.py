@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.compile.layout import Field, Layout, Role
+from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.core.types import DataType
 
 from .support import compiled_of, lines, repeatable, task_of
@@ -114,7 +114,7 @@ def layouts(draw) -> tuple[Layout, list]:
         is_array = draw(st.booleans())
         role = draw(st.sampled_from([Role.LOCAL, Role.BLOCK]))
         length = 5 if kind is DataType.STRING else 0
-        fields.append(Field(f"F{number}", kind, role, kind.zero, size if is_array else 1, is_array, length=length))
+        fields.append(StateField(f"F{number}", kind, role, kind.zero, size if is_array else 1, is_array, length=length))
         state.append(draw(st.lists(VALUES[kind], min_size=size, max_size=size)) if is_array else draw(VALUES[kind]))
     return Layout(tuple(fields)), state
 
@@ -149,11 +149,11 @@ def test_flat_values_bring_the_state_back(made):
 def test_values_that_a_field_cannot_hold_are_refused(kind, role, value):
     """A snapshot comes from a bag, which nobody vouches for."""
     with pytest.raises(ValueError, match="cannot be"):
-        Layout((Field("F", kind, role, kind.zero, length=4),)).restore([value])
+        Layout((StateField("F", kind, role, kind.zero, length=4),)).restore([value])
 
 
 def test_a_blocks_state_may_be_wider_than_its_type():
-    layout = Layout((Field("30 PULSE_MULT.remainder", DataType.INTEGER, Role.BLOCK, 0),))
+    layout = Layout((StateField("30 PULSE_MULT.remainder", DataType.INTEGER, Role.BLOCK, 0),))
     assert layout.restore([2**40]) == [2**40]
 
 
