@@ -38,7 +38,7 @@ def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
         return {}
     commons = commons_of(config)
     facts = {}
-    for processor in config.processors:
+    for processor in config.task_modules:
         for task in processor.tasks:
             source = info.texts.get(f"{task.name}.BLK")
             name = f"{task.name}.BLK"

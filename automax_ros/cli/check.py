@@ -157,8 +157,8 @@ def _print(findings: list[_Findings], files: int) -> None:
 
 def _size(rack: RackConfig) -> str:
     """Return what a rack consists of, in words."""
-    tasks = sum(len(processor.tasks) for processor in rack.processors)
-    counts = ((len(rack.processors), "Processor"), (tasks, "task"), (len(rack.variables), "common"))
+    processors, tasks, commons = len(rack.task_modules), len(rack.placed_tasks), len(rack.declared)
+    counts = ((processors, "Processor"), (tasks, "task"), (commons, "common"))
     return ", ".join(count_of(number, thing) for number, thing in counts)
 
 

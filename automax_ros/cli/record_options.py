@@ -106,7 +106,7 @@ def _split_bytes(text: str | None, option: str) -> int:
 def _tasks(text: str | None, config: RackConfig) -> frozenset[str] | None:
     if text is None:
         return None
-    known = [task.name for processor in config.processors for task in processor.tasks]
+    known = [task.name for _, task in config.placed_tasks]
     names = [name.strip().upper() for name in text.split(",") if name.strip()]
     if not names:
         raise UsageError("--record-tasks: names no task", f"there are {', '.join(known)}")

@@ -26,7 +26,7 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value, bare_name
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.rack import RackError
+from automax_ros.rack.installation import RackError
 from automax_ros.rack.settings import CommonElement, setting, watched
 from automax_ros.rack.tasks_check import check_tasks
 

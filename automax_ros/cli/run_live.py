@@ -71,10 +71,10 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
 def _opening(rack: Rack, domain: int) -> str:
     config = rack.config
     modules = ", ".join(
-        f"{processor.model} in slot {processor.slot} ({' '.join(task.name for task in processor.tasks)})"
-        for processor in rack.processors
+        f"{module.config.model} in slot {module.config.slot} ({' '.join(item.task.name for item in module.tasks)})"
+        for module in rack.task_modules
     )
     return (
-        f"rack {config.name}: {modules}; {len(config.variables)} common variables\n"
+        f"rack {config.name}: {modules}; {len(config.declared)} common variables\n"
         f"ROS 2 namespace /{config.namespace} in domain {domain}; Ctrl-C ends the run"
     )

@@ -11,7 +11,8 @@ from automax_ros.cli.status_line import StatusLine
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.values import value_text
-from automax_ros.rack.rack import Processor, Rack
+from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import CommonElement
 from automax_ros.running.health import Health
 
@@ -83,7 +84,7 @@ class StatusDisplay:
         rate = (scans - self._last_scans) / elapsed if elapsed else 0.0
         parts = [f"{now_ns / NS_PER_S:8.1f} s", f"{rate:.0f} scans/s"]
         if self._live:
-            parts += [self._load(processor, passed_ns) for processor in self._rack.processors]
+            parts += [self._load(module, passed_ns) for module in self._rack.task_modules]
         else:
             parts.append(f"{(now_ns - self._last_rack_ns) / passed_ns:.0f}x")
         parts += self._trouble()
@@ -91,13 +92,14 @@ class StatusDisplay:
         self._last_rack_ns, self._last_scans = now_ns, scans
         self._line.show(parts)
 
-    def _load(self, processor: Processor, passed_ns: int) -> str:
+    def _load(self, module: Module, passed_ns: int) -> str:
         """Return a Processor's share of the time since the last line, and the deadlines it has missed."""
-        busy = sum(self._rack.statistics[task.name].total_ns for task in processor.tasks)
-        share = (busy - self._last_busy.get(processor.slot, 0)) / passed_ns
-        self._last_busy[processor.slot] = busy
-        late = sum(self._rack.statistics[task.name].skipped for task in processor.tasks)
-        return f"P{processor.slot} {100 * share:.1f} % late {late}"
+        slot = module.config.slot
+        busy = sum(item.statistics.total_ns for item in module.tasks)
+        share = (busy - self._last_busy.get(slot, 0)) / passed_ns
+        self._last_busy[slot] = busy
+        late = sum(item.statistics.skipped for item in module.tasks)
+        return f"P{slot} {100 * share:.1f} % late {late}"
 
     def _trouble(self) -> list[str]:
         """Return the counts of what went wrong."""

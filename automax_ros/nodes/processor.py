@@ -24,7 +24,8 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.tunables import Tunable, tunables_of
-from automax_ros.rack.rack import Processor
+from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.observers import Operation
 from automax_ros.running.error_log import LogEntry
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Status, Task
@@ -40,24 +41,25 @@ ERRORS_SHOWN = 5
 class ProcessorNode(ModuleNode):
     """Serves one Processor; the scheduler of the rack scans its tasks."""
 
-    def __init__(self, site: Site, processor: Processor) -> None:
+    def __init__(self, site: Site, processor: Module) -> None:
         """Create publishers and parameters, and observe the rack."""
-        super().__init__(site, f"processor_{processor.slot}")
+        super().__init__(site, processor.config.name)
         rack, stream = site.rack, site.stream
-        self._rack, self._processor = rack, processor
+        self._rack = rack
+        self._slot, self._tasks = processor.config.slot, [item.task for item in processor.tasks]
         outlets = {
-            topic: self.outlet(topic, partial(stream.send_states, processor.slot))
+            topic: self.outlet(topic, partial(stream.send_states, self._slot))
             for topic in stream.module_topics
-            if topic.slot == processor.slot
+            if topic.slot == self._slot
         }
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(processor.tasks)}
+        self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(self._tasks)}
         for tunable in self._tunables.values():
             self.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor())
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._tune)
-        self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in processor.tasks}
-        self._skipped_reported = dict.fromkeys((task.name for task in processor.tasks), 0)
+        self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in self._tasks}
+        self._skipped_reported = dict.fromkeys((task.name for task in self._tasks), 0)
         stream.add_sink(outlets.get)
         rack.observe(self)
         key = EventKey(EventClass.OBSERVE, 0, self.get_name())
@@ -67,7 +69,7 @@ class ProcessorNode(ModuleNode):
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
         """Report errors and printed lines of the Processor's own tasks."""
-        if task.slot != self._processor.slot:
+        if task.slot != self._slot:
             return
         if record.errors:
             self._report_errors(task, record)
@@ -88,10 +90,12 @@ class ProcessorNode(ModuleNode):
     def tuned(self, task: Task, now_ns: int) -> None:
         """Who tunes a task tells its parameter."""
 
-    def all_stopped(self, reason: str, now_ns: int) -> None:
-        """Report a STOP ALL."""
-        self.get_logger().error(f"STOP ALL: {reason}")
-        self._publish_diagnostics(now_ns)
+    def operated(self, operation: Operation) -> None:
+        """Report a STOP ALL, and the health of the tasks after each operation on one of them."""
+        if operation.what == "stop_all":
+            self.get_logger().error(f"STOP ALL: {operation.reason}")
+        if operation.task in ("", *(task.name for task in self._tasks)):
+            self._publish_diagnostics(operation.at_ns)
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         """Refuse what a task would refuse, before any of the parameters is set; those that are no tunables pass."""
@@ -115,7 +119,7 @@ class ProcessorNode(ModuleNode):
                     self._rack.tune(tunable.task, tunable.variable, parameter.value)
 
     def _publish_diagnostics(self, now_ns: int) -> None:
-        statuses = [self._status(task, now_ns) for task in self._processor.tasks]
+        statuses = [self._status(task, now_ns) for task in self._tasks]
         message = DiagnosticArray(status=statuses)
         stamp = self.site.stream.stamp(now_ns)
         message.header.stamp = Time(sec=stamp // NS_PER_S, nanosec=stamp % NS_PER_S)

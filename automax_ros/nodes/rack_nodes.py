@@ -26,8 +26,9 @@ from automax_ros.core.types import Value
 from automax_ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
-from automax_ros.rack.rack import Rack, RackError
+from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import START_LEAD_NS, Pacer
 from automax_ros.wire.stream import RackStream
@@ -69,7 +70,7 @@ class RackNodes:
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
         memory = CommonMemoryNode(self._site)
-        processors = [ProcessorNode(self._site, processor) for processor in self.rack.processors]
+        processors = [ProcessorNode(self._site, processor) for processor in self.rack.task_modules]
         self.nodes: tuple[ModuleNode, ...] = (memory, *processors)
 
     def add_to(self, executor: Any) -> None:
@@ -114,7 +115,7 @@ class RackNodes:
         if self._thread is not None:
             self._thread.join()
         with self.lock:
-            self.rack.stop()
+            self.rack.operations.stop_tasks()
             if self._begun:
                 self.stream.end()
         for node in self.nodes:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.kinds import Direction
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType, bare_name
 from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable
 from automax_ros.rack.findings import Findings
+from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import PREDEFINED, NameFault, VariableName, variable_name
+from automax_ros.rack.points import KEYS, PointReader
 from automax_ros.rack.presets import preset_value
 from automax_ros.rack.reserved import is_reserved
 from automax_ros.rack.scalars import boolean_value, number_value, text_value, wrong_kind
@@ -21,7 +25,7 @@ DESCRIPTION_LIMIT = 200
 MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
 """Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
 
-OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "description")
+OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "description", *KEYS)
 _DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
 _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 
@@ -29,8 +33,9 @@ _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 class CommonReader:
     """Reads the ``common`` section."""
 
-    def __init__(self, findings: Findings) -> None:
-        """Begin with no variables."""
+    def __init__(self, modules: Iterable[ModuleConfig], findings: Findings) -> None:
+        """Begin with no variables; I/O points stand on ``modules``."""
+        self._points = PointReader(modules, findings)
         self._findings = findings
         self._names: dict[str, Span] = {}
         self._bare: dict[str, tuple[str, Span]] = {}
@@ -67,6 +72,7 @@ class CommonReader:
             unit=self._text(section, "unit", declared.name, UNIT_LIMIT),
             description=self._text(section, "description", declared.name, DESCRIPTION_LIMIT),
             line=key.span.line,
+            point=self._points.read(section, declared, key.span),
         )
 
     def _name(self, key: Scalar) -> VariableName | None:
@@ -99,7 +105,7 @@ class CommonReader:
         if declared.name != name or declared.dimensions:
             message = f"{declared.name} must be the simple BOOLEAN {name}: the name is pre-defined"
             self._findings.add("AMX6410", message, key.span)
-        for option in ("preset", "non_volatile"):
+        for option in ("preset", "non_volatile", *KEYS):
             if option in section:
                 message = f"{name} has no {option}: the rack itself writes it"
                 self._findings.add("AMX6410", message, section.key_span(option))

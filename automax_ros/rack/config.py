@@ -10,13 +10,9 @@ from pathlib import Path
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value
+from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.task_config import TaskConfig
 
-MIN_PRIORITY, MAX_PRIORITY = 4, 11
-"""Priorities of tasks: 4 is served first (J2-3106-1 p. 8-2)."""
-MAX_TASKS = 32
-"""Tasks of one Processor (J2-3106-1 p. 2-5)."""
-MAX_PROCESSORS = 4
-"""Processors of one rack (J2-3106-1 p. 2-5)."""
 MAX_SLOT = 15
 """Highest slot of the largest rack (J2-3106-1 p. 10-2)."""
 DEFAULT_OUT_LIMIT = 200
@@ -88,41 +84,12 @@ class CommonVariable:
 
 
 @dataclass(frozen=True)
-class TaskConfig:
-    """A task of a Processor: ``file`` is its source, ``priority`` is 4 (first) to 11."""
-
-    name: str
-    file: Path
-    priority: int
-    line: int = 0
-
-
-@dataclass(frozen=True)
-class ProcessorConfig:
-    """A Processor module; ``model`` is its number as the manuals write it (``57C430A``), tasks in the file's order."""
-
-    slot: int
-    model: str
-    tick_ns: int
-    tasks: tuple[TaskConfig, ...] = ()
-    line: int = 0
-
-
-@dataclass(frozen=True)
-class CommonMemoryConfig:
-    """The common memory module in slot 0."""
-
-    slot: int
-    model: str
-    line: int = 0
-
-
-@dataclass(frozen=True)
 class RackConfig:
     """A rack without errors.
 
-    ``namespace`` is its ROS namespace without the slash, ``path`` the YAML file and ``text`` what it says. Processors
-    stand in the order of slots, variables in the order of the file.
+    ``namespace`` is its ROS namespace without the slash, ``path`` the YAML file and ``text`` what it says. Modules
+    stand in the order of slots, variables in the order of the file; after them the registers of the modules that have
+    some, each as one variable with a ``bank``.
     """
 
     name: str
@@ -130,6 +97,25 @@ class RackConfig:
     path: Path
     text: str
     operator: bool
-    common_memory: CommonMemoryConfig | None
-    processors: tuple[ProcessorConfig, ...]
+    modules: tuple[ModuleConfig, ...]
     variables: tuple[CommonVariable, ...]
+
+    @property
+    def declared(self) -> tuple[CommonVariable, ...]:
+        """The variables that the file defines: all but the registers of modules."""
+        return tuple(variable for variable in self.variables if variable.bank is None)
+
+    @property
+    def task_modules(self) -> tuple[ModuleConfig, ...]:
+        """The modules that run tasks."""
+        return tuple(module for module in self.modules if module.tick_ns)
+
+    @property
+    def placed_tasks(self) -> list[tuple[ModuleConfig, TaskConfig]]:
+        """All tasks with their modules: modules in the order of slots, tasks in the order of the file."""
+        return [(module, task) for module in self.modules for task in module.tasks]
+
+    @property
+    def home_slot(self) -> int:
+        """The slot of the module that holds the common variables: the first that can."""
+        return next((module.slot for module in self.modules if module.common_registers), 0)

@@ -25,15 +25,13 @@ from automax_ros.language.syntax.tree import Declaration, Declared, Scope
 from automax_ros.language.syntax.walk import statements_in_order
 from automax_ros.rack.config import (
     DEFAULT_OUT_LIMIT,
-    MAX_PRIORITY,
-    MAX_PROCESSORS,
-    MAX_TASKS,
-    MIN_PRIORITY,
     CommonVariable,
 )
 from automax_ros.rack.files import MAX_BYTES, FileFault, is_inside
-from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS
+from automax_ros.rack.modules.common_memory import COMMON_REGISTERS
+from automax_ros.rack.modules.processor import MAX_PROCESSORS
 from automax_ros.rack.names import NameFault, variable_name
+from automax_ros.rack.task_config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY
 from automax_ros.rack.task_source import read_task_source
 from automax_ros.rack.tasks_check import check_source
 
@@ -139,8 +137,8 @@ class Draft:
             CommonVariable(spec.name, spec.type, spec.dimensions, spec.length).registers
             for spec in self.commons.values()
         )
-        fitting = (model for model, size in sorted(COMMON_MEMORY_REGISTERS.items()) if needed <= size)
-        return next(fitting, max(COMMON_MEMORY_REGISTERS))
+        fitting = (model for model, size in sorted(COMMON_REGISTERS.items()) if needed <= size)
+        return next(fitting, max(COMMON_REGISTERS))
 
 
 def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:

@@ -12,13 +12,14 @@ from automax_ros.rack.commons import CommonReader
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS, PROCESSOR_REGISTERS
+from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import is_rack_name
 from automax_ros.rack.ros_names import namespace
 from automax_ros.rack.scalars import boolean_value, text_value
 from automax_ros.rack.sections import Section, entries_of
-from automax_ros.rack.slots import SlotReader, Slots
+from automax_ros.rack.slots import SlotReader
 from automax_ros.rack.tasks import TaskReader
+from automax_ros.rack.views import bank_variables
 from automax_ros.rack.yaml_text import Node, read_yaml
 
 _START = Span(1, 1, 2)
@@ -93,11 +94,11 @@ class _RackReader:
         section.require(("rack", "slots"), "the rack file", _START, self._findings)
         name = self._name(section.get("rack"))
         operator = self._operator(section.get("operator"))
-        slots = self._slots(section)
+        modules = self._modules(section)
         common = section.get("common")
-        variables = CommonReader(self._findings).read(common) if common is not None else ()
+        variables = CommonReader(modules, self._findings).read(common) if common is not None else ()
         if common is not None:
-            self._check_size(variables, slots, section.key_span("common"))
+            self._check_size(variables, modules, section.key_span("common"))
         if name is None or self._findings.errors:
             return None
         return RackConfig(
@@ -106,9 +107,8 @@ class _RackReader:
             path=self._path,
             text=self._text,
             operator=operator,
-            common_memory=slots.common_memory,
-            processors=slots.processors,
-            variables=variables,
+            modules=modules,
+            variables=(*variables, *bank_variables(modules)),
         )
 
     def _name(self, node: Node | None) -> str | None:
@@ -129,21 +129,16 @@ class _RackReader:
     def _operator(self, node: Node | None) -> bool:
         return bool(node is not None and boolean_value(node, "operator", self._findings))
 
-    def _slots(self, section: Section) -> Slots:
+    def _modules(self, section: Section) -> tuple[ModuleConfig, ...]:
         node = section.get("slots")
         if node is None:
-            return Slots()
+            return ()
         return SlotReader(self._tasks, self._findings).read(node, section.key_span("slots"))
 
-    def _check_size(self, variables: tuple[CommonVariable, ...], slots: Slots, span: Span) -> None:
-        """Compare the commons with the module that holds them (J-3636 p. 1-1; alone, a Processor counts as 57C413)."""
-        if slots.common_memory is not None:
-            holder, size = slots.common_memory.model, COMMON_MEMORY_REGISTERS[slots.common_memory.model]
-        elif slots.processors:
-            holder, size = slots.processors[0].model, PROCESSOR_REGISTERS
-        else:
-            return
-        needed = sum(variable.registers for variable in variables)
-        if needed > size:
-            message = f"the common variables take {needed} registers; the {holder} has {size}"
+    def _check_size(self, variables: tuple[CommonVariable, ...], modules: tuple[ModuleConfig, ...], span: Span) -> None:
+        """Compare the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""
+        holder = next((module for module in modules if module.common_registers), None)
+        needed = sum(variable.registers for variable in variables if variable.point is None)
+        if holder is not None and needed > holder.common_registers:
+            message = f"the common variables take {needed} registers; the {holder.model} has {holder.common_registers}"
             self._findings.add("AMX6409", message, span)

@@ -1,33 +1,21 @@
-"""The slots of a rack: which module stands where, and the rules that bind them together."""
+"""The slots of a rack: which module stands where. What it may say and where it may stand is its kind's business."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import quoted
-from automax_ros.core.ticks import DEFAULT_TICK_NS, tick_ns
-from automax_ros.rack.config import MAX_PROCESSORS, MAX_SLOT, CommonMemoryConfig, ProcessorConfig
+from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules import COMMON_MEMORY_REGISTERS, NOT_YET, PROCESSORS, SUPPORTED, module_number
+from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
+from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_number
 from automax_ros.rack.scalars import text_value, wrong_kind
 from automax_ros.rack.sections import Entry, Section, entries_of
 from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.yaml_text import Mapping, Node, Scalar
 
 _SLOT = re.compile(r"[0-9]{1,3}\Z")
-_TICK = re.compile(r"[0-9]{1,6}(\.[0-9]{1,9})?\Z")
-_PROCESSOR_SLOTS = range(1, 5)
-"""Where Processors stand beside a common memory module (J2-3106-1 p. 10-2)."""
-
-
-@dataclass(frozen=True)
-class Slots:
-    """The modules of a rack that are right, in the order of slots."""
-
-    common_memory: CommonMemoryConfig | None = None
-    processors: tuple[ProcessorConfig, ...] = ()
 
 
 class SlotReader:
@@ -37,17 +25,16 @@ class SlotReader:
         """Take the reader of tasks, which knows the names of the whole rack."""
         self._tasks = tasks
         self._findings = findings
-        self._models: dict[int, tuple[str, Span]] = {}
+        self._standing: dict[int, Standing] = {}
         self._places: dict[int, Span] = {}
         self._complete = True
 
-    def read(self, node: Node, span: Span) -> Slots:
-        """Return the modules; ``span`` is the place of the key ``slots``."""
+    def read(self, node: Node, span: Span) -> tuple[ModuleConfig, ...]:
+        """Return the modules that are right, in the order of slots; ``span`` is the place of the key ``slots``."""
         entries = entries_of(node, "slots", self._findings)
         if entries is None:
-            return Slots()
-        processors: list[ProcessorConfig] = []
-        memory: CommonMemoryConfig | None = None
+            return ()
+        modules: list[ModuleConfig] = []
         for key, value in entries:
             slot = self._slot(key)
             if slot is None:
@@ -55,12 +42,12 @@ class SlotReader:
             self._places[slot] = key.span
             module = self._module(slot, key, value)
             self._complete = self._complete and module is not None
-            if isinstance(module, ProcessorConfig):
-                processors.append(module)
-            elif module is not None and slot == 0:
-                memory = module
-        self._check_layout(span)
-        return Slots(memory, tuple(sorted(processors, key=lambda item: item.slot)))
+            if module is not None:
+                modules.append(module)
+        rack = Arrangement(list(self._standing.values()), self._complete, span, self._findings)
+        for kind in KINDS:
+            kind.check_places(rack)
+        return tuple(sorted(modules, key=lambda item: item.slot))
 
     def _slot(self, key: Scalar) -> int | None:
         if not _SLOT.match(key.text) or not 0 <= int(key.text) <= MAX_SLOT:
@@ -71,12 +58,12 @@ class SlotReader:
         if slot not in self._places:
             return slot
         first = self._places[slot]
-        held = f"holds {_described(self._models[slot][0])}" if slot in self._models else "is defined"
+        held = f"holds {_described(self._standing[slot])}" if slot in self._standing else "is defined"
         message = f"slot {slot} already {held} (line {first.line})"
         self._findings.add("AMX6201", message, key.span, notes=(Note("first defined here", first),))
         return None
 
-    def _module(self, slot: int, key: Scalar, node: Node) -> ProcessorConfig | CommonMemoryConfig | None:
+    def _module(self, slot: int, key: Scalar, node: Node) -> ModuleConfig | None:
         what = f"slot {slot}"
         if not isinstance(node, Mapping):
             given = module_number(node.text) if isinstance(node, Scalar) and len(node.text) < 10 else ""
@@ -86,15 +73,11 @@ class SlotReader:
         model = self._model(node.entries, what, key)
         if model is None:
             return None
-        self._models[slot] = (model, key.span)
-        if model in COMMON_MEMORY_REGISTERS:
-            Section(node.entries, _described(model), ("module",), self._findings)
-            return CommonMemoryConfig(slot, model, key.span.line)
-        section = Section(node.entries, _described(model), ("module", "tick_ms", "tasks"), self._findings)
-        where = f"{_described(model)} in slot {slot}"
-        tick = self._tick(section.get("tick_ms"), where)
-        tasks = section.get("tasks")
-        return ProcessorConfig(slot, model, tick, self._tasks.read(tasks, where) if tasks else (), key.span.line)
+        kind = SUPPORTED[model]
+        standing = self._standing[slot] = Standing(slot, model, kind, key.span)
+        section = Section(node.entries, _described(standing), ("module", *kind.options), self._findings)
+        where = f"{_described(standing)} in slot {slot}"
+        return kind.read(FoundModule(slot, model, section, where, key.span, self._tasks, self._findings))
 
     def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:
         """Return the number of a module that the emulator has; report AMX6202 to AMX6204 for others."""
@@ -118,54 +101,6 @@ class SlotReader:
             self._findings.add("AMX6202", f"{quoted(text)} is no module that the emulator knows", node.span, hint)
         return None
 
-    def _tick(self, node: Node | None, where: str) -> int:
-        if node is None:
-            return DEFAULT_TICK_NS
-        if not isinstance(node, Scalar) or not node.plain or not _TICK.match(node.text):
-            wrong_kind(node, f"tick_ms of {where}", "a number of milliseconds such as 5.5", self._findings)
-            return DEFAULT_TICK_NS
-        try:
-            return tick_ns(node.text)
-        except ValueError as error:
-            self._findings.add("AMX6210", f"{where}: {error}", node.span)
-            return DEFAULT_TICK_NS
 
-    def _check_layout(self, span: Span) -> None:
-        """Report what is wrong with the modules together; if one is not known, it may be the one that is missing."""
-        for slot, (model, place) in self._models.items():
-            if model in COMMON_MEMORY_REGISTERS and slot != 0:
-                self._report_memory_place(slot, model, place)
-        if not self._complete:
-            return
-        processors = sorted(slot for slot, (model, _) in self._models.items() if model in PROCESSORS)
-        has_memory = 0 in self._models and self._models[0][0] in COMMON_MEMORY_REGISTERS
-        if not processors:
-            self._findings.add("AMX6209", "the rack has no Processor", span, f"Processors are {', '.join(PROCESSORS)}")
-        elif len(processors) > MAX_PROCESSORS:
-            place = self._places[processors[MAX_PROCESSORS]]
-            message = f"the rack has {len(processors)} Processors; it may have at most {MAX_PROCESSORS}"
-            self._findings.add("AMX6207", message, place)
-        elif len(processors) > 1 and not has_memory:
-            message = "more than one Processor needs a common memory module in slot 0"
-            hint = f"put {' or '.join(COMMON_MEMORY_REGISTERS)} into slot 0 and the Processors into slots 1 to 4"
-            self._findings.add("AMX6205", message, self._places[processors[1]], hint)
-        else:
-            self._check_processor_slots(processors, has_memory)
-
-    def _check_processor_slots(self, processors: list[int], has_memory: bool) -> None:
-        allowed = _PROCESSOR_SLOTS if has_memory else range(1)
-        where = "slots 1 to 4 beside common memory" if has_memory else "slot 0 of a rack without common memory"
-        for slot in processors:
-            if slot not in allowed:
-                message = f"a Processor stands in {where}, not in slot {slot}"
-                self._findings.add("AMX6206", message, self._places[slot])
-
-    def _report_memory_place(self, slot: int, model: str, place: Span) -> None:
-        reason = "plain registers, which are not supported yet" if slot % 2 == 0 else "not possible"
-        self._findings.add(
-            "AMX6208", f"the {model} in slot {slot} is {reason}", place, "common memory stands in slot 0"
-        )
-
-
-def _described(model: str) -> str:
-    return f"{'processor' if model in PROCESSORS else 'common memory'} {model}"
+def _described(standing: Standing) -> str:
+    return f"{standing.kind.word} {standing.model}"

@@ -10,8 +10,10 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, in_order
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
-from automax_ros.rack.config import ProcessorConfig, RackConfig, TaskConfig
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import FileFault
+from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.task_source import read_task_source
 
 
@@ -25,6 +27,7 @@ class CheckedTask(NamedTuple):
 
 def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
     """Return the rack's common variables by full name, as the checker compares them with a task's COMMON."""
+    outputs = {module.slot: module.registers.outputs for module in config.modules}
     return {
         variable.name: CommonSpec(
             name=variable.name,
@@ -32,22 +35,23 @@ def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
             place=f"{config.path.name}:{variable.line}",
             dimensions=variable.dimensions,
             length=variable.length,
+            is_input=variable.point is not None and variable.point.register not in outputs[variable.point.slot],
         )
-        for variable in config.variables
+        for variable in config.declared
     }
 
 
 def check_tasks(config: RackConfig) -> list[CheckedTask]:
-    """Check all tasks of a rack, Processors in the order of slots, tasks in the order of the file.
+    """Check all tasks of a rack, modules in the order of slots, tasks in the order of the file.
 
     A source that could be read when the rack file was loaded but cannot be any more is an error of its task (AMX6306).
     """
     commons = commons_of(config)
-    return [_checked(processor, task, commons, config) for processor in config.processors for task in processor.tasks]
+    return [_checked(module, task, commons, config) for module, task in config.placed_tasks]
 
 
 def _checked(
-    processor: ProcessorConfig, task: TaskConfig, commons: Mapping[str, CommonSpec], config: RackConfig
+    module: ModuleConfig, task: TaskConfig, commons: Mapping[str, CommonSpec], config: RackConfig
 ) -> CheckedTask:
     try:
         source = read_task_source(task.file)
@@ -55,7 +59,7 @@ def _checked(
         place = SourceText(str(config.path), config.text)
         gone = Diagnostic("AMX6306", f"the source {task.file.name} of task {task.name} {fault}", Span(task.line, 1, 2))
         return CheckedTask(task, place, CheckResult(None, [gone]))
-    return CheckedTask(task, source, check_source(source, task.name, processor.tick_ns, commons))
+    return CheckedTask(task, source, check_source(source, task.name, module.tick_ns, commons))
 
 
 def check_source(source: SourceText, name: str, tick_ns: int, commons: Mapping[str, CommonSpec]) -> CheckResult:

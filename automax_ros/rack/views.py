@@ -6,14 +6,35 @@ from collections.abc import Iterable, Sequence
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonVariable
+from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.running.backplane import Backplane, Bank
 from automax_ros.running.views import Place, ViewSpec
 
 
-def bank_variable(slot: int, registers: int, line: int) -> CommonVariable:
-    """Return the variable that is all the registers of the module in a slot; ROS never sees it."""
-    return CommonVariable(
-        f"SLOT:{slot}%", DataType.INTEGER, (registers,), direction=Direction.CLOSED, line=line, bank=slot
+def bank_variables(modules: Iterable[ModuleConfig]) -> list[CommonVariable]:
+    """Return a variable for the registers of each module that has some; ROS never sees it."""
+    return [
+        CommonVariable(
+            f"SLOT:{module.slot}%",
+            DataType.INTEGER,
+            (module.registers.count,),
+            direction=Direction.CLOSED,
+            line=module.line,
+            bank=module.slot,
+        )
+        for module in modules
+        if module.registers.count
+    ]
+
+
+def backplane_of(config: RackConfig) -> Backplane:
+    """Return where the registers of a rack's modules answer."""
+    banks = bank_views(config.variables)
+    return Backplane(
+        Bank(module.slot, banks[module.slot], module.registers.count, module.registers.outputs)
+        for module in config.modules
+        if module.slot in banks
     )
 
 

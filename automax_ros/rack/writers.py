@@ -29,7 +29,7 @@ _FIRST_TASK = 3
 
 def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
     """Return all writers of a rack, in the order of their ids: outside sources, then tasks by slot and name."""
-    home = config.common_memory.slot if config.common_memory else 0
+    home = config.home_slot
     outside = [
         WriterSpec(PRESET_WRITER, "rack", WriterKind.PRESET, home),
         WriterSpec(ROS_WRITER, "ros", WriterKind.ROS, home),
@@ -37,7 +37,7 @@ def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
     ]
     tasks = [
         (module.slot, task.name)
-        for module in sorted(config.processors, key=lambda module: module.slot)
+        for module in config.modules
         for task in sorted(module.tasks, key=lambda task: task.name)
     ]
     return (

@@ -22,9 +22,11 @@ from automax_ros.core.text import did_you_mean
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Scope, Variable
 from automax_ros.language.syntax.walk import statements_in_order
-from automax_ros.rack.config import MAX_PROCESSORS, MAX_TASKS, RackConfig
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.loader import load_stored
+from automax_ros.rack.modules.processor import MAX_PROCESSORS
+from automax_ros.rack.task_config import MAX_TASKS
 from automax_ros.rack.tasks_check import check_source, commons_of
 from automax_ros.wire.messages import VariableTable
 
@@ -73,7 +75,7 @@ class StoredRack:
     @property
     def task_names(self) -> list[str]:
         """All tasks of the rack, as its file lists them."""
-        return [task.name for processor in self.config.processors for task in processor.tasks]
+        return [task.name for _, task in self.config.placed_tasks]
 
     def require_tasks(self, names: Iterable[str]) -> None:
         """Make sure that the rack has these tasks.
@@ -96,7 +98,7 @@ class StoredRack:
         """
         self.require_tasks([*names, *new])
         commons = commons_of(self.config)
-        ticks = {task.name: processor.tick_ns for processor in self.config.processors for task in processor.tasks}
+        ticks = {task.name: module.tick_ns for module, task in self.config.placed_tasks}
         views = {variable.name: view for view, variable in enumerate(self.config.variables)}
         made: list[ReplaySource] = []
         refused: list[tuple[SourceText, list[Diagnostic]]] = []

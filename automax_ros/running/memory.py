@@ -84,6 +84,12 @@ class CommonMemory(Image):
             self._store(view, element, self.read_now(view, element), writer, WriteKind.RELEASE)
             self._forces_changed(writer)
 
+    def hold(self, forced: Iterable[tuple[int, int]]) -> None:
+        """Take over which values are forced, as ``load_image`` takes over the values: nothing is logged."""
+        self._forced = set(forced)
+        for changed in self._force_watchers:
+            changed()
+
     @property
     def forced(self) -> frozenset[tuple[int, int]]:
         """What is forced: pairs of view and element."""
@@ -107,16 +113,16 @@ class CommonMemory(Image):
         entries, self._log = self._log or [], None if self._log is None else []
         return entries
 
-    def clear(self, writer: int = 0, *, keep_non_volatile: bool = True, kept: Container[int] = ()) -> None:
+    def clear(self, writer: int = 0, *, keep_non_volatile: bool = True, kept: Container[tuple[int, int]] = ()) -> None:
         """Set volatile variables to 0, except what is forced: STOP ALL and system restart (2.4.5).
 
-        ``kept`` are the views that their module keeps, such as its inputs. FORCINGSTATUS@ goes on telling the truth.
+        ``kept`` are views and elements that their module keeps, such as inputs. FORCINGSTATUS@ still tells the truth.
         """
         for view, spec in enumerate(self.specs):
-            if view in kept or spec.name == FORCING or (spec.non_volatile and keep_non_volatile):
+            if spec.name == FORCING or (spec.non_volatile and keep_non_volatile):
                 continue
             for element in range(spec.elements):
-                if self.read_now(view, element) != spec.type.zero:
+                if self.read_now(view, element) != spec.type.zero and (view, element) not in kept:
                     self._store(view, element, spec.type.zero, writer, WriteKind.OUTSIDE)
 
     def _forces_changed(self, writer: int) -> None:

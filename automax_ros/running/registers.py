@@ -48,6 +48,12 @@ class RegisterMap:
             if shown != read(other, 0):
                 yield other, 0, shown
 
+    def apart_from(self, bank: int, outputs: range, registers: int) -> frozenset[tuple[int, int]]:
+        """Return view and element of all that shows registers of a bank that are no outputs: its inputs."""
+        inputs = [register for register in range(registers) if register not in outputs]
+        points = (view for register in inputs for view in self._points.get((bank, register), ()))
+        return frozenset([*((bank, register) for register in inputs), *((view, 0) for view in points)])
+
     def others(self, view: int) -> list[int]:
         """Return the points that share a bit with a point: a word, and each of its named bits."""
         place = self._places.get(view)

@@ -89,6 +89,11 @@ class Scheduler:
             heapq.heappop(self._queue)
         return self._queue[0][0] if self._queue else None
 
+    def due_ns(self, event: Event) -> int | None:
+        """Return when an event happens next, None if it does not any more."""
+        found = (entry[0] for entry in self._queue if entry[5] is event)
+        return None if event.cancelled else next(found, None)
+
     def run_until(self, end_ns: int) -> None:
         """Let simulated time pass: every event before ``end_ns`` happens at its instant, then it is ``end_ns``."""
         queue = self._queue

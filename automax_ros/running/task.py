@@ -168,24 +168,29 @@ class Task:
         backplane: Backplane = NO_MODULES,
     ) -> None:
         """Install the task: its state is as at installation (2.4.5)."""
-        self.compiled = compiled
         self.memory = memory
         self.writer = writer
         self.slot = slot
         self.priority = priority
         self.backplane = backplane
-        self.plan = memory.plan([memory.view(name) for name in compiled.latched])
-        self.written = tuple(memory.view(name) for name in compiled.written)
-        self._state: StateValues = compiled.layout.fresh()
-        self._scans: Generator[bool, None, None] | None = None
-        self.errors = ErrorLog()
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
+        self._recording = False
+        self._scans: Generator[bool, None, None] | None = None
+        self.install(compiled)
+        memory.watch_forces(self._look_at_forces)
+
+    def install(self, compiled: CompiledTask) -> None:
+        """Begin anew, with this or another program: state and error log are as at installation (2.4.5)."""
+        self._put_down()
+        self.compiled = compiled
+        self.plan = self.memory.plan([self.memory.view(name) for name in compiled.latched])
+        self.written = tuple(self.memory.view(name) for name in compiled.written)
+        self._state: StateValues = compiled.layout.fresh()
+        self.errors = ErrorLog()
         self.status = Status.STOPPED
         self.scan_number = 0
-        self._recording = False
-        self._forced = False
-        self._io: TaskIo = TaskIo(self)
-        memory.watch_forces(self._look_at_forces)
+        self._forced = any(map(self.memory.is_forced, self.written))
+        self._io: TaskIo = RecordingIo(self) if self._recording else TaskIo(self)
 
     @property
     def name(self) -> str:

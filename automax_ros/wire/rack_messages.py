@@ -115,6 +115,7 @@ class _TaskFacts:
 
     def __init__(self, task: Task) -> None:
         layout = task.layout
+        self.compiled = task.compiled
         self.name, self.slot = task.name, task.slot
         self.views = tuple(task.memory.view(name) for name in task.compiled.latched)
         self.layout_hash, self.source_hash = layout.hash, task.compiled.program.source_hash
@@ -143,6 +144,11 @@ class RackMessages:
         self._text_positions = [position for position, entry in enumerate(image) if isinstance(entry[2], str)]
         self._tasks = {task: _TaskFacts(task) for task in rack.tasks}
 
+    def reinstalled(self, task: Task) -> None:
+        """Describe a task anew if it executes another program than before."""
+        if task.compiled is not self._tasks[task].compiled:
+            self._tasks[task] = _TaskFacts(task)
+
     def stamp(self, now_ns: int) -> int:
         """Return the stamp of an instant of rack time."""
         return self.epoch_ns + now_ns
@@ -150,8 +156,9 @@ class RackMessages:
     def table(self) -> VariableTable:
         """Return the table of variables and writers."""
         config = self._rack.config
-        home = config.common_memory.slot if config.common_memory else 0
         topics = topic_names(variable.name for variable in config.variables)
+        slots = {number: item.point.slot for number, item in enumerate(config.variables) if item.point is not None}
+        slots |= {number: item.bank for number, item in enumerate(config.variables) if item.bank is not None}
         variables = [
             Variable(
                 number,
@@ -159,7 +166,7 @@ class RackMessages:
                 variable.type.number,
                 variable.dimensions,
                 variable.length,
-                home,
+                slots.get(number, config.home_slot),
                 variable.non_volatile,
                 variable.direction,
                 f"/{config.namespace}/{topics[variable.name]}" if variable.direction is not Direction.CLOSED else "",

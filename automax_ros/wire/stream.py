@@ -13,6 +13,7 @@ from functools import partial
 from automax_ros.core.kinds import Direction
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.config import CommonVariable
+from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
 from automax_ros.running.scheduler import EventClass, EventKey
@@ -85,7 +86,7 @@ class RackStream:
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
-        slots = [processor.slot for processor in rack.processors]
+        slots = [module.config.slot for module in rack.task_modules]
         self.scans_topics = {slot: Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN, slot) for slot in slots}
         self.states_topics = {
             slot: Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN, slot) for slot in slots
@@ -226,10 +227,12 @@ class RackStream:
         """Send the task's new state: no scan tells that a tunable was set."""
         self._send_state(task, now_ns)
 
-    def all_stopped(self, reason: str, now_ns: int) -> None:  # noqa: ARG002
-        """Send the states in which the tasks were stopped."""
+    def operated(self, operation: Operation) -> None:
+        """Send the states in which an operation has left the tasks that it concerns."""
         for task in self._rack.tasks:
-            self._send_state(task, now_ns)
+            if operation.ok and operation.task in ("", task.name):
+                self._messages.reinstalled(task)
+                self._send_state(task, operation.at_ns)
 
     def _value_topics(self, space: str) -> dict[int, _ValueTopic]:
         variables = self._rack.config.variables

@@ -63,8 +63,8 @@ def recorded_twice(
         rack.run(seconds / slices)
         if rack.now_ns == JOINED_NS + 100 * NS_PER_MS:  # what a rack does when a late joiner has subscribed
             stream.send_image()
-            for processor in rack.processors:
-                stream.send_states(processor.slot)
+            for processor in rack.task_modules:
+                stream.send_states(processor.config.slot)
     stream.end()
     recorder.close()
     space = f"/{rack.config.namespace}"

@@ -166,7 +166,7 @@ def test_an_idle_rack_reaches_the_disk(tmp_path: Path) -> None:
     stream.begin(epoch_ns=1_700_000_000 * NS_PER_S)
     rack.start()
     rack.run(0.2)
-    rack.stop()
+    rack.operations.stop_tasks()
     data = tmp_path / "bag" / "scans_0.mcap"
     size = data.stat().st_size
     recorder.flush(NS_PER_S // 2 - 1)

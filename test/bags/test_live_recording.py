@@ -63,8 +63,8 @@ class Wire:
         """Send the image and the states again; return where they begin among the messages."""
         start = len(self.sent)
         self.stream.send_image()
-        for processor in self.rack.processors:
-            self.stream.send_states(processor.slot)
+        for processor in self.rack.task_modules:
+            self.stream.send_states(processor.config.slot)
         return start
 
     def end(self) -> list[Sent]:

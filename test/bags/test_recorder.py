@@ -94,7 +94,7 @@ def test_example_rack_executes_again(tmp_path):
     bag = recorded(Rack(config), tmp_path / "bag", seconds=12.0)
     (tmp_path / "again").mkdir()
     outcome = Reexecution(bag, tmp_path / "again").execute()
-    assert set(outcome.scans) == {task.name for module in config.processors for task in module.tasks}
+    assert set(outcome.scans) == {task.name for module in config.task_modules for task in module.tasks}
     assert min(outcome.scans.values()) > 200
 
 

@@ -47,7 +47,7 @@ def test_commons_have_types_dimensions_and_lengths(plant):
     plant("new", "plant")
     config = loaded("plant/rack.yaml")
     assert config.name == "PLANT"
-    assert config.common_memory.slot == 0
+    assert config.modules[0].model == "57C413"
     found = {item.name: (item.dimensions, item.length) for item in config.variables}
     assert found == {
         "REF%": ((), 0), "RUN@": ((), 0), "GAIN": ((), 0), "TABLE%": ((11,), 0), "NOTE$": ((), 12), "TEXT$": ((), 31),
@@ -57,17 +57,17 @@ def test_commons_have_types_dimensions_and_lengths(plant):
 
 def test_task_that_scans_most_often_is_served_first(plant):
     plant("new", "plant", "--tick-ms", "2.5")
-    (processor,) = loaded("plant/rack.yaml").processors
+    (processor,) = loaded("plant/rack.yaml").task_modules
     assert (processor.slot, processor.tick_ns) == (1, 2_500_000)
     assert {task.name: task.priority for task in processor.tasks} == {"FAST": 4, "SLOW": 5}
 
 
 def test_processors_share_the_tasks(plant):
     assert plant("new", "plant", "--processors", "2").code == 0
-    tasks = [[task.name for task in item.tasks] for item in loaded("plant/rack.yaml").processors]
+    tasks = [[task.name for task in item.tasks] for item in loaded("plant/rack.yaml").task_modules]
     assert tasks == [["FAST"], ["SLOW"]]
     assert plant("new", "plant", "--force", "--processors", "4").code == 0
-    assert len(loaded("plant/rack.yaml").processors) == 4
+    assert len(loaded("plant/rack.yaml").task_modules) == 4
 
 
 def test_tasks_of_the_example_give_its_commons(automax):
@@ -114,7 +114,7 @@ def test_nothing_is_written_over_without_force(plant):
 
 def test_rack_file_may_stand_above_the_tasks(plant):
     assert plant("new", "plant", "-o", "line.yaml").code == 0
-    (processor,) = loaded("line.yaml").processors
+    (processor,) = loaded("line.yaml").task_modules
     assert [str(task.file) for task in processor.tasks] == ["plant/FAST.BLK", "plant/SLOW.BLK"]
 
 
@@ -165,7 +165,7 @@ def test_odd_names_become_names_of_tasks(plant):
     for name in ("LINE SPEED'S.BLK", "line.blk", "9TH.BLK", "VERYLONGNAME1.BLK", "VERYLONGNAME2.BLK"):
         plant.write(f"plant/{name}", SLOW)
     assert plant("new", "plant").code == 0
-    (processor,) = loaded("plant/rack.yaml").processors
+    (processor,) = loaded("plant/rack.yaml").task_modules
     assert {task.file.name: task.name for task in processor.tasks} == {
         "FAST.BLK": "FAST", "SLOW.BLK": "SLOW", "LINE SPEED'S.BLK": "LINE_SPE", "line.blk": "LINE", "9TH.BLK": "T9TH",
         "VERYLONGNAME1.BLK": "VERYLONG", "VERYLONGNAME2.BLK": "VERYLON2",
@@ -186,7 +186,7 @@ def test_files_that_cannot_be_tasks_are_left_out(plant):
     assert result.code == 0
     assert result.err.count("left out") == 7
     assert "\x1b" not in result.err
-    assert [task.name for task in loaded("plant/rack.yaml").processors[0].tasks] == ["FAST", "SLOW"]
+    assert [task.name for task in loaded("plant/rack.yaml").task_modules[0].tasks] == ["FAST", "SLOW"]
     assert "SECRET" not in Path("plant/rack.yaml").read_text()
 
 

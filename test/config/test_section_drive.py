@@ -404,8 +404,8 @@ class Log:
     def written(self, writes: list[object]) -> None:
         self.entries += writes
 
-    def all_stopped(self, reason: str, now_ns: int) -> None:
-        self.entries.append((reason, now_ns))
+    def operated(self, operation) -> None:
+        self.entries.append(operation)
 
 
 def test_two_runs_write_the_same(config):

@@ -34,7 +34,7 @@ class Observer:
     def tuned(self, task, now_ns):
         pass
 
-    def all_stopped(self, reason, now_ns):
+    def operated(self, operation):
         pass
 
 

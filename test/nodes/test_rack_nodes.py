@@ -9,8 +9,9 @@ import pytest
 from system.support import TYPES, wait_until
 
 from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
-from automax_ros.rack.rack import Rack, RackError
+from automax_ros.rack.rack import Rack
 
 ROOT = Path(__file__).parents[2]
 
@@ -99,7 +100,7 @@ def test_scans_stand_on_the_grid(nodes):
         def written(self, writes):
             pass
 
-        tuned = all_stopped = written
+        tuned = operated = written
 
     nodes.rack.observe(Observer())
     nodes.start()

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.kinds import WriteKind, WriterKind
+from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
-from automax_ros.rack.rack import Rack, RackError, scans_per_second
+from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER
 from automax_ros.running.task import Status
 from automax_ros.running.views import MemoryValueError
@@ -70,8 +71,8 @@ class Notes:
     def tuned(self, task, now_ns):
         self.events.append(("tuned", task.name, now_ns))
 
-    def all_stopped(self, reason, now_ns):
-        self.events.append(("all_stopped", reason, now_ns))
+    def operated(self, operation):
+        self.events.append((operation.what, operation.reason, operation.at_ns))
 
 
 @pytest.fixture
@@ -232,7 +233,7 @@ def test_fault_stops_all_tasks_and_zeroes_volatile_commons(build):
     scanned, cleared, stopped = notes.events[-3:]
     assert scanned[:3] == ("scanned", "ALPHA", 2)
     assert {write.writer for write in cleared[1]} == {PRESET_WRITER}
-    assert stopped == ("all_stopped", reason, 10_000_000)
+    assert stopped == ("stop_all", reason, 10_000_000)
     assert rack.value("KEPT!") == 7
     assert (rack.value("REF%"), rack.value("SUM%"), rack.value("GO@")) == (0, 0, False)
     assert rack.value("BATTERYSTATUS1@") is True, "a battery does not fail with a task"
@@ -261,7 +262,7 @@ def test_stop_keeps_memory(build):
     rack.start()
     rack.run(0.1)
     before = rack.memory.image()
-    rack.stop()
+    rack.operations.stop_tasks()
     rack.run(1.0)
     assert rack.memory.image() == before
     assert rack.stop_reason is None

@@ -13,6 +13,25 @@ from automax_ros.wire.cdr import decode
 from automax_ros.wire.stream import RackStream
 
 PAGE = Path(__file__).parents[2] / "docs" / "rack_yaml.md"
+OUTPUT = """\
+10 COMMON COUNT%, LAMP@, LIGHTS%
+20 LOCAL SEEN%
+30 CALL SCAN_LOOP(TICKS=1)
+40 CALL MOVE(INPUT1=5, OUTPUT1=LIGHTS%)
+50 COUNT% = IOREAD%(5, 0) + IOREAD%(5, 1) * 100
+60 END
+"""
+POINTS = """\
+rack: LINE1
+slots:
+  0: {module: 57C435, tasks: {OUT: {priority: 5}}}
+  5: {module: 57C408}
+  6: {module: 57C408}
+common:
+  COUNT%:
+  LIGHTS%: {slot: 5, register: 1}
+  LAMP@: {slot: 5, register: 1, bit: 0}
+"""
 COUNTING = "10 COMMON COUNT%\n20 CALL SCAN_LOOP(TICKS=1)\n30 COUNT% = COUNT% + {step}\n40 END\n"
 RACK = """\
 rack: LINE1
@@ -42,6 +61,7 @@ class Behaviour(NamedTuple):
 def behaviour(folder: Path, text: str) -> Behaviour:
     for name, step in (("ONE", 1), ("TWO", 10), ("other", 100)):
         (folder / f"{name}.BLK").write_text(COUNTING.format(step=step))
+    (folder / "OUT.BLK").write_text(OUTPUT)
     path = folder / "rack.yaml"
     path.write_text(text)
     result = load(path)
@@ -54,7 +74,7 @@ def behaviour(folder: Path, text: str) -> Behaviour:
     rack.start()
     rack.run(0.022)
     count = rack.value("COUNT%")
-    rack.stop_all("test")
+    rack.operations.stop_all("test")
     return Behaviour(messages, count, rack.value("COUNT%"))
 
 
@@ -94,6 +114,22 @@ def test_a_key_changes_what_the_rack_does(key, tmp_path):
     assert look(behaviour(tmp_path, RACK.replace(old, new, 1))) == after
 
 
+@pytest.mark.parametrize(
+    ("key", "old", "new", "before", "after"),
+    [
+        ("slot", "slot: 5, register: 1, bit", "slot: 6, register: 1, bit", True, False),
+        ("register", "register: 1, bit", "register: 0, bit", True, False),
+        ("bit", "bit: 0", "bit: 1", True, False),
+    ],
+)
+def test_the_place_of_a_point_decides_what_it_shows(tmp_path, key, old, new, before, after):
+    assert key in old
+    for text, shown in ((POINTS, before), (POINTS.replace(old, new), after)):
+        found = behaviour(tmp_path, text)
+        assert found.count == 500
+        assert [message.data for message in found.on("common/LAMP")][-2:-1] == ([shown] if shown else [])
+
+
 def test_the_module_decides_how_many_registers_there_are(tmp_path):
     text = RACK + "  BIG!(40000):\n"
     (tmp_path / "rack.yaml").write_text(text)
@@ -107,5 +143,5 @@ def test_every_documented_key_is_tried():
     tables = re.findall(r"^\| (?:key|option) \| value .*\n\| --- .*\n((?:\|.*\n)+)", text, re.M)
     rows = [re.match(r"\| `(\w+)` \|", row) for table in tables for row in table.splitlines()]
     keys = {match[1] for match in rows if match}
-    assert keys == {*CHANGES, "module", "operator"}
+    assert keys == {*CHANGES, "module", "operator", "slot", "register", "bit"}
     assert "`operator` | `true` or `false` | `false` | No effect yet" in text

@@ -7,7 +7,7 @@ import pytest
 from automax_ros.core.diagnostics import render
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonMemoryConfig
+from automax_ros.rack.modules.common_memory import CommonMemoryConfig
 
 from .helpers import HEAD, codes, common, good, loaded
 
@@ -33,14 +33,14 @@ def test_modules_stand_in_the_order_of_slots_with_their_ticks_and_tasks(tmp_path
     (tmp_path / "line.blk").write_text("10 END\n")
     rack = good(tmp_path, TWO_PROCESSORS)
     assert (rack.name, rack.namespace, rack.operator) == ("LINE1", "line1", True)
-    assert rack.common_memory == CommonMemoryConfig(0, "57C413", 4)
-    assert [(item.slot, item.model, item.tick_ns) for item in rack.processors] == [
+    assert rack.modules[0] == CommonMemoryConfig(0, "57C413", 4)
+    assert [(item.slot, item.model, item.tick_ns) for item in rack.task_modules] == [
         (1, "57C435", 5_500_000),
         (2, "57C431", 500_000),
     ]
-    tasks = [(task.name, task.file.name, task.priority, task.line) for task in rack.processors[0].tasks]
+    tasks = [(task.name, task.file.name, task.priority, task.line) for task in rack.task_modules[0].tasks]
     assert tasks == [("LINE", "LINE.BLK", 5, 9), ("DRAW", "LINE.BLK", 4, 10)]
-    assert rack.processors[1].tasks[0].file == tmp_path / "line.blk"
+    assert rack.task_modules[1].tasks[0].file == tmp_path / "line.blk"
 
 
 def test_text_and_path_are_kept_for_the_recording(tmp_path):
@@ -187,7 +187,7 @@ def test_lower_case_names_are_read_in_upper_case_with_one_warning(tmp_path):
     result = loaded(tmp_path, text)
     assert [item.code for item in result.diagnostics] == ["AMX6411"]
     assert (result.config.name, result.config.variables[0].name) == ("LINE1", "SPEED%")
-    assert result.config.processors[0].tasks[0].name == "LINE"
+    assert result.config.task_modules[0].tasks[0].name == "LINE"
 
 
 def test_letters_beyond_ascii_are_not_made_to_fit(tmp_path):

@@ -34,7 +34,7 @@ def test_every_arrangement_of_six_slots_is_judged_by_the_rules(tmp_path):
 
 @pytest.mark.parametrize("model", PROCESSORS)
 def test_all_processors_are_known(tmp_path, model):
-    assert good(tmp_path, rack({0: model})).processors[0].model == model
+    assert good(tmp_path, rack({0: model})).task_modules[0].model == model
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_ticks_are_half_milliseconds_from_half_to_ten(tmp_path):
     for tenths in range(111):
         text = f"rack: A\nslots:\n  0: {{module: 57C435, tick_ms: {tenths // 10}.{tenths % 10}}}\n"
         if tenths % 5 == 0 and 5 <= tenths <= 100:
-            assert good(tmp_path, text).processors[0].tick_ns == tenths * 100_000
+            assert good(tmp_path, text).task_modules[0].tick_ns == tenths * 100_000
         else:
             assert codes(tmp_path, text) == ["AMX6210"]
 

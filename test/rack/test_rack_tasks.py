@@ -15,7 +15,7 @@ def rack(task: str) -> str:
 
 @pytest.mark.parametrize("name", ["A", "LINE", "S_1", "ABCDEFGH"])
 def test_task_names(tmp_path, name):
-    assert good(tmp_path, rack(f"{name}: {{file: LINE.BLK, priority: 4}}")).processors[0].tasks[0].name == name
+    assert good(tmp_path, rack(f"{name}: {{file: LINE.BLK, priority: 4}}")).task_modules[0].tasks[0].name == name
 
 
 @pytest.mark.parametrize("name", ["ABCDEFGHI", "1A", "_A", "A-B", "A B", "A%", "''"])
@@ -73,13 +73,13 @@ def test_symbolic_links_lead_out_only_when_allowed(tmp_path):
         text = rack(f"LINE: {{file: {file}, priority: 4}}")
         assert codes(inside, text) == ["AMX6305"]
         config = loaded(inside, text, allow_outside=True).config
-        assert config.processors[0].tasks[0].file.read_text() == "10 END\n"
+        assert config.task_modules[0].tasks[0].file.read_text() == "10 END\n"
 
 
 def test_symbolic_link_inside_the_folder_is_fine(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "ONE.BLK").symlink_to(tmp_path / "LINE.BLK")
-    assert good(tmp_path, rack("LINE: {file: sub/ONE.BLK, priority: 4}")).processors[0].tasks[0].name == "LINE"
+    assert good(tmp_path, rack("LINE: {file: sub/ONE.BLK, priority: 4}")).task_modules[0].tasks[0].name == "LINE"
 
 
 def test_tasks_next_to_the_file_that_the_rack_file_links_to_are_fine(tmp_path):
@@ -90,7 +90,7 @@ def test_tasks_next_to_the_file_that_the_rack_file_links_to_are_fine(tmp_path):
     write(source, rack("LINE: {priority: 4}"))
     for file in source.iterdir():
         (installed / file.name).symlink_to(file)
-    assert [task.name for task in load(installed / "rack.yaml").config.processors[0].tasks] == ["LINE"]
+    assert [task.name for task in load(installed / "rack.yaml").config.task_modules[0].tasks] == ["LINE"]
     (elsewhere / "LINE.BLK").write_text("10 END\n")
     (installed / "LINE.BLK").unlink()
     (installed / "LINE.BLK").symlink_to(elsewhere / "LINE.BLK")
@@ -100,7 +100,7 @@ def test_tasks_next_to_the_file_that_the_rack_file_links_to_are_fine(tmp_path):
 def test_rack_file_may_be_named_relative_to_the_working_folder(tmp_path, monkeypatch):
     write(tmp_path, rack("LINE: {priority: 4}"))
     monkeypatch.chdir(tmp_path)
-    assert load("rack.yaml").config.processors[0].tasks[0].file.name == "LINE.BLK"
+    assert load("rack.yaml").config.task_modules[0].tasks[0].file.name == "LINE.BLK"
 
 
 def test_rack_file_that_is_no_file_is_refused_without_waiting(tmp_path):

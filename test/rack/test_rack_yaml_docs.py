@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 
 from automax_ros.core.kinds import Direction
-from automax_ros.rack import commons, modules
+from automax_ros.rack import commons
 from automax_ros.rack.loader import load
+from automax_ros.rack.modules.registry import KINDS, SUPPORTED
 
 PAGE = Path(__file__).parents[2] / "docs" / "rack_yaml.md"
 
@@ -30,7 +31,7 @@ def test_example_is_a_rack_without_problems(tmp_path):
     result = load(example(tmp_path))
     assert result.diagnostics == []
     rack = result.config
-    processors = [(item.slot, item.tick_ns, len(item.tasks)) for item in rack.processors]
+    processors = [(item.slot, item.tick_ns, len(item.tasks)) for item in rack.task_modules]
     assert processors == [(1, 5_500_000, 2), (2, 2_500_000, 1)]
     directions = {item.name: item.direction for item in rack.variables}
     assert directions["LINE_SPEED%"] is Direction.IN
@@ -40,13 +41,14 @@ def test_example_is_a_rack_without_problems(tmp_path):
 
 def test_page_has_every_key():
     assert table_keys("The file") == ["rack", "operator", "slots", "common"]
-    assert table_keys("Slots") == ["module", "tick_ms", "tasks"]
+    assert table_keys("Slots") == ["module", *dict.fromkeys(key for kind in KINDS for key in kind.options)]
     assert sorted(table_keys("Tasks")) == ["file", "priority"]
     text = PAGE.read_text(encoding="utf-8")
-    options = re.findall(r"^\| `(\w+)` \|", text.split("| option |")[1].split("\n###")[0], re.M)
+    tables = text.split("| option |")
+    options = re.findall(r"^\| `(\w+)` \|", tables[1].split("\n###")[0] + tables[2].split("\n###")[0], re.M)
     assert tuple(options) == commons.OPTIONS
 
 
 def test_page_names_every_module():
     text = PAGE.read_text(encoding="utf-8")
-    assert all(f"`{number}`" in text for number in modules.SUPPORTED)
+    assert all(f"`{number}`" in text for number in SUPPORTED)

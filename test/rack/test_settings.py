@@ -60,7 +60,7 @@ def test_last_subscript_runs_fastest(first, second):
 def _rack_of(variable: CommonVariable) -> RackConfig:
     from pathlib import Path
 
-    return RackConfig("LINE1", "line1", Path("rack.yaml"), "", False, None, (), (variable,))
+    return RackConfig("LINE1", "line1", Path("rack.yaml"), "", False, (), (variable,))
 
 
 @pytest.mark.parametrize(

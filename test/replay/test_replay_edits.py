@@ -13,6 +13,7 @@ from compile.programs import DECLARATIONS
 from automax_ros.bags.errors import BagError
 from automax_ros.core.types import Value
 from automax_ros.rack.loader import load
+from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.report import Kind
 from automax_ros.replay.task import element_name
@@ -59,7 +60,7 @@ class AfterScans:
     def tuned(self, task: Task, now_ns: int) -> None:
         """No variable changes."""
 
-    def all_stopped(self, reason: str, now_ns: int) -> None:
+    def operated(self, operation: Operation) -> None:
         """No variable changes."""
 
 

@@ -55,6 +55,11 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6412", "commons without a topic", Severity.WARNING),
     Problem("AMX6413", "array of strings on ROS 2"),
     Problem("AMX6414", "rate limit without a topic", Severity.WARNING),
+    # rack files: I/O points
+    Problem("AMX6420", "I/O point in a slot without registers"),
+    Problem("AMX6421", "register or bit of an I/O point"),
+    Problem("AMX6422", "variable that cannot be an I/O point"),
+    Problem("AMX6423", "register or bit with two names"),
     # recordings
     Problem("AMX6700", "event that no module of the rack raises"),
     Problem("AMX6800", "folder for a recording exists already"),

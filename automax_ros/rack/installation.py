@@ -1,0 +1,65 @@
+"""Tasks of a rack, checked and compiled against its common memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from automax_ros.compile.compiler import CompiledTask, compile_program
+from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of
+
+Finding = tuple[SourceText, list[Diagnostic]]
+"""What is wrong in which text."""
+
+
+class RackError(Exception):
+    """A rack or a task cannot be built; ``findings`` are the diagnostics with the texts they refer to."""
+
+    def __init__(self, message: str, findings: Sequence[Finding] = ()) -> None:
+        """Take a message and what is wrong in which text."""
+        super().__init__(message)
+        self.findings = list(findings)
+
+
+class Installation:
+    """All tasks of a rack, compiled; ``warnings`` are what their checks found short of errors."""
+
+    def __init__(self, config: RackConfig) -> None:
+        """Check and compile all tasks.
+
+        Raises:
+            RackError: a task has errors; nothing is started then (the hardware's E0).
+        """
+        self._config = config
+        self._views = {variable.name: view for view, variable in enumerate(config.variables)}
+        self._compiled: dict[str, CompiledTask] = {}
+        self.sources: dict[str, SourceText] = {}
+        self.warnings: list[Finding] = []
+        checked = check_tasks(config)
+        failed = [(source, result.diagnostics) for _, source, result in checked if has_errors(result.diagnostics)]
+        if failed:
+            names = ", ".join(source.name for source, _ in failed)
+            raise RackError(f"no task is started: errors in {names} (the rack shows E0)", failed)
+        for task, source, result in checked:
+            assert result.program is not None
+            self.sources[task.name] = source
+            if result.diagnostics:
+                self.warnings.append((source, result.diagnostics))
+            self._compiled[task.name] = compile_program(result.program, self._views)
+
+    def compiled(self, task: str) -> CompiledTask:
+        """Return a task of the rack's file."""
+        return self._compiled[task]
+
+    def compile(self, task: str, source: SourceText) -> CompiledTask:
+        """Check and compile another source for a task of the rack.
+
+        Raises:
+            RackError: the source has errors.
+        """
+        module = next(module for module, item in self._config.placed_tasks if item.name == task)
+        result = check_source(source, task, module.tick_ns, commons_of(self._config))
+        if result.program is None or has_errors(result.diagnostics):
+            raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
+        return compile_program(result.program, self._views)

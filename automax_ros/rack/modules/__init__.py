@@ -1,0 +1,6 @@
+"""The kinds of modules, one file each: catalogue numbers, keys, places, registers, tasks, what survives, state.
+
+- ``kind`` says what a kind of module is, to the loader and to the rack;
+- ``processor``, ``common_memory``, ``digital_io`` are the kinds;
+- ``registry`` is the one list of them, and says why other modules of the catalogue cannot be used.
+"""

@@ -1,0 +1,203 @@
+"""What a kind of module is. The loader, the rack, the stream and the nodes know modules only through these protocols.
+
+A kind reads its section of a rack file into a configuration; a configuration builds the module of a running rack.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.rack.findings import Findings
+from automax_ros.rack.scheduled_task import ScheduledTask
+from automax_ros.rack.sections import Section
+from automax_ros.rack.task_config import TaskConfig
+from automax_ros.rack.tasks import TaskReader
+from automax_ros.running.backplane import Backplane
+from automax_ros.running.memory import CommonMemory
+from automax_ros.running.scheduler import Scheduler
+
+ModuleState = Mapping[str, Any]
+"""What a module keeps beside common memory, as numbers, texts, lists and mappings: ``{}`` where that is nothing."""
+
+
+@dataclass(frozen=True)
+class Registers:
+    """The registers of a module: how many, and which of them are outputs; the others are inputs."""
+
+    count: int = 0
+    outputs: range = range(0)
+
+
+NO_REGISTERS = Registers()
+
+
+class ModuleConfig(Protocol):
+    """A module as a rack file configures it. Its kind (``rack/modules``) has the rest.
+
+    ``name`` is unique in the rack and that of its node; ``tick_ns`` is that of its tasks, 0 where it can have none;
+    ``common_registers`` is how many 16-bit registers of common variables it can hold, 0 for none.
+    """
+
+    @property
+    def slot(self) -> int: ...  # noqa: D102
+
+    @property
+    def model(self) -> str: ...  # noqa: D102
+
+    @property
+    def line(self) -> int: ...  # noqa: D102
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def tick_ns(self) -> int: ...  # noqa: D102
+
+    @property
+    def tasks(self) -> tuple[TaskConfig, ...]: ...  # noqa: D102
+
+    @property
+    def registers(self) -> Registers: ...  # noqa: D102
+
+    @property
+    def common_registers(self) -> int: ...  # noqa: D102
+
+    @property
+    def has_battery(self) -> bool: ...  # noqa: D102
+
+    def build(self, parts: Parts) -> Module:
+        """Return the module of a running rack."""
+        ...
+
+
+@dataclass(frozen=True)
+class FoundModule:
+    """A module of a rack file as its kind reads it; ``where`` names it in messages."""
+
+    slot: int
+    model: str
+    section: Section
+    where: str
+    span: Span
+    tasks: TaskReader
+    findings: Findings
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A module as the rules of places see it: all modules whose number is known, right in the rest or not."""
+
+    slot: int
+    model: str
+    kind: ModuleKind
+    span: Span
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """All modules of a rack file. Unless ``complete``, one could not be read and may be the one that a rule misses."""
+
+    standing: Sequence[Standing]
+    complete: bool
+    span: Span
+    findings: Findings
+
+    def of(self, kind: ModuleKind) -> list[Standing]:
+        """Return the modules of one kind, in the order of slots."""
+        return sorted((item for item in self.standing if item.kind is kind), key=lambda item: item.slot)
+
+
+class ModuleKind(Protocol):
+    """A kind of module: what a rack file may say of it, and where it may stand.
+
+    ``word`` names the kind in messages; ``models`` are its catalogue numbers, each with what it is.
+    """
+
+    @property
+    def word(self) -> str: ...  # noqa: D102
+
+    @property
+    def models(self) -> Mapping[str, str]: ...  # noqa: D102
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The keys of its section, ``module`` left out."""
+        ...
+
+    def read(self, found: FoundModule) -> ModuleConfig:
+        """Read a module's section; what is wrong goes to the findings."""
+        ...
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report modules of this kind that stand where none can, or that are missing."""
+        ...
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a rack gives to its modules; ``install`` makes a task of a module's configuration."""
+
+    memory: CommonMemory
+    scheduler: Scheduler
+    backplane: Backplane
+    install: Callable[[TaskConfig], ScheduledTask]
+
+
+class Module(Protocol):
+    """A module of a running rack. ``tasks`` stand in the order in which they start: priority, then name."""
+
+    @property
+    def config(self) -> ModuleConfig: ...  # noqa: D102
+
+    @property
+    def tasks(self) -> Sequence[ScheduledTask]: ...  # noqa: D102
+
+    @property
+    def kept(self) -> frozenset[tuple[int, int]]:
+        """The views and elements that it keeps when STOP ALL or a restart clears memory, such as its inputs."""
+        ...
+
+    def power_on(self) -> None:
+        """Begin what it does by itself, at the scheduler's present."""
+        ...
+
+    def power_off(self) -> None:
+        """End all that it does by itself."""
+        ...
+
+    def state(self) -> ModuleState:
+        """Return what it keeps beside common memory."""
+        ...
+
+    def load(self, state: ModuleState) -> None:
+        """Take over a state, in place of ``power_on``.
+
+        Raises:
+            ValueError: the state does not fit.
+        """
+        ...
+
+
+@dataclass
+class QuietModule:
+    """A module that does nothing by itself: its registers, if it has some, are all there is."""
+
+    config: ModuleConfig
+    kept: frozenset[tuple[int, int]] = frozenset()
+    tasks: Sequence[ScheduledTask] = field(default=())
+
+    def power_on(self) -> None:
+        """Nothing begins."""
+
+    def power_off(self) -> None:
+        """Nothing ends."""
+
+    def state(self) -> ModuleState:
+        """Return nothing: its registers are in common memory."""
+        return {}
+
+    def load(self, state: ModuleState) -> None:
+        """Take over nothing."""

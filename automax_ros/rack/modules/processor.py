@@ -1,0 +1,131 @@
+"""AutoMax Processors: each runs up to 32 tasks on a tick of its own (J2-3106-1 p. 2-5, 10-1)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from automax_ros.core.ticks import DEFAULT_TICK_NS, tick_ns
+from automax_ros.rack.modules.common_memory import COMMON_MEMORY
+from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule, Module, ModuleState, Parts, Registers
+from automax_ros.rack.scalars import wrong_kind
+from automax_ros.rack.scheduled_task import ScheduledTask
+from automax_ros.rack.task_config import TaskConfig
+from automax_ros.rack.yaml_text import Node, Scalar
+
+MAX_PROCESSORS = 4
+"""Processors of one rack (J2-3106-1 p. 2-5)."""
+_COMMON_REGISTERS = 65536
+"""Registers for commons where a Processor works alone (decision: as many as the 57C413 has)."""
+_TICK = re.compile(r"[0-9]{1,6}(\.[0-9]{1,9})?\Z")
+_SLOTS = range(1, 5)
+"""Where Processors stand next to a common memory module (J2-3106-1 p. 10-2)."""
+
+
+@dataclass(frozen=True)
+class ProcessorConfig:
+    """A Processor module; ``model`` is its number as the manuals write it (``57C430A``), tasks in the file's order."""
+
+    slot: int
+    model: str
+    tick_ns: int
+    tasks: tuple[TaskConfig, ...] = ()
+    line: int = 0
+
+    has_battery = True
+    registers: Registers = NO_REGISTERS
+    common_registers = _COMMON_REGISTERS
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"processor_{self.slot}"
+
+    def build(self, parts: Parts) -> Module:
+        """Return the module of a running rack."""
+        in_order = sorted(self.tasks, key=lambda item: (item.priority, item.name))
+        return ProcessorModule(self, [parts.install(item) for item in in_order])
+
+
+@dataclass
+class ProcessorModule:
+    """A Processor with its tasks."""
+
+    config: ProcessorConfig
+    tasks: Sequence[ScheduledTask]
+    kept: frozenset[tuple[int, int]] = frozenset()
+
+    def power_on(self) -> None:
+        """Nothing begins: tasks are put into RUN by the rack, in the order of all its Processors."""
+
+    def power_off(self) -> None:
+        """Stop the tasks; locals, tunables and error logs stay (2.4.5)."""
+        for task in self.tasks:
+            task.stop()
+
+    def state(self) -> ModuleState:
+        """Return the state of each task."""
+        return {item.task.name: item.state() for item in self.tasks}
+
+    def load(self, state: ModuleState) -> None:
+        """Take over the state of each task; those that ran go on with their next scan."""
+        if set(state) != {item.task.name for item in self.tasks}:
+            raise ValueError(f"{self.config.name} has the tasks {[item.task.name for item in self.tasks]}")
+        for item in self.tasks:
+            item.load(state[item.task.name])
+
+
+class ProcessorKind:
+    """What a rack file may say of a Processor."""
+
+    word = "processor"
+    models = {"57C430A": "6010", "57C431": "6011", "57C435": "7010"}  # noqa: RUF012
+    options = ("tick_ms", "tasks")
+
+    def read(self, found: FoundModule) -> ProcessorConfig:
+        """Read tick and tasks."""
+        tick = _tick(found.section.get("tick_ms"), found)
+        tasks = found.section.get("tasks")
+        read = found.tasks.read(tasks, found.where) if tasks else ()
+        return ProcessorConfig(found.slot, found.model, tick, read, found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report too few or too many Processors, and those in other slots than 1 to 4, or 0 for a Processor alone."""
+        own = rack.of(self)
+        if not rack.complete:
+            return
+        has_memory = any(item.slot == 0 for item in rack.of(COMMON_MEMORY))
+        if not own:
+            hint = f"Processors are {', '.join(self.models)}"
+            rack.findings.add("AMX6209", "the rack has no Processor", rack.span, hint)
+        elif len(own) > MAX_PROCESSORS:
+            message = f"the rack has {len(own)} Processors; it may have at most {MAX_PROCESSORS}"
+            rack.findings.add("AMX6207", message, own[MAX_PROCESSORS].span)
+        elif len(own) > 1 and not has_memory:
+            message = "more than one Processor needs a common memory module in slot 0"
+            hint = f"put {' or '.join(COMMON_MEMORY.models)} into slot 0 and the Processors into slots 1 to 4"
+            rack.findings.add("AMX6205", message, own[1].span, hint)
+        else:
+            allowed = _SLOTS if has_memory else range(1)
+            where = "slots 1 to 4 next to common memory" if has_memory else "slot 0 of a rack without common memory"
+            for item in own:
+                if item.slot not in allowed:
+                    message = f"a Processor stands in {where}, not in slot {item.slot}"
+                    rack.findings.add("AMX6206", message, item.span)
+
+
+PROCESSOR = ProcessorKind()
+
+
+def _tick(node: Node | None, found: FoundModule) -> int:
+    if node is None:
+        return DEFAULT_TICK_NS
+    if not isinstance(node, Scalar) or not node.plain or not _TICK.match(node.text):
+        wrong_kind(node, f"tick_ms of {found.where}", "a number of milliseconds such as 5.5", found.findings)
+        return DEFAULT_TICK_NS
+    try:
+        return tick_ns(node.text)
+    except ValueError as error:
+        found.findings.add("AMX6210", f"{found.where}: {error}", node.span)
+        return DEFAULT_TICK_NS

@@ -1,0 +1,102 @@
+"""I/O points of the ``common`` section: a variable with ``slot``, ``register`` and, for a BOOLEAN, ``bit``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.types import DataType
+from automax_ros.rack.config import Point
+from automax_ros.rack.findings import Findings
+from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.names import VariableName
+from automax_ros.rack.scalars import integer_value
+from automax_ros.rack.sections import Section
+
+KEYS = ("slot", "register", "bit")
+_SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32}
+"""Bits of the types that a point may have (J2-3045 p. 7-1)."""
+
+
+class PointReader:
+    """Reads the places of I/O points. A word may have a name and its bits too, otherwise a bit has one name."""
+
+    def __init__(self, modules: Iterable[ModuleConfig], findings: Findings) -> None:
+        """Take the modules of the rack that are right."""
+        self._modules = {module.slot: module for module in modules}
+        self._findings = findings
+        self._named: dict[tuple[int, int, int], tuple[str, Span]] = {}
+
+    def read(self, section: Section, declared: VariableName, span: Span) -> Point | None:
+        """Return where a variable stands on a module, None where it is in common memory or its place is wrong."""
+        given = [key for key in KEYS if key in section]
+        if not given:
+            return None
+        what = f"I/O point {declared.name}"
+        wanted = KEYS if declared.type is DataType.BOOLEAN else KEYS[:2]
+        if not section.require(wanted, what, span, self._findings) or not self._is_possible(section, declared):
+            return None
+        slot = self._number(section, "slot", what, 0, 15)
+        module = self._module(slot, section, what) if slot is not None else None
+        if slot is None or module is None:
+            return None
+        last = module.registers.count - (2 if declared.type is DataType.DOUBLE else 1)
+        register = self._number(section, "register", what, 0, last)
+        bit = self._number(section, "bit", what, 0, 15) if "bit" in section else None
+        if register is None or (bit is None and "bit" in section):
+            return None
+        point = Point(slot, register, bit)
+        return point if self._is_free(point, declared, span) else None
+
+    def _is_possible(self, section: Section, declared: VariableName) -> bool:
+        """Report what no point can be: an array, a REAL or a string, non-volatile, a word with a bit."""
+        message = ""
+        place = section.key_span(next(key for key in KEYS if key in section))
+        if declared.dimensions or declared.type not in _SIZES:
+            kind = "an array" if declared.dimensions else declared.type.word
+            message = f"{declared.name} cannot be an I/O point: it is {kind}"
+        elif declared.type is not DataType.BOOLEAN and "bit" in section:
+            message, place = f"{declared.name} has a bit but is not BOOLEAN", section.key_span("bit")
+        elif "non_volatile" in section:
+            message = f"{declared.name} cannot be non-volatile: its module holds it"
+            place = section.key_span("non_volatile")
+        if message:
+            hint = "an I/O point is a simple BOOLEAN (with slot, register, bit), INTEGER or DOUBLE INTEGER"
+            self._findings.add("AMX6422", message, place, hint)
+        return not message
+
+    def _number(self, section: Section, key: str, what: str, low: int, high: int) -> int | None:
+        node = section.get(key)
+        if node is None:
+            return None
+        return integer_value(node, f"{key} of {what}", self._findings, low=low, high=high, code="AMX6421")
+
+    def _module(self, slot: int, section: Section, what: str) -> ModuleConfig | None:
+        module = self._modules.get(slot)
+        if module is not None and module.registers.count:
+            return module
+        held = (
+            f"the {module.model} there has no registers for I/O points" if module else "no module is configured there"
+        )
+        node = section.get("slot")
+        assert node is not None
+        self._findings.add("AMX6420", f"{what} is in slot {slot}, but {held}", node.span, "name the I/O module's slot")
+        return None
+
+    def _is_free(self, point: Point, declared: VariableName, span: Span) -> bool:
+        """Report a register or bit that has a name already; only a word may have bits that are named too."""
+        size = _SIZES[declared.type]
+        first = 16 * point.register + (point.bit or 0)
+        for bit in range(first, first + size):
+            for other_size in _SIZES.values():
+                other = self._named.get((point.slot, bit, other_size))
+                if other is not None and (other_size == size or 1 not in (size, other_size)):
+                    notes = (Note(f"{other[0]} is defined here", other[1]),)
+                    place = f"slot {point.slot} register {point.register}"
+                    self._findings.add(
+                        "AMX6423", f"{declared.name} is at {place}, which {other[0]} names already", span, notes=notes
+                    )
+                    return False
+        for bit in range(first, first + size):
+            self._named[point.slot, bit, size] = (declared.name, span)
+        return True

@@ -1,0 +1,21 @@
+"""A task as a rack file names it, and how many there may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+MIN_PRIORITY, MAX_PRIORITY = 4, 11
+"""Priorities of tasks: 4 is served first (J2-3106-1 p. 8-2)."""
+MAX_TASKS = 32
+"""Tasks of one Processor (J2-3106-1 p. 2-5)."""
+
+
+@dataclass(frozen=True)
+class TaskConfig:
+    """A task of a Processor: ``file`` is its source, ``priority`` is 4 (first) to 11."""
+
+    name: str
+    file: Path
+    priority: int
+    line: int = 0
