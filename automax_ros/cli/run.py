@@ -124,7 +124,7 @@ def _tunable_hint(config: RackConfig, text: str) -> str | None:
     for task, _, result in check_tasks(config):
         symbol = result.program.symbols.get(name.removeprefix(f"{task.name}.")) if result.program is not None else None
         if symbol is not None and symbol.tuning is not None:
-            slot = next(item.slot for item in config.processors if task in item.tasks)
+            slot = next(item.slot for item in config.task_modules if task in item.tasks)
             command = (
                 f"ros2 param set /{config.namespace}/processor_{slot} {task.name}.{bare_name(symbol.name)} {value}"
             )
