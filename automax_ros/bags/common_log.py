@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
@@ -38,7 +38,7 @@ class CommonLog:
         self._log = WriteLog(facts.table.run_id)
         self._first_write = facts.first_write
         self._kinds = {
-            item.id: (kind, kind.range, math.prod(item.dimensions), name)
+            item.id: (_TYPED.get(kind), *kind.range, math.prod(item.dimensions), name)
             for name, item in self.variables.items()
             for kind in (DataType.numbered(item.type),)
         }
@@ -85,17 +85,13 @@ class CommonLog:
         kinds = self._kinds
         try:
             for number, element, value in zip(values.variable, values.element, values.value, strict=True):
-                kind, (least, greatest), elements, name = kinds[number]
+                typed, least, greatest, elements, name = kinds[number]
                 if element >= elements:
                     raise ValueError(f"{name} has no element {element}")
-                if kind is _STRING:
+                if typed is None:
                     found.append((number, element, next(texts)))
-                elif not least <= value <= greatest:
-                    found.append((number, element, self._odd(name, value)))
-                elif kind is _REAL:
-                    found.append((number, element, value))
-                elif value == int(value):
-                    found.append((number, element, bool(value) if kind is _BOOLEAN else int(value)))
+                elif least <= value <= greatest and (own := typed(value)) == value:
+                    found.append((number, element, own))
                 else:
                     found.append((number, element, self._odd(name, value)))
         except KeyError as error:
@@ -123,7 +119,13 @@ class CommonLog:
         return BagError("AMX6813", self._bag, f"wrong values at {seconds_text(max(0, stamp))} s: {reason}")
 
 
-_STRING, _REAL, _BOOLEAN = DataType.STRING, DataType.REAL, DataType.BOOLEAN
+_TYPED: dict[DataType, Callable[[float], Value]] = {
+    DataType.INTEGER: int,
+    DataType.DOUBLE: int,
+    DataType.REAL: float,
+    DataType.BOOLEAN: bool,
+}
+"""What makes a number in a message one of the variable's type; strings have none."""
 
 
 class WatchedValues:

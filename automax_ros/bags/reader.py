@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cached_property
@@ -66,6 +67,12 @@ class BagReader:
             self.files = [path]
         else:
             raise no_recording(path)
+
+    def again(self) -> BagReader:
+        """Return a reader of the same recording that tells nobody of its progress."""
+        other = copy.copy(self)
+        other.on_progress = other.last_stamp = None
+        return other
 
     @cached_property
     def custom_data(self) -> dict[str, str]:

@@ -33,7 +33,7 @@ def run_facts(bag: BagReader) -> RunFacts:
     Raises:
         BagError: there is no table of variables, or the recording cannot be read so far.
     """
-    reader = BagReader(bag.path)
+    reader = bag.again()
     found: RunFacts | None = None
     writes: dict[int, int] = {}
     for entry in reader.messages(types=frozenset({_TABLE} if reader.is_ours else {_TABLE, _WRITE})):
@@ -62,7 +62,7 @@ def sent_files(bag: BagReader) -> list[RackFile]:
         if error.code == _NO_TABLE:
             return []
         raise
-    for entry in BagReader(bag.path).messages(topics={f"{space}/config"}, types=frozenset({_STRING})):
+    for entry in bag.again().messages(topics={f"{space}/config"}, types=frozenset({_STRING})):
         assert isinstance(entry.message, String)
         try:
             return files_from_text(entry.message.data)

@@ -45,7 +45,8 @@ class ScanTable:
         self._window = window
         self._task = task.upper()
         self._progress = progress
-        self._log = CommonLog(bag, run_facts(BagReader(bag)))
+        self._reader = BagReader(bag)
+        self._log = CommonLog(bag, run_facts(self._reader))
         self._variables = {item.id: item for item in self._log.variables.values()}
         self._columns: list[Column] = list(_OWN)
         self._latched: dict[tuple[int, int], int] = {}
@@ -84,7 +85,7 @@ class ScanTable:
 
     def _scans(self, *, first_half: bool) -> Iterator[tuple[int, Scan]]:
         """The task's scans up to the end of the window."""
-        reader = BagReader(self._bag)
+        reader = self._reader
         if self._progress is not None:
             progress = self._progress
             reader.on_progress = lambda share: progress(share / 2 if first_half else (1 + share) / 2)

@@ -79,7 +79,7 @@ class Replay:
             SourceRefused: a source has errors.
         """
         self.options = options
-        reader = BagReader(bag)
+        self._reader = reader = BagReader(bag)
         self.rack: StoredRack = stored_rack(reader)
         self.facts = run_facts(reader)
         self.rack.check_table(self.facts.table)
@@ -105,7 +105,7 @@ class Replay:
         Raises:
             BagError: the recording cannot be read to its end, or does not hold what the replay needs.
         """
-        reader = BagReader(self._bag)
+        reader = self._reader.again()
         options = self.options if to_ns is None else replace(self.options, to_ns=to_ns)
         starts: Mapping[str, int] = {}
         if options.from_ns:

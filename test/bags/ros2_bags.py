@@ -18,7 +18,7 @@ from automax_ros.wire.definitions import schema_text
 from automax_ros.wire.messages import String
 from automax_ros.wire.qos import LATCHED, SCAN
 from automax_ros.wire.rack_files import files_of, files_text
-from automax_ros.wire.stream import RackStream, Topic
+from automax_ros.wire.stream import RackStream, Take, Topic
 
 EPOCH = 1_700_000_000 * NS_PER_S
 """The wall clock when the run begins."""
@@ -43,9 +43,14 @@ class Listener:
 
     sent: list[Sent] = field(default_factory=list)
 
-    def take(self, topic: Topic, stamp: int, payload: bytes) -> None:
-        before = self.sent[-1].sent if self.sent else 0
-        self.sent.append(Sent(topic.name, topic.type_name, max(before + 1000, stamp + 200_000), payload))
+    def take(self, topic: Topic) -> Take:
+        """Return what takes the messages of a topic."""
+
+        def take(stamp: int, payload: bytes) -> None:
+            before = self.sent[-1].sent if self.sent else 0
+            self.sent.append(Sent(topic.name, topic.type_name, max(before + 1000, stamp + 200_000), payload))
+
+        return take
 
 
 def recorded_twice(
