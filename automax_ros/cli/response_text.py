@@ -102,7 +102,7 @@ def _bode(response: BlockResponse) -> str:
     above = ""
     for place, title in zip(places, ("measured", "discrete", "Laplace"), strict=True):
         above = above.ljust(place - 3) + title
-    return f"Bode diagram, sines of so many counts\n{above}\n{head}\n{body}{_legend(response)}"
+    return f"Bode diagram; counts: the amplitude of the sine\n{above}\n{head}\n{body}{_legend(response)}"
 
 
 def _doubt(point: Point) -> str:

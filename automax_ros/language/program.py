@@ -118,7 +118,7 @@ class BoundCall:
 class Program:
     """A task without errors.
 
-    ``startup`` are the statements before SCAN_LOOP, which run once when the task goes into RUN; ``scan`` those behind
+    ``startup`` are the statements before SCAN_LOOP, which run once when the task goes into RUN; ``scan`` those after
     it up to END; neither holds declarations or SCAN_LOOP. ``calls`` maps a Call node (by identity of its span) to what
     the checker bound it to, SCAN_LOOP included; ``data`` is the pool of DATA values, ``data_lines`` the line number of
     each DATA line and the index in the pool at which it begins. ``events`` are declared by EVENT; ``event`` is the one

@@ -57,7 +57,7 @@ def is_constant(expression: Expression) -> bool:
 
 
 def literal_of(expression: Expression) -> IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral | None:
-    """Return the constant with its sign drawn in (``-5`` becomes one literal), None where it is no constant.
+    """Return the constant with its sign drawn in (``-5`` becomes one literal), None where it is not a constant.
 
     A literal of a REAL parameter is rounded to what a REAL variable holds (decision).
     """

@@ -31,25 +31,25 @@ def check_declarations(context: Context, layout: TaskLayout) -> None:
     """Fill the context's symbols and events and report what is wrong with their declarations."""
     top = {id(statement) for statement in (*layout.startup, *layout.scan)}
     events: list[tuple[Event, int | None]] = []
-    for statement, line, behind in layout.numbered():
+    for statement, line, after in layout.numbered():
         context.line = line
         if isinstance(statement, Declaration):
-            _check_place(context, statement, behind, id(statement) in top)
+            _check_place(context, statement, after, id(statement) in top)
             for declared in statement.variables:
                 _declare(context, statement.scope, declared)
         elif isinstance(statement, Event):
             events.append((statement, line))
-            _declare_event(context, statement, behind)
+            _declare_event(context, statement, after)
     _check_total(context)
     for event, line in events:
         context.line = line
         _check_event(context, event)
 
 
-def _check_place(context: Context, statement: Declaration, behind: bool, top: bool) -> None:
-    if behind:
+def _check_place(context: Context, statement: Declaration, after: bool, top: bool) -> None:
+    if after:
         hint = "all variables are declared before the SCAN_LOOP block"
-        context.report("AMX4003", f"{statement.scope.value} stands behind SCAN_LOOP", statement.span, hint)
+        context.report("AMX4003", f"{statement.scope.value} stands after SCAN_LOOP", statement.span, hint)
     elif not top:
         hint = "a declaration holds for the whole task and cannot depend on a condition"
         context.report("AMX4004", f"{statement.scope.value} stands inside an IF or FOR block", statement.span, hint)
@@ -103,7 +103,7 @@ def _length(context: Context, declared: Declared) -> int:
     """Return a string's maximum length, 0 for other types."""
     if declared.type is not DataType.STRING:
         if declared.length is not None:
-            context.report("AMX4008", f"{declared.name} is no string and has no length", declared.span)
+            context.report("AMX4008", f"{declared.name} is not a string and has no length", declared.span)
         return 0
     length = DEFAULT_STRING_LENGTH if declared.length is None else declared.length
     if not 1 <= length <= MAX_STRING_LENGTH:
@@ -171,9 +171,9 @@ def _shape(dimensions: tuple[int, ...]) -> str:
     return f"an array ({','.join(str(size - 1) for size in dimensions)})" if dimensions else "a simple variable"
 
 
-def _declare_event(context: Context, event: Event, behind: bool) -> None:
-    if behind:
-        context.report("AMX4064", f"the event {event.name} is declared behind SCAN_LOOP", event.span)
+def _declare_event(context: Context, event: Event, after: bool) -> None:
+    if after:
+        context.report("AMX4064", f"the event {event.name} is declared after SCAN_LOOP", event.span)
     earlier = context.events.get(event.name) or context.symbols.get(event.name)
     if earlier is not None:
         note = Note(f"{event.name} is first declared here", earlier.span)

@@ -97,7 +97,7 @@ def check_variable(context: Context, target: Variable | Element) -> DataType | N
 
 
 def check_integer(context: Context, expression: Expression, code: str, what: str) -> None:
-    """Report an expression that is no integer; ``what`` begins the message."""
+    """Report an expression that is not an integer; ``what`` begins the message."""
     kind = check_expression(context, expression)
     if kind is not None and not kind.is_integer:
         hint = "INT(x) gives the integer part of a REAL" if kind is DataType.REAL else None

@@ -135,7 +135,7 @@ def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:
 
 
 def _near_line(line: int, places: dict[int, Place]) -> str | None:
-    """Return a hint to the next line that exists, None where there is none behind."""
+    """Return a hint to the next line that exists, None where none follows."""
     following = min((number for number in places if number > line), default=None)
     return None if following is None else f"the next line is {following}"
 
@@ -153,7 +153,7 @@ def _check_returns(context: Context, layout: TaskLayout) -> None:
 
 
 def _check_restores(context: Context, layout: TaskLayout, places: dict[int, Place]) -> None:
-    """RESTORE takes a line that exists and has DATA in it or behind it."""
+    """RESTORE takes a line that exists and has DATA in it or after it."""
     data = [line or 0 for line, _ in context.data]
     for statement, line, _ in layout.numbered():
         if not isinstance(statement, Restore) or "DATA" in context.broken.words:
@@ -166,7 +166,7 @@ def _check_restores(context: Context, layout: TaskLayout, places: dict[int, Plac
                 hint = _near_line(statement.line, places)
                 context.report("AMX4047", f"there is no line {statement.line} to RESTORE to", statement.span, hint)
         elif statement.line is not None and statement.line > max(data):
-            message = f"there is no DATA in line {statement.line} or behind it"
+            message = f"there is no DATA in line {statement.line} or after it"
             context.report("AMX4052", message, statement.span, f"the last DATA is in line {max(data)}")
 
 
@@ -192,13 +192,13 @@ def _check_reached(
 
 
 def _up_to_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
-    """Return the statements before END; what stands behind it is an error of its own."""
+    """Return the statements before END; what stands after it is an error of its own."""
     at = next((index for index, item in enumerate(statements) if isinstance(item, End)), len(statements))
     return statements[:at]
 
 
 def _leaves(statement: Statement, targets: frozenset[int]) -> bool:
-    """Return whether the statement behind can only be reached by a jump."""
+    """Return whether the statement that follows can only be reached by a jump."""
     if isinstance(statement, If):
         return all(_body_leaves(body, targets) for body in (statement.then, statement.otherwise))
     return isinstance(statement, (Goto, Stop, Return, End))

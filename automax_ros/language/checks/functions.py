@@ -46,7 +46,7 @@ def _check_range(context: Context, call: FunctionCall, argument: Expression) -> 
         return
     value = constant_value(argument)
     if isinstance(value, (int, float)) and not low <= value <= high:
-        context.report("AMX2019", f"{value} is no argument of {call.name}: it takes {text}", argument.span)
+        context.report("AMX2019", f"{value} is not an argument of {call.name}: it takes {text}", argument.span)
 
 
 def _count(function: Function) -> str:

@@ -18,8 +18,8 @@ def check_sharing(context: Context, layout: TaskLayout) -> None:
     """
     by_blocks: dict[str, Use] = {}
     by_basic: dict[str, Use] = {}
-    for statement, line, behind in layout.numbered():
-        if not behind:
+    for statement, line, after in layout.numbered():
+        if not after:
             continue
         if isinstance(statement, Call):
             expressions = tuple(argument.value for argument in arguments_of(statement))

@@ -119,7 +119,7 @@ def _check_assignment(context: Context, statement: Assignment) -> None:
     if not assignable(target, value):
         hint = None
         if target.is_numeric and value is DataType.BOOLEAN:
-            hint = "a boolean counts as 0 or 1 beside an operator: multiply it by 1"
+            hint = "a boolean counts as 0 or 1 next to an operator: multiply it by 1"
         elif target is DataType.BOOLEAN and value.is_numeric:
             hint = "compare the number: A% <> 0"
         elif target is DataType.STRING:

@@ -21,7 +21,7 @@ class TaskLayout:
     scan_loop_line: int | None = None
 
     def numbered(self) -> Iterator[tuple[Statement, int | None, bool]]:
-        """Yield every statement but SCAN_LOOP with the line number in force, and whether it stands behind SCAN_LOOP."""
+        """Yield every statement but SCAN_LOOP with the line number in force, and whether it stands after SCAN_LOOP."""
         for statement, line in statements_in_order(self.startup):
             yield statement, line, False
         for statement, line in statements_in_order(self.scan, self.scan_loop_line):
@@ -63,7 +63,7 @@ def _check_scan_loops(context: Context, module: Module, loops: list[tuple[Call, 
                 "AMX4040",
                 "the task has no SCAN_LOOP block",
                 _end_of_text(module),
-                "every Control Block task needs CALL SCAN_LOOP(TICKS=n) behind its declarations",
+                "every Control Block task needs CALL SCAN_LOOP(TICKS=n) after its declarations",
             )
         return
     first, _ = loops[0]
@@ -85,7 +85,7 @@ def _check_blocks_before(context: Context, layout: TaskLayout) -> None:
             context.line = line
             note = Note("SCAN_LOOP is here", layout.scan_loop.span)
             message = f"{statement.block} is called before SCAN_LOOP, which must be the first block"
-            context.report("AMX4042", message, statement.span, "move the block behind SCAN_LOOP", (note,))
+            context.report("AMX4042", message, statement.span, "move the block after SCAN_LOOP", (note,))
 
 
 def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:

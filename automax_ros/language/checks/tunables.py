@@ -56,7 +56,7 @@ def _text(value: Value) -> str:
 
 
 def _value(context: Context, declared: Declared, key: str, expression: Expression | None) -> int | float | None:
-    """Return the number behind a key of the bracket in the tunable's type, None where it is absent or at fault."""
+    """Return the number after a key of the bracket in the tunable's type, None where it is absent or at fault."""
     if expression is None:
         return None
     kind = declared.type

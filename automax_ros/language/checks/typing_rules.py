@@ -1,7 +1,7 @@
 """Types of expressions: purely syntactic, from type characters, constants and the function table (J-3675 chapter 5).
 
 Integers of both widths are worked in 32 bits, so every integer operation gives DOUBLE; REAL wins over integers; a
-boolean counts as 0 or 1 beside an arithmetic operator or beside an integer, and two booleans give a boolean only with
+boolean counts as 0 or 1 next to an arithmetic operator or next to an integer, and two booleans give a boolean only with
 AND, OR, XOR and NOT. Nothing turns into a string or a boolean by itself.
 """
 

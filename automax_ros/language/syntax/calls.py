@@ -18,7 +18,7 @@ def call(cursor: Cursor, start: Token) -> Call:
         hint = f"CALL {block.text[:20]}(INPUT = ..., OUTPUT = ...)"
         if cursor.current.kind is Kind.WORD:
             hint = f"names of blocks have no blanks: CALL {block.text[:20]}_{cursor.current.text[:20]}("
-        cursor.fail("AMX0070", f"`(` is missing behind {block.text[:20]}", hint)
+        cursor.fail("AMX0070", f"`(` is missing after {block.text[:20]}", hint)
     opening = cursor.advance()
     arguments: list[Argument] = []
     if not cursor.accept(")"):
@@ -42,8 +42,8 @@ def _argument(cursor: Cursor) -> Argument:
     if not cursor.at("="):
         if cursor.at(",", ")"):
             hint = f"write KEYWORD = {key.text[:20]}"
-            cursor.fail("AMX0070", f"`=` and a value are missing behind {key.text[:20]}", hint)
-        cursor.fail("AMX0035", f"`=` is missing behind {key.text[:20]}")
+            cursor.fail("AMX0070", f"`=` and a value are missing after {key.text[:20]}", hint)
+        cursor.fail("AMX0035", f"`=` is missing after {key.text[:20]}")
     cursor.advance()
     value = expression(cursor)
     return Argument(key.text, value, span=key.span.to(value.span))

@@ -45,7 +45,7 @@ class StatementReader:
         return self._frames.add(self._simple(cursor))
 
     def recover(self, cursor: Cursor, start: int) -> None:
-        """Step behind a statement that could not be read, and open or close the block that it meant."""
+        """Step after a statement that could not be read, and open or close the block that it meant."""
         first = cursor.tokens[start]
         failed, cursor.position = cursor.position, start
         word = first.text if first.kind is Kind.WORD else ""
@@ -135,7 +135,7 @@ class StatementReader:
         return If(condition, then, otherwise, True, span=_span(cursor, start))
 
     def _branch(self, cursor: Cursor, depth: int) -> tuple[Statement, ...]:
-        """Read what stands behind THEN or ELSE on one line: a line number, or statements up to ELSE or the end."""
+        """Read what stands after THEN or ELSE on one line: a line number, or statements up to ELSE or the end."""
         statements: list[Statement] = []
         while True:
             statements.append(self._branch_statement(cursor, depth))
@@ -155,7 +155,7 @@ class StatementReader:
         token = cursor.current
         start = cursor.position
         if cursor.at_end():
-            cursor.fail("AMX0036", f"a statement is missing behind {cursor.previous.text}")
+            cursor.fail("AMX0036", f"a statement is missing after {cursor.previous.text}")
         if token.kind is Kind.INTEGER and token.text.isdigit() and isinstance(token.value, int):
             cursor.advance()
             return Goto(token.value, span=token.span)
@@ -164,15 +164,15 @@ class StatementReader:
         if token.text == "IF":
             condition = self._condition(cursor)
             if cursor.at_end():
-                cursor.fail("AMX0060", "a block IF cannot stand behind THEN", "give it a line of its own")
+                cursor.fail("AMX0060", "a block IF cannot stand after THEN", "give it a line of its own")
             return self._one_line(cursor, start, condition, depth + 1)
         return self._simple(cursor)
 
     def _refuse_behind_then(self, cursor: Cursor) -> None:
         word = cursor.current.text
         if word in _BLOCK_WORDS and cursor.following.text != "=":
-            hint = "put nothing behind THEN and the statements on lines of their own, closed by END_IF"
-            cursor.fail("AMX0060", f"{word} cannot stand behind THEN on one line", hint)
+            hint = "put nothing after THEN and the statements on lines of their own, closed by END_IF"
+            cursor.fail("AMX0060", f"{word} cannot stand after THEN on one line", hint)
         refuse_word(cursor, self._basic_task)
 
     def _for(self, cursor: Cursor) -> None:
@@ -182,7 +182,7 @@ class StatementReader:
         control = variable(cursor, "FOR")
         if cursor.at("(", "["):
             cursor.fail("AMX0077", "FOR needs a simple variable, not an array element")
-        cursor.expect("=", "AMX0035", f"`=` is missing behind FOR {control.name[:20]}", form)
+        cursor.expect("=", "AMX0035", f"`=` is missing after FOR {control.name[:20]}", form)
         first = expression(cursor)
         hint = (did_you_mean(cursor.current.text, ("TO",)) or form) if cursor.current.kind is Kind.WORD else form
         cursor.expect("TO", "AMX0061", f"TO is missing before {cursor.found()}", hint)
@@ -233,7 +233,7 @@ def _assigns(cursor: Cursor) -> bool:
 
 
 def _assigned_behind_parenthesis(cursor: Cursor) -> bool:
-    """Return whether `=` stands behind the closing parenthesis: else NAME(WORD = ... is a block without its CALL."""
+    """Return whether `=` stands after the closing parenthesis: else NAME(WORD = ... is a block without its CALL."""
     depth = 0
     for index in range(cursor.position + 1, len(cursor.tokens) - 1):
         token = cursor.tokens[index]

@@ -27,7 +27,7 @@ class Cursor:
 
     @property
     def following(self) -> Token:
-        """The token behind the current one."""
+        """The token after the current one."""
         return self.tokens[min(self.position + 1, len(self.tokens) - 1)]
 
     @property
@@ -73,7 +73,7 @@ class Cursor:
         raise SyntaxFaultError(Fault(code, message, hint), self.here(), notes)
 
     def here(self) -> Span:
-        """The span of the current token; at the end of a line the place behind the last character."""
+        """The span of the current token; at the end of a line the place after the last character."""
         return self.current.span
 
     def found(self) -> str:

@@ -17,7 +17,7 @@ EVENT_KEYS = ("INTERRUPT_STATUS", "TIMEOUT")
 
 
 def declaration(cursor: Cursor, start: Token) -> Declaration:
-    """Read the list behind LOCAL, COMMON or GLOBAL."""
+    """Read the list after LOCAL, COMMON or GLOBAL."""
     scope = Scope.LOCAL if start.text == "LOCAL" else Scope.COMMON
     variables = [_declared(cursor, start.text)]
     while cursor.accept(","):
@@ -51,8 +51,8 @@ def _declared(cursor: Cursor, word: str) -> Declared:
 
 
 def _begins_tuning(cursor: Cursor) -> bool:
-    behind = cursor.tokens[min(cursor.position + 2, len(cursor.tokens) - 1)]
-    return cursor.following.kind is Kind.WORD and behind.text == "="
+    after = cursor.tokens[min(cursor.position + 2, len(cursor.tokens) - 1)]
+    return cursor.following.kind is Kind.WORD and after.text == "="
 
 
 def _count(cursor: Cursor, what: str) -> int:
@@ -85,7 +85,7 @@ def _tuning(cursor: Cursor) -> Tuning:
         if key.text in given:
             cursor.fail("AMX0074", f"{key.text} is given twice")
         cursor.advance()
-        cursor.expect("=", "AMX0035", f"`=` is missing behind {key.text}")
+        cursor.expect("=", "AMX0035", f"`=` is missing after {key.text}")
         given[key.text] = constant(cursor, key.text)
         if not cursor.accept(","):
             break
@@ -105,7 +105,7 @@ def event(cursor: Cursor, start: Token) -> Event:
     del start
     form = "EVENT NAME = event, INTERRUPT_STATUS = variable, TIMEOUT = count"
     cursor.expect("NAME", "AMX0076", "EVENT needs NAME = and the name of the event", form)
-    cursor.expect("=", "AMX0035", "`=` is missing behind NAME", form)
+    cursor.expect("=", "AMX0035", "`=` is missing after NAME", form)
     token = cursor.current
     if token.kind is not Kind.WORD or token.text in RESERVED_WORDS:
         hint = "the name of an event has no type character" if token.kind is Kind.NAME else None
@@ -121,7 +121,7 @@ def event(cursor: Cursor, start: Token) -> Event:
         if (status if key.text == "INTERRUPT_STATUS" else timeout) is not None:
             cursor.fail("AMX0076", f"{key.text} is given twice")
         cursor.advance()
-        cursor.expect("=", "AMX0035", f"`=` is missing behind {key.text}")
+        cursor.expect("=", "AMX0035", f"`=` is missing after {key.text}")
         if key.text == "TIMEOUT":
             if cursor.current.kind is not Kind.INTEGER:
                 cursor.fail("AMX0076", f"TIMEOUT needs an integer constant, not {cursor.found()}")

@@ -110,7 +110,7 @@ def _operation(cursor: Cursor, level: int, depth: int) -> _Measured:
 def _negation(cursor: Cursor, level: int, depth: int) -> _Measured:
     if level > NOT_LEVEL:
         hint = "put parentheses around NOT and its operand"
-        cursor.fail("AMX0041", f"NOT cannot stand right behind `{cursor.previous.text}`", hint)
+        cursor.fail("AMX0041", f"NOT cannot stand directly after `{cursor.previous.text}`", hint)
     start = cursor.advance()
     if cursor.at("NOT"):
         cursor.fail("AMX0041", "two operators in a row", "NOT NOT cancels out: remove both")

@@ -123,7 +123,7 @@ class FrameStack:
         _turn_to_else(frame)
 
     def end_if(self, cursor: Cursor, span: Span) -> None:
-        """END_IF: its line number becomes a label behind the block."""
+        """END_IF: its line number becomes a label after the block."""
         self._close_inner("IF")
         if self._top.word != "IF":
             cursor.position -= 1
@@ -212,7 +212,7 @@ class FrameStack:
     def _one_line_hint(self) -> str | None:
         last = self._top.statements[-1] if self._top.statements else None
         if isinstance(last, If) and last.one_line:
-            return "an IF with a statement behind THEN ends on its line; for a block put nothing behind THEN"
+            return "an IF with a statement after THEN ends on its line; for a block put nothing after THEN"
         return None
 
 

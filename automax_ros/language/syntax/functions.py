@@ -102,7 +102,7 @@ _TABLE = (
     ),
     Function("STR$", (_N,), Result.STRING, "A number in decimal digits, as PRINT shows it."),
     Function(
-        "VAL", (_S,), Result.REAL, "The number that a string holds; a string that is no number is logged, gives 0."
+        "VAL", (_S,), Result.REAL, "The number that a string holds; a string that is not a number is logged, gives 0."
     ),
     Function("LEFT$", (_S, _I), Result.STRING, "The first n characters; all of them if the string is shorter."),
     Function(

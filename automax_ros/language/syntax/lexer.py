@@ -46,7 +46,7 @@ _FOREIGN = {
 _PLAIN = {"mark": Kind.MARK, "separator": Kind.SEPARATOR}
 TYPE_CHARACTERS = "%!@$"
 BROKEN_END = "&!"
-"""Text of an ERROR token behind which the statement goes on in the next line all the same."""
+"""Text of an ERROR token after which the statement goes on in the next line all the same."""
 
 
 class LineLexer:
@@ -83,7 +83,7 @@ class LineLexer:
         return result
 
     def remark(self, text: str, line: int, start: int, mark: str) -> Token:
-        """Return the remark that goes from index ``start`` to the end of the line; its text begins behind ``mark``."""
+        """Return the remark that goes from index ``start`` to the end of the line; its text begins after ``mark``."""
         body = text[start + len(mark) :].strip(BLANKS)
         end = len(text.rstrip(BLANKS))
         return Token(Kind.REMARK, mark.upper(), line, start + 1, max(end, start + 1) + 1, value=body)
@@ -187,7 +187,7 @@ def _ampersand(text: str, here: Span) -> Token:
     hint = "a remark may stand on the statement's first or last line" if remark else "`and` is written AND"
     if rest[0] in "Hh":
         hint = "a hexadecimal constant is written 0FFH"
-    # A remark behind the `&` shows that a continuation was meant: the statement goes on, with this one fault.
+    # A remark after the `&` shows that a continuation was meant: the statement goes on, with this one fault.
     end = len(text) + 1 if remark else here.end_column
     span = Span(here.line, here.column, end)
     return _error(BROKEN_END if remark else "&", span, "AMX0015", "`&` is not the last character of its line", hint)
@@ -207,9 +207,9 @@ def _unknown_character(char: str, span: Span) -> Token:
 
 
 _CHARACTER_HINTS = {
-    "%": "`%` is the type character of an INTEGER and stands right behind a name",
-    "@": "`@` is the type character of a BOOLEAN and stands right behind a name",
-    "$": "`$` is the type character of a STRING and stands right behind a name",
+    "%": "`%` is the type character of an INTEGER and stands directly after a name",
+    "@": "`@` is the type character of a BOOLEAN and stands directly after a name",
+    "$": "`$` is the type character of a STRING and stands directly after a name",
     "?": "write PRINT",
     "|": "write OR",
     "~": "write NOT",

@@ -91,7 +91,7 @@ class LineReader:
             self._reporter.report(Fault("AMX0012", f"line number {number} is used twice"), span, (note,))
         elif number < self._previous:
             hint = f"line numbers ascend: use one above {self._previous}"
-            fault = Fault("AMX0013", f"line number {number} stands behind line {self._previous}", hint)
+            fault = Fault("AMX0013", f"line number {number} stands after line {self._previous}", hint)
             self._reporter.report(fault, span)
         self._seen.setdefault(number, span)
         self._previous = number
@@ -108,7 +108,7 @@ class LineReader:
         self._reporter.report(fault, first.span)
 
     def _assemble(self, line: LogicalLine, start: int) -> None:
-        """Fill in the tokens of a logical line, ended by an END token, and step to the line behind it."""
+        """Fill in the tokens of a logical line, ended by an END token, and step to the line after it."""
         tokens = line.tokens
         nesting = _Nesting()
         remark: list[str] = []
@@ -161,7 +161,7 @@ class LineReader:
         if following is None:
             fault = Fault("AMX0017", "nothing follows the `&`", "remove it, or write the rest of the statement")
         elif _NUMBERED_STATEMENT.match(self._lines[following]):
-            fault = Fault("AMX0017", "the line behind this `&` has a line number", "remove the `&` or the line number")
+            fault = Fault("AMX0017", "the line after this `&` has a line number", "remove the `&` or the line number")
         else:
             self._index = following
             return True

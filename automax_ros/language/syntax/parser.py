@@ -1,4 +1,4 @@
-"""Text to syntax tree: the driver, which reads statement by statement and goes on behind a wrong one."""
+"""Text to syntax tree: the driver, which reads statement by statement and goes on after a wrong one."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class _TaskParser:
         cursor = Cursor(line.tokens, self._reporter, self._long_names)
         if cursor.at_line_end():
             if not line.faulty:
-                hint = "remove the line, or put a REM behind its number"
+                hint = "remove the line, or put a REM after its number"
                 self._reporter.report(Fault("AMX0014", "the line has no statement", hint), line.number_span)
             self._frames.add(Label(span=line.number_span))
             return
@@ -61,7 +61,7 @@ class _TaskParser:
         self._frames.end_line(line.number_span)
 
     def _statement(self, cursor: Cursor, line: LogicalLine) -> None:
-        """Read one statement and the separator behind it; report at most one syntax error."""
+        """Read one statement and the separator after it; report at most one syntax error."""
         start = cursor.position
         if self._too_long(cursor, line):
             cursor.skip_statement()
@@ -77,10 +77,10 @@ class _TaskParser:
             self._report(line, error)
             self._statements.recover(cursor, start)
         if cursor.at_separator():
-            behind = cursor.advance().span
+            after = cursor.advance().span
             if cursor.at_line_end():
-                fault = Fault("AMX0036", "a statement is missing behind `\\`", "remove the `\\`")
-                self._report(line, SyntaxFaultError(fault, behind))
+                fault = Fault("AMX0036", "a statement is missing after `\\`", "remove the `\\`")
+                self._report(line, SyntaxFaultError(fault, after))
 
     def _report(self, line: LogicalLine, error: SyntaxFaultError) -> None:
         if not line.faulty:

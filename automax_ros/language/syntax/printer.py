@@ -22,7 +22,7 @@ def print_module(module: Module) -> str:
     """Return the text of a task.
 
     A tree in which no statement has a number is numbered first. Raises ValueError for a tree that no text gives, such
-    as a statement without a number behind a remark.
+    as a statement without a number after a remark.
     """
     if not _numbers(module.statements):
         module = numbered(module)
@@ -104,7 +104,7 @@ class _Writer:
         return "".join(f"{line}\n" for line in self._lines)
 
     def statements(self, statements: tuple[Statement, ...]) -> None:
-        """Write statements; the label behind a block IF is the number of its END_IF."""
+        """Write statements; the label after a block IF is the number of its END_IF."""
         index = 0
         while index < len(statements):
             statement = statements[index]
@@ -135,9 +135,9 @@ class _Writer:
         if not self._lines:
             raise ValueError("the first statement has no line number")
         if isinstance(self._last, (Remark, Label)):
-            raise ValueError("a statement behind a remark or a bare number needs a line number")
+            raise ValueError("a statement after a remark or a bare number needs a line number")
         if isinstance(self._last, If) and self._last.one_line and not isinstance(statement, Remark):
-            raise ValueError("a statement behind a one-line IF needs a line number")
+            raise ValueError("a statement after a one-line IF needs a line number")
 
     def _call(self, statement: Call) -> None:
         text = print_simple(statement)
@@ -175,7 +175,7 @@ class _Writer:
 
     def _one_line(self, statement: If) -> str:
         if not statement.then:
-            raise ValueError("a one-line IF needs a statement behind THEN")
+            raise ValueError("a one-line IF needs a statement after THEN")
         text = f"IF {print_expression(statement.condition)} THEN {self._branch(statement.then)}"
         if not statement.otherwise:
             return text
@@ -209,7 +209,7 @@ def _takes_else(statement: Statement) -> bool:
 
 
 def _split_label(statements: tuple[Statement, ...]) -> tuple[int | None, tuple[Statement, ...]]:
-    """Return the number of the label at the end, and the rest; the label behind a block IF is that of its END_IF."""
+    """Return the number of the label at the end, and the rest; the label after a block IF is that of its END_IF."""
     if not statements or not isinstance(statements[-1], Label):
         return None, statements
     before = statements[-2] if len(statements) > 1 else None

@@ -75,7 +75,7 @@ def _on(cursor: Cursor, start: Token) -> OnJump:
         cursor.fail("AMX0032", "ON ERROR is not part of the language", "test the error log with TST_ERRLOG@")
     selector = expression(cursor)
     if not cursor.at("GOTO", "GOSUB"):
-        cursor.fail("AMX0063", f"GOTO or GOSUB is missing behind {start.text}", "ON value GOTO line, line, ...")
+        cursor.fail("AMX0063", f"GOTO or GOSUB is missing after {start.text}", "ON value GOTO line, line, ...")
     word = cursor.advance().text
     return OnJump(selector, _line_numbers(cursor, word), word == "GOSUB")
 
@@ -169,4 +169,4 @@ SIMPLE_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
     "EVENT": event,
     "CALL": call,
 }
-"""How each simple statement is read behind its first word."""
+"""How each simple statement is read after its first word."""

@@ -358,7 +358,7 @@ class Label:
     """A numbered line that does nothing but can be jumped to.
 
     The lines of ELSE, END_IF and NEXT leave one: ELSE as the last statement of ``then``, NEXT as the last of the loop's
-    body (a jump there takes the next turn), END_IF behind the If. A line with a number alone is one too.
+    body (a jump there takes the next turn), END_IF after the If. A line with a number alone is one too.
     """
 
     number: int | None = field(default=None, kw_only=True)
