@@ -14,6 +14,7 @@ from automax_ros.blocks.dynamics import Dynamics, Integrator, corners_at
 from automax_ros.blocks.examples import Example
 from automax_ros.blocks.families import Family
 from automax_ros.blocks.transfer import mapped
+from automax_ros.core.numbers import clamp16, round_count
 from automax_ros.core.types import DataType
 
 from .support import columns_of
@@ -30,8 +31,9 @@ def all_pass_transfer(period_s, values):
 
 
 def all_pass_step(signal: int, bypass: bool, gain: float, x1: int, y1: float) -> tuple[int, int, float]:
+    """Direct form I; the output alone is clamped to 16 bits."""
     y1 = signal + 0.0 if bypass else gain * (signal - y1) + x1
-    result = int(y1 + 0.5) if y1 >= 0.0 else -int(0.5 - y1)
+    result = clamp16(round_count(y1))
     x1 = signal
     return result, x1, y1
 
