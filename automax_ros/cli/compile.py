@@ -6,9 +6,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from automax_ros.cli.lone_task import compiled_alone
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
 from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.running.lone_task import compiled_alone
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -78,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: list[str]) -> int:
-    from automax_ros.cli.usage import UsageError
+    from automax_ros.core.faults import Fault
 
     # The options in front of the subcommand take no values, so the first word is its name.
     name = next((word for word in argv if not word.startswith("-")), None)
@@ -94,7 +94,7 @@ def _run(argv: list[str]) -> int:
             parser.print_help(sys.stderr)
             return 2
         return _exit_code(module.run(arguments))
-    except UsageError as error:
+    except Fault as error:
         print(f"automax{f' {name}' if name in SUBCOMMANDS else ''}: error: {error}", file=sys.stderr)
         return 2
     except SystemExit as stop:  # argparse's way to end after --help, --version and wrong usage

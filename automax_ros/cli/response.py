@@ -14,24 +14,16 @@ import math
 import sys
 from pathlib import Path
 
-from automax_ros.blocks.declaration import Block
-from automax_ros.cli.dynamic_calls import (
-    DynamicCall,
-    Source,
-    add_call_arguments,
-    dynamic_calls,
-    require_running,
-)
+from automax_ros.cli.call_options import add_call_arguments, chosen_calls
 from automax_ros.cli.numbers import number, whole_number
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
-from automax_ros.cli.response_data import BlockResponse, Range, measured_response
 from automax_ros.cli.task_files import add_target_arguments
-from automax_ros.cli.tune_info import checked_program, tuning_of
+from automax_ros.cli.tune_info import checked_program
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.numbers import INT16_MAX
-from automax_ros.core.types import DataType, Value
-from automax_ros.core.values import source_text
 from automax_ros.language.program import Program
+from automax_ros.tuning.dynamic_calls import DynamicCall, require_running, tuning_of
+from automax_ros.tuning.response import BlockResponse, Range, measured_response
 from automax_ros.tuning.step_response import MOST_SCANS, default_scans
 from automax_ros.tuning.tuning import Tuning
 
@@ -74,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     if program is None:
         return 1
     require_different_files({"FILE": arguments.file}, {"--output": arguments.output, "--csv": arguments.csv})
-    (call,) = dynamic_calls(program, arguments.settings, arguments.block, driven=True)
+    (call,) = chosen_calls(program, arguments, driven=True)
     tuning = tuning_of(call, program)
     _require_known(call, tuning)
     if arguments.output is not None:
@@ -107,7 +99,7 @@ def _show(arguments: argparse.Namespace, response: BlockResponse) -> None:
 
 
 def _measured(arguments: argparse.Namespace, program: Program, call: DynamicCall, tuning: Tuning) -> BlockResponse:
-    parameters, assumed = _driving(call)
+    parameters, assumed = call.standing_inputs()
     require_running(call)
     return measured_response(
         path=arguments.file,
@@ -121,29 +113,6 @@ def _measured(arguments: argparse.Namespace, program: Program, call: DynamicCall
         scans=_scans(arguments, tuning),
         assumed=assumed,
     )
-
-
-def _driving(call: DynamicCall) -> tuple[dict[str, Value], list[str]]:
-    """Return the inputs but the signal, by keyword, and what had to be assumed of variables that nobody knows."""
-    parameters: dict[str, Value] = {}
-    assumed: list[str] = []
-    for name, given in call.parameters.items():
-        if name in call.dynamics.signals:
-            continue
-        value = given.value
-        if given.source is Source.UNKNOWN:
-            value = _default(call.block, name)
-            assumed.append(f"{name} = {source_text(value)} ({given.text})")
-        if value is not None:
-            parameters[name] = value
-    return parameters, assumed
-
-
-def _default(block: Block, name: str) -> Value:
-    item = next(item for item in block.inputs if item.name == name)
-    if item.default is not None:
-        return item.default
-    return item.type.zero if isinstance(item.type, DataType) else 0
 
 
 def _require_known(call: DynamicCall, tuning: Tuning) -> None:

@@ -7,9 +7,9 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from automax_ros.cli.response_data import BlockResponse, Point, followed
 from automax_ros.cli.usage import UsageError
 from automax_ros.tuning.frequency import decibels, logarithmic
+from automax_ros.tuning.response import BlockResponse, Point, followed
 
 _LAPLACE, _DESIGN, _MEASURED, _MARK = "#d1892f", "#1f4e9c", "black", "#7a7a7a"
 _CURVE, _STEPS, _TIMES = 300, 2000, 400

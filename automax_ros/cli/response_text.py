@@ -7,10 +7,10 @@ import math
 from collections.abc import Sequence
 from typing import TextIO
 
-from automax_ros.cli.response_data import BlockResponse, Point
 from automax_ros.cli.tune_info_text import frequency_text
 from automax_ros.tuning.driven import STANDING
 from automax_ros.tuning.frequency import Measured, decibels
+from automax_ros.tuning.response import BlockResponse, Point
 from automax_ros.tuning.step_response import SETTLED
 from automax_ros.tuning.transfer_text import fixed, number
 

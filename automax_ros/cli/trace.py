@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TextIO
 
 from automax_ros.cli.csv_table import CsvFault
-from automax_ros.cli.lone_task import LoneTask, LoneVariable
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
@@ -33,6 +32,7 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_text
 from automax_ros.running.error_log import LogEntry
+from automax_ros.running.lone_task import LoneTask, LoneVariable
 from automax_ros.running.task import ScanRecord, Status
 
 _ROWS_A_LOOK = 256

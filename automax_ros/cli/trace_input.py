@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from automax_ros.cli.csv_table import CsvFault, CsvTable
-from automax_ros.cli.lone_task import LoneTask, LoneVariable
 from automax_ros.core.names import NameFault, UnknownName
 from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import is_number, value_of, value_text, wanted
 from automax_ros.language.program import Symbol
+from automax_ros.running.lone_task import LoneTask, LoneVariable
 
 _NOT_SET = ("scan", "time_s")
 """Columns that tables of ``trace`` and ``export`` have: a row is a scan whatever they say."""

@@ -17,7 +17,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.blocks.declaration import Processor
-from automax_ros.cli.dynamic_calls import DynamicCall, add_call_arguments, dynamic_calls
+from automax_ros.cli.call_options import add_call_arguments, chosen_calls
 from automax_ros.cli.numbers import number, whole_number
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
 from automax_ros.cli.terminal import print_diagnostics
@@ -25,7 +25,7 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.ticks import MAX_TICKS, NS_PER_S, UDC_MAX_TICKS
 from automax_ros.language.program import Program
-from automax_ros.tuning.tuning import Tuning, tuning
+from automax_ros.tuning.dynamic_calls import tuning_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,16 +74,11 @@ def checked_program(arguments: argparse.Namespace) -> Program | None:
     return result.program
 
 
-def tuning_of(call: DynamicCall, program: Program) -> Tuning:
-    """Return what the coefficients of a CALL mean in its task."""
-    return tuning(call.block, program.period_ns / NS_PER_S, call.coefficients)
-
-
 def _print_blocks(arguments: argparse.Namespace, program: Program) -> None:
     from automax_ros.cli.tune_info_json import task_record
     from automax_ros.cli.tune_info_text import report
 
-    found = [(call, tuning_of(call, program)) for call in dynamic_calls(program, arguments.settings, arguments.block)]
+    found = [(call, tuning_of(call, program)) for call in chosen_calls(program, arguments)]
     if arguments.json:
         print(json.dumps(task_record(arguments.file, program, found), indent=2, allow_nan=False))
     else:
@@ -91,7 +86,7 @@ def _print_blocks(arguments: argparse.Namespace, program: Program) -> None:
 
 
 def _print_rate(arguments: argparse.Namespace, program: Program | None) -> None:
-    from automax_ros.cli.integrate_rate import Rate
+    from automax_ros.tuning.integrate_rate import Rate, RateFault
 
     period_ns = None
     if program is not None:
@@ -105,7 +100,10 @@ def _print_rate(arguments: argparse.Namespace, program: Program | None) -> None:
     elif arguments.tick_ms is not None:
         raise UsageError("--tick-ms needs --ticks or a FILE", "the scan time is ticks x tick")
     y, x = arguments.ki
-    rate = Rate.of(y, x, None if period_ns is None else period_ns / NS_PER_S)
+    try:
+        rate = Rate.of(y, x, None if period_ns is None else period_ns / NS_PER_S)
+    except RateFault as fault:
+        raise UsageError(f"--ki: {fault.message}", fault.hint) from fault
     if arguments.json:
         print(json.dumps(rate.record(), indent=2, allow_nan=False))
     else:

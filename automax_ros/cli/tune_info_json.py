@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from automax_ros.cli.dynamic_calls import DynamicCall, Source
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.language.program import Program
+from automax_ros.tuning.dynamic_calls import DynamicCall, Source
 from automax_ros.tuning.frequency import decibels
 from automax_ros.tuning.tuning import Corner, LimitNow, Tuning
 

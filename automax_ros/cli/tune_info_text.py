@@ -7,11 +7,11 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from automax_ros.cli.dynamic_calls import DynamicCall, Parameter, Source
 from automax_ros.core.numbers import INT16_MAX
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.values import source_text
 from automax_ros.language.program import Program
+from automax_ros.tuning.dynamic_calls import DynamicCall, Parameter, Source
 from automax_ros.tuning.transfer_text import digits_for, discrete_text, gain_text, number
 from automax_ros.tuning.tuning import Corner, LimitNow, Tuning, Verdict
 

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
+from automax_ros.core.faults import Fault
 
-class UsageError(Exception):
+
+class UsageError(Fault):
     """The command cannot do what it was told: wrong arguments, or an unreadable file; exit code 2."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
-
-    def __str__(self) -> str:
-        text = str(self.args[0])
-        return f"{text}\n  hint: {self.hint}" if self.hint else text

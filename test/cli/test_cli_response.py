@@ -298,7 +298,7 @@ def test_extreme_values_end_without_a_fault(automax, line):
         (("--block", "140", "--set", "GAIN=nan"), "--set: 'nan' is not a value for GAIN, type REAL"),
         (("--block", "140", "--set", "A%=1"), "--set A%: it carries the signal, INPUT of 140 PROP_INT\n"),
         (("--block", "140", "--set", "GAIN=1", "--set", "GAIN=1"), "--set GAIN is given twice"),
-        (("--block", "140.0"), "--block '140.0' is no BASIC line such as 210 or 210.2"),
+        (("--block", "140.0"), "--block '140.0' is not a BASIC line such as 210 or 210.2"),
         (("--block", "100", "--amplitude", "0"), "--amplitude 0: it must be 1 to 32767 counts"),
         (("--block", "100", "--amplitude", "32768"), "--amplitude 32768: it must be 1 to 32767 counts"),
         (("--block", "100", "--step", "0"), "--step 0: it must be 1 to 32767 counts"),

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from automax_ros.blocks.declaration import Processor
 from automax_ros.cli.csv_table import MAX_LINE, CsvFault
-from automax_ros.cli.lone_task import LoneTask
 from automax_ros.cli.main import main
 from automax_ros.cli.task_files import Target, check_task_file
 from automax_ros.cli.trace_input import InputTable
 from automax_ros.core.problems import PROBLEMS
+from automax_ros.running.lone_task import LoneTask
 
 from .support import TASK, table_of
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import optimize, signal
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.cli.integrate_rate import RATE_FACTOR, rate_gain, rate_limits
+from automax_ros.tuning.integrate_rate import RATE_FACTOR, rate_gain, rate_limits
 from automax_ros.tuning.tuning import (
     Verdict,
     range_of,

@@ -1,4 +1,4 @@
-"""The answer of ``automax tune-info --ki``: the KI of an INTEGRATE that gains so many counts a second (42.3)."""
+"""The answer of ``automax tune-info --ki``: the KI of an INTEGRATE that gains this many counts per second (42.3)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from automax_ros.blocks.coefficients import TWO_TO_MINUS_18
-from automax_ros.cli.usage import UsageError
+from automax_ros.core.faults import Fault
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
 from automax_ros.core.ticks import MAX_TICK_NS, MAX_TICKS, MIN_TICK_NS, NS_PER_S
 from automax_ros.tuning.tuning import IntegratorRange, Verdict, range_of, verdict_of
@@ -32,6 +32,10 @@ def rate_limits(period_s: float) -> tuple[float, float]:
     return TWO_TO_MINUS_18 * 2.0 * RATE_FACTOR / period_s, 0.9 * math.pi / period_s
 
 
+class RateFault(Fault):
+    """A rate that no KI gives."""
+
+
 @dataclass(frozen=True)
 class Rate:
     """A rate of ``y`` counts/s at a constant INPUT of ``x`` counts, and the KI for it; ``period_s`` may be None."""
@@ -46,7 +50,7 @@ class Rate:
         """Return the rate with its KI, checked against the limits at the scan time, without one against those of all.
 
         Raises:
-            UsageError: no number, Y or INPUT 0, INPUT beyond 16 bits, KI not above 0, or beyond its limits.
+            RateFault: not numbers, Y or INPUT 0, INPUT beyond 16 bits, KI not above 0, or beyond its limits.
         """
         _require(y, x)
         ki = rate_gain(y, x)
@@ -140,8 +144,8 @@ class Rate:
         if verdict is Verdict.BELOW:
             side = f"below its low limit {low:.6g} (C x 2**-18)"
         slow, fast = sorted(limit * self.x / RATE_FACTOR for limit in (low, high))
-        raise UsageError(
-            f"--ki: KI = {self.ki:.7g} is {side} {when}",
+        raise RateFault(
+            f"KI = {self.ki:.7g} is {side} {when}",
             f"with INPUT = {self.x:g} it can be {slow:.6g} to {fast:.6g} counts/s; take another INPUT or scan time"
             if period_s is not None
             else f"with INPUT = {self.x:g} it can be {slow:.6g} to {fast:.6g} counts/s",
@@ -150,15 +154,15 @@ class Rate:
 
 def _require(y: float, x: float) -> None:
     if not math.isfinite(y) or not math.isfinite(x):
-        raise UsageError(f"--ki {y:g} {x:g}: Y and X must be numbers")
+        raise RateFault(f"Y = {y:g} and X = {x:g}: both must be numbers")
     if x == 0.0:
-        raise UsageError("--ki: X is 0, and an integrator of 0 does not move", "X is the constant INPUT in counts")
+        raise RateFault("X is 0, and an integrator of 0 does not move", "X is the constant INPUT in counts")
     if not INT16_MIN <= x <= INT16_MAX or x != int(x):
-        raise UsageError(f"--ki: X = {x:g} is no INPUT: that is a whole number from {INT16_MIN} to {INT16_MAX}")
+        raise RateFault(f"X = {x:g} cannot be an INPUT, which is a whole number from {INT16_MIN} to {INT16_MAX}")
     if y == 0.0:
-        raise UsageError("--ki: Y is 0, and OUTPUT would not move", "Y is the change of OUTPUT in counts a second")
+        raise RateFault("Y is 0, and OUTPUT would not move", "Y is the change of OUTPUT in counts per second")
     if not _SLOWEST <= abs(y) <= _FASTEST:
-        raise UsageError(f"--ki: Y = {y:g} counts/s is {'more' if abs(y) > 1.0 else 'less'} than any scan time allows")
+        raise RateFault(f"Y = {y:g} counts/s is {'more' if abs(y) > 1.0 else 'less'} than any scan time allows")
     if y / x <= 0.0:
         what = "OUTPUT moves in the direction of INPUT"
-        raise UsageError(f"--ki: KI = {rate_gain(y, x):.7g}, but KI must be above 0: {what}", "turn the sign of INPUT")
+        raise RateFault(f"KI = {rate_gain(y, x):.7g}, but KI must be above 0: {what}", "turn the sign of INPUT")

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.blocks.transfer import Transfer
-from automax_ros.cli.dynamic_calls import DynamicCall
 from automax_ros.core.types import Value
+from automax_ros.tuning.dynamic_calls import DynamicCall
 from automax_ros.tuning.frequency import (
     Measured,
     Sweep,

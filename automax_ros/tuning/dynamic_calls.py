@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import enum
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -10,12 +9,11 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declaration import Block
 from automax_ros.blocks.dynamics import Dynamics
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.faults import Fault
-from automax_ros.core.settings import setting
 from automax_ros.core.text import quoted
-from automax_ros.core.types import Value
-from automax_ros.core.values import value_text
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import DataType, Value
+from automax_ros.core.values import source_text
 from automax_ros.language.program import BoundCall, Program
 from automax_ros.language.syntax.statement_text import print_expression
 from automax_ros.language.syntax.tree import (
@@ -32,9 +30,22 @@ from automax_ros.language.syntax.tree import (
     Unary,
 )
 from automax_ros.language.syntax.walk import bodies, statements_in_order
+from automax_ros.tuning.tuning import Tuning, tuning
 
 _LABEL = re.compile(r"0*([0-9]{1,6})(?:\.0*([1-9][0-9]{0,2}))?")
 _LEADING_ZEROS = re.compile(r"(?<=[(,])0+(?=[0-9])")
+
+
+class CallFault(Fault):
+    """A dynamic block that cannot be used as it is called."""
+
+
+class NoDynamicBlock(Fault):
+    """A line that was asked for has no dynamic block."""
+
+
+class ValueFault(Fault):
+    """A value that was given for a variable is for no block."""
 
 
 class Source(enum.Enum):
@@ -104,37 +115,42 @@ class DynamicCall:
         found = {name: self.parameters[name].value for name in declared.parameters if name in self.parameters}
         return {name: float(value) if isinstance(value, (int, float)) else None for name, value in found.items()}
 
+    def standing_inputs(self) -> tuple[dict[str, Value], list[str]]:
+        """Return the inputs but the signal, by keyword, and what had to be assumed of variables nothing is known of."""
+        inputs: dict[str, Value] = {}
+        assumed: list[str] = []
+        for name, given in self.parameters.items():
+            if name in self.dynamics.signals:
+                continue
+            value = given.value
+            if given.source is Source.UNKNOWN:
+                value = _unprogrammed(self.block, name)
+                assumed.append(f"{name} = {source_text(value)} ({given.text})")
+            if value is not None:
+                inputs[name] = value
+        return inputs, assumed
 
-def add_call_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
-    """Add ``--block`` and ``--set``."""
-    parser.add_argument(
-        "--block",
-        required=required,
-        metavar="LINE",
-        help="the BASIC line of a block; LINE.2 is the second CALL of a line, as in the names of states",
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="settings",
-        metavar="NAME=VALUE",
-        help="the value of a variable that a block takes, such as GAIN=2.0; repeatable",
-    )
+
+def _unprogrammed(block: Block, name: str) -> Value:
+    """Return what an input is that no CALL programs."""
+    item = next(item for item in block.inputs if item.name == name)
+    if item.default is not None:
+        return item.default
+    return item.type.zero if isinstance(item.type, DataType) else 0
 
 
 def dynamic_calls(
-    program: Program, settings: Sequence[str], label: str | None, *, driven: bool = False
+    program: Program, values: Mapping[str, Value], label: str | None, *, driven: bool = False
 ) -> list[DynamicCall]:
     """Return the dynamic blocks of a task in the order of the text, or the one on a line.
 
-    ``settings`` are texts NAME=VALUE; they may set what coefficients come from and, of blocks that are to be driven,
-    every other input but the signal.
+    ``values`` are those of variables, by the label of ``core.names``; they may be what coefficients come from and, of
+    blocks that are to be driven, every other input but the signal.
 
     Raises:
-        UsageError: no dynamic block there, or a setting is at fault or for no block.
+        NoDynamicBlock: there is none on that line.
+        ValueFault: a value is for no block.
     """
-    values = _settings(program, settings)
     bound = _labelled(program)
     if label is not None:
         chosen = _chosen(label, bound, program)
@@ -148,20 +164,25 @@ def dynamic_calls(
         if name not in {_plain(item) for item in free}:
             _refuse(name, calls)
             what = "no dynamic block takes it" if label is None else "the block does not take it"
-            raise UsageError(f"--set {name}: {what}", _free_text(free))
+            raise ValueFault(f"{name}: {what}", _free_text(free))
     return calls
+
+
+def tuning_of(call: DynamicCall, program: Program) -> Tuning:
+    """Return what the coefficients of a CALL mean in its task."""
+    return tuning(call.block, program.period_ns / NS_PER_S, call.coefficients)
 
 
 def require_running(call: DynamicCall) -> None:
     """Refuse a block that holds its output.
 
     Raises:
-        UsageError: RESET or MANUAL is TRUE.
+        CallFault: an input that stops it, such as RESET, is TRUE.
     """
     for name, what in call.dynamics.stopped_by:
         given = call.parameters.get(name)
         if given is not None and given.value is True:
-            raise UsageError(f"{call.title}: {name} is TRUE, {what}")
+            raise CallFault(f"{call.title}: {name} is TRUE, {what}")
 
 
 def _refuse(name: str, calls: Sequence[DynamicCall]) -> None:
@@ -172,10 +193,10 @@ def _refuse(name: str, calls: Sequence[DynamicCall]) -> None:
                 continue
             where = f"{item.keyword} of {call.label} {call.block.name}"
             if item.keyword in call.dynamics.signals:
-                raise UsageError(f"--set {name}: it carries the signal, {where}", _free_text(_free([call])))
+                raise ValueFault(f"{name}: it carries the signal, {where}", _free_text(_free([call])))
             if item.keyword in dict(call.dynamics.stopped_by):
                 require_running(call)
-            raise UsageError(f"--set {name}: it is {where}, no coefficient", _free_text(_free(calls)))
+            raise ValueFault(f"{name}: it is {where}, no coefficient", _free_text(_free(calls)))
 
 
 def _free(calls: Sequence[DynamicCall], *, driven: bool = False) -> set[str]:
@@ -239,14 +260,14 @@ def _subroutines(program: Program) -> set[int]:
 def _chosen(label: str, bound: Mapping[str, tuple[BoundCall, str]], program: Program) -> str:
     match = _LABEL.fullmatch(label.strip())
     if match is None:
-        raise UsageError(f"--block {quoted(label)} is no BASIC line such as 210 or 210.2", _listed(bound))
+        raise NoDynamicBlock(f"{quoted(label)} is not a BASIC line such as 210 or 210.2", _listed(bound))
     line, number = int(match[1]), int(match[2] or 1)
     name = f"{line}" if number == 1 else f"{line}.{number}"
     if name in bound:
         return name
     there = {item.line for item in program.calls.values()}
     what = "that is no dynamic block" if line in there else "there is no block on this line"
-    raise UsageError(f"--block {name}: {what}", _listed(bound))
+    raise NoDynamicBlock(f"{name}: {what}", _listed(bound))
 
 
 def _listed(bound: Mapping[str, tuple[BoundCall, str]]) -> str:
@@ -283,31 +304,6 @@ def _parameter(program: Program, keyword: str, given: Expression, values: Mappin
     else:
         return Parameter(keyword, None, Source.UNKNOWN, text, inverted)
     return Parameter(keyword, not value if inverted else value, source, text, inverted)
-
-
-def _settings(program: Program, texts: Sequence[str]) -> dict[str, Value]:
-    """Return values by variable, as ``_plain`` has it."""
-    values: dict[str, Value] = {}
-    for text in texts:
-        name, value = _setting(program, text)
-        if name in values:
-            raise UsageError(f"--set {name} is given twice", "give each variable one value")
-        values[name] = value
-    return values
-
-
-def _setting(program: Program, text: str) -> tuple[str, Value]:
-    try:
-        meant, value = setting(text, program.symbols, "the task has no variable")
-    except Fault as fault:
-        raise UsageError(f"--set: {fault.message}", fault.hint) from fault
-    tuning = meant.variable.tuning
-    if tuning is not None and not isinstance(value, str) and not isinstance(tuning.low, str):
-        assert not isinstance(tuning.high, str)
-        if not tuning.low <= value <= tuning.high:
-            limits = f"{value_text(tuning.low)} to {value_text(tuning.high)}"
-            raise UsageError(f"--set {meant.label}: {value_text(value)} is beyond its tuning limits, {limits}")
-    return meant.label, value
 
 
 def _plain(text: str) -> str:
