@@ -379,8 +379,8 @@ def test_ki_that_comes_close(automax):
     ("options", "told"),
     [
         (("1200", "0"), "--ki: X is 0, and an integrator of 0 does not move"),
-        (("nan", "10"), "--ki: Y = nan and X = 10: both must be numbers"),
-        (("10", "inf"), "--ki: Y = 10 and X = inf: both must be numbers"),
+        (("1e999", "10"), "--ki: Y = inf and X = 10: both must be numbers"),
+        (("10", "-1e999"), "--ki: Y = 10 and X = -inf: both must be numbers"),
         (("1200", "-10"), "--ki: KI = -119.0114, but KI must be above 0: OUTPUT moves in the direction of INPUT"),
         (("0", "10"), "--ki: Y is 0, and OUTPUT would not move\n"),
         (
