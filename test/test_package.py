@@ -1,6 +1,7 @@
 """The package as a whole: one version, its entry points, its rooms and their floors, its compiled messages."""
 
 import ast
+import importlib
 import json
 import os
 import re
@@ -160,6 +161,37 @@ def test_syntax_knows_no_program_and_a_program_no_checks():
         if 0 <= rank(module) < rank(name)
     ]
     assert not wrong
+
+
+def homes_of(room: str) -> dict[str, str]:
+    """The names that a room shows its type checker, each with the module that it comes from."""
+    tree = ast.parse((PACKAGE / room / "__init__.py").read_text(encoding="utf-8"))
+    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
+    return {alias.name: str(node.module) for node in block.body for alias in getattr(node, "names", ())}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_room_has_a_public_face(room):
+    """What a type checker sees is what is there, and no name hides a file of the room."""
+    found = importlib.import_module(f"automax_ros.{room}")
+    homes = homes_of(room)
+    assert found.__doc__
+    assert sorted(found.__all__) == sorted(homes)
+    for name, home in homes.items():
+        assert getattr(found, name) is getattr(importlib.import_module(home), name)
+    assert not {path.stem for path in (PACKAGE / room).iterdir()} & set(found.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        found.nothing  # noqa: B018
+
+
+def test_room_loads_its_files_when_they_are_asked_for():
+    program = (
+        "import sys\n"
+        f"for room in {ROOMS}: __import__('automax_ros.' + room)\n"
+        "print(*sorted(name for name in sys.modules if name.count('.') > 1 and name.startswith('automax_ros')))"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert result.stdout.split() == ["automax_ros.core.face"]
 
 
 def test_library_loads_without_ros():

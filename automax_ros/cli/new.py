@@ -18,7 +18,7 @@ from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import count_of, quoted
-from automax_ros.rack.draft import Draft, DraftFault, draft
+from automax_ros.rack.drafting import Draft, DraftFault, draft
 from automax_ros.rack.loader import load
 from automax_ros.rack.modules.processor import MAX_PROCESSORS
 

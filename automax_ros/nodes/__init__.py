@@ -5,19 +5,14 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from automax_ros.nodes.environment import RosUnavailable, prepare
+from automax_ros.core.face import face
 
 if TYPE_CHECKING:
+    from automax_ros.nodes.environment import RosUnavailable, prepare
     from automax_ros.nodes.rack_nodes import RackNodes
 
 __all__ = ["RackNodes", "RosUnavailable", "prepare"]
 
-
-def __getattr__(name: str) -> Any:
-    """Import what needs rclpy when it is asked for: ``prepare`` must be there before."""
-    if name == "RackNodes":
-        return import_module(f"{__name__}.rack_nodes").RackNodes
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = face(__name__, "environment", "rack_nodes")

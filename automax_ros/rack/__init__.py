@@ -3,9 +3,60 @@
 - ``config`` says what a rack's file means, as frozen dataclasses;
 - ``loader`` reads a file into them and finds everything wrong with it: ``load(path)``;
 - ``yaml_text`` reads YAML without its dangerous parts, ``sections`` and ``scalars`` check mappings and values;
-- ``slots``, ``tasks``, ``commons``, ``names``, ``presets`` check one part of the file each;
-- ``modules`` is the table of AutoMax modules, ``files`` reads files within bounds;
+- ``slots``, ``tasks``, ``commons``, ``points``, ``names``, ``presets`` check one part of the file each;
+- ``modules/`` has a file for each kind of module, ``files`` reads files within bounds;
+- ``rack`` is what runs, ``operations`` what can be done with it, ``observers`` who is told;
+- ``drafting`` makes a rack file from a folder of tasks;
 - ``ros_names`` turns the rack's names into names of ROS 2.
 
 docs/rack_yaml.md is the user's reference of the file.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from automax_ros.core.face import face
+
+if TYPE_CHECKING:
+    from automax_ros.rack.config import CommonVariable, RackConfig
+    from automax_ros.rack.drafting import Draft, draft
+    from automax_ros.rack.installation import RackError
+    from automax_ros.rack.loader import LoadResult, load
+    from automax_ros.rack.modules.kind import Module, ModuleConfig, ModuleKind
+    from automax_ros.rack.observers import Operation, RackObserver
+    from automax_ros.rack.operations import OperationRefused
+    from automax_ros.rack.rack import Rack, RackState
+    from automax_ros.rack.tasks_check import check_tasks
+
+__all__ = [
+    "CommonVariable",
+    "Draft",
+    "LoadResult",
+    "Module",
+    "ModuleConfig",
+    "ModuleKind",
+    "Operation",
+    "OperationRefused",
+    "Rack",
+    "RackConfig",
+    "RackError",
+    "RackObserver",
+    "RackState",
+    "check_tasks",
+    "draft",
+    "load",
+]
+
+__getattr__ = face(
+    __name__,
+    "config",
+    "loader",
+    "tasks_check",
+    "drafting",
+    "installation",
+    "modules.kind",
+    "observers",
+    "operations",
+    "rack",
+)

@@ -1,1 +1,22 @@
 """A recording executed again and compared."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from automax_ros.core.face import face
+
+if TYPE_CHECKING:
+    from automax_ros.replay.engine import Replay, ReplayOptions, replay
+    from automax_ros.replay.report import ReplayReport
+    from automax_ros.replay.stored_rack import SourceRefused
+
+__all__ = [
+    "Replay",
+    "ReplayOptions",
+    "ReplayReport",
+    "SourceRefused",
+    "replay",
+]
+
+__getattr__ = face(__name__, "report", "stored_rack", "engine")

@@ -1,1 +1,31 @@
 """The messages of a rack: definitions, CDR, quality of service, the stream that nodes and recordings share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from automax_ros.core.face import face
+
+if TYPE_CHECKING:
+    from automax_ros.wire.cdr import CdrError, decode, encode
+    from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable
+    from automax_ros.wire.qos import QosProfile
+    from automax_ros.wire.rack_files import RackFile
+    from automax_ros.wire.stream import RackStream, Topic
+
+__all__ = [
+    "CdrError",
+    "CommonImage",
+    "CommonWrite",
+    "QosProfile",
+    "RackFile",
+    "RackStream",
+    "Scan",
+    "TaskState",
+    "Topic",
+    "VariableTable",
+    "decode",
+    "encode",
+]
+
+__getattr__ = face(__name__, "qos", "cdr", "messages", "rack_files", "stream")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import automax_ros
 from automax_ros.cli.main import main
-from automax_ros.rack.draft import DraftFault, draft
+from automax_ros.rack.drafting import DraftFault, draft
 from automax_ros.rack.loader import load
 
 EXAMPLE = Path(automax_ros.__file__).parent.parent / "config" / "section_drive"
@@ -208,7 +208,7 @@ def test_rack_file_over_the_limit_is_refused(plant):
 
 
 def test_folder_of_too_many_files_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("automax_ros.rack.draft._MOST_FILES", 3)
+    monkeypatch.setattr("automax_ros.rack.drafting._MOST_FILES", 3)
     for number in range(4):
         (tmp_path / f"{number}.txt").touch()
     with pytest.raises(DraftFault, match="more than 3 files"):
