@@ -18,6 +18,7 @@ SWITCHES = {
 }
 VALUES = {
     "duration": "seconds to run; empty: until Ctrl-C",
+    "state": "folder that keeps non-volatile values; empty: next to the rack file",
     "record": "bag folder to record into; empty: none",
     "record_split_mb": "megabytes after which the recording begins a new file; empty: one file",
     "record_split_s": "seconds after which the recording begins a new file; empty: one file",

@@ -27,6 +27,7 @@ from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value, bare_name
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import RackError
+from automax_ros.rack.retention import RetentionFault
 from automax_ros.rack.settings import CommonElement, setting, watched
 from automax_ros.rack.tasks_check import check_tasks
 
@@ -52,6 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
     add_watch_argument(parser, "the first published ones")
     parser.add_argument(
+        "--state",
+        type=Path,
+        metavar="DIR",
+        help="keep non-volatile commons and tunables in this folder from run to run (default on the wall clock: "
+        ".automax/RACK next to the rack file; simulated: nowhere)",
+    )
+    parser.add_argument(
         "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
     )
 
@@ -74,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
             recording_options(arguments, config),
             tuple(_settings(config, arguments.settings)),
             tuple(_watched(config, arguments.watch)),
+            arguments.state,
         )
         try:
             if arguments.simulated:
@@ -83,7 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
             return run_live(plan, stop)
         except RackError as error:
             return _refused(error)
-        except BagError as error:
+        except (BagError, RetentionFault) as error:
             print(error, file=sys.stderr)
             return 2
 

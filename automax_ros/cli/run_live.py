@@ -8,12 +8,14 @@ from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import DiskSync, RecordingWatch, live_options
 from automax_ros.cli.run_plan import RunPlan, report_end, warn
 from automax_ros.cli.signals import StopRequest
+from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.usage import UsageError
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import LockError, RackLock, domain_id
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.retention import default_folder
 
 
 def run_live(plan: RunPlan, stop: StopRequest) -> int:
@@ -29,6 +31,7 @@ def run_live(plan: RunPlan, stop: StopRequest) -> int:
 def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     rack = Rack(plan.config, stopwatch=time.perf_counter_ns)
     warn(rack)
+    state = StateKeeping(rack, plan.state or default_folder(plan.config))
     live = LiveRack(rack)
     recorder: Recorder | None = None
     sync: DiskSync | None = None
@@ -43,6 +46,9 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         if rack.stop_reason is not None and not told:
             told = True
             display.message(f"STOP ALL: {rack.stop_reason}")
+        state.update(now_ns)
+        for text in state.news():
+            display.message(text)
         recording.flush(now_ns)
         recording.tell()
 
@@ -52,7 +58,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
             recording = RecordingWatch(recorder, display)
             sync = DiskSync(recorder.sync)
         display.message(_opening(rack, domain))
-        live.start(list(plan.settings))
+        live.start([*state.settings, *plan.settings])
         live.run(plan.duration_ns, on_idle)
     finally:
         try:
@@ -63,9 +69,12 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
             if recorder is not None:
                 recorder.close()
                 recorder.sync_at_end()
+    state.end()
+    for text in state.news():
+        display.message(text)
     recording.tell()
     display.finish(plan.record, complete=not recording.failed)
-    return report_end(rack, failed=recording.failed)
+    return report_end(rack, failed=recording.failed or (state.failed and plan.state is not None))
 
 
 def _opening(rack: Rack, domain: int) -> str:

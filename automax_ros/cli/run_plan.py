@@ -16,7 +16,11 @@ from automax_ros.rack.settings import CommonElement
 
 @dataclass(frozen=True)
 class RunPlan:
-    """A run: ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, if any."""
+    """A run.
+
+    ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the one that was
+    named for values that outlive the run, if any.
+    """
 
     config: RackConfig
     duration_ns: int | None
@@ -24,6 +28,7 @@ class RunPlan:
     recording: RecordingOptions
     settings: tuple[tuple[str, Value], ...]
     watch: tuple[CommonElement, ...]
+    state: Path | None = None
 
 
 def warn(rack: Rack) -> None:

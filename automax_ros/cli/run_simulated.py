@@ -6,6 +6,7 @@ from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import RecordingWatch
 from automax_ros.cli.run_plan import RunPlan, report_end, warn
 from automax_ros.cli.signals import StopRequest
+from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.rack import Rack
@@ -25,15 +26,18 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     recorder = Recorder(rack, stream, plan.record, plan.recording) if plan.record is not None else None
     display = StatusDisplay(rack, plan.watch, live=False)
     recording = RecordingWatch(recorder, display)
+    state = StateKeeping(rack, plan.state)
     end_ns = _ENDLESS_NS if plan.duration_ns is None else plan.duration_ns
     try:
         if recorder is not None:
             stream.begin()
         if plan.duration_ns is None:
             display.message(_NO_END)
-        rack.start(plan.settings)
+        rack.start([*state.settings, *plan.settings])
         while not stop.requested and rack.stop_reason is None and rack.now_ns < end_ns:
             rack.scheduler.run_until(min(rack.now_ns + SLICE_NS, end_ns))
+            for text in state.news():
+                display.message(text)
             display.printed()
             display.update(rack.now_ns)
             recording.tell()
@@ -41,6 +45,9 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
         if recorder is not None:
             stream.end()
             recorder.close()
+    state.end()
+    for text in state.news():
+        display.message(text)
     recording.tell()
     display.finish(plan.record, complete=not recording.failed)
-    return report_end(rack, failed=recording.failed)
+    return report_end(rack, failed=recording.failed or state.failed)

@@ -4,6 +4,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -32,6 +33,9 @@ class Automax:
     """`automax` with arguments as a child process, in a ``with`` block that leaves nothing running."""
 
     def __init__(self, *arguments: str | Path, environment: dict[str, str] | None = None) -> None:
+        self._state = tempfile.TemporaryDirectory(prefix="automax_state_")
+        if arguments[0] == "run" and not {"--simulated", "--state"} & set(arguments):
+            arguments += ("--state", self._state.name)  # what one test tunes is nothing to the next
         self.process = subprocess.Popen(
             [*COMMAND, *map(str, arguments)],
             stdout=subprocess.PIPE,
@@ -57,6 +61,7 @@ class Automax:
             self.process.wait()
         for reader in self._readers:
             reader.join()
+        self._state.cleanup()
 
     @property
     def pid(self) -> int:
