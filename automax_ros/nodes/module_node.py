@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
 from rclpy.event_handler import (
@@ -19,13 +21,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_policy_name_from_kind
 
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.guard import Guard
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import Pacer
+from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.wire.stream import RackStream, Take, Topic
 
+DIAGNOSTICS_PERIOD_NS = NS_PER_S
 _SIM_TIME = "use_sim_time"
 
 
@@ -81,6 +86,30 @@ class ModuleNode(Node):  # type: ignore[misc]
         kind = message_class(topic.type_name)
         publish = self.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events).publish
         return lambda _, payload: publish(payload)
+
+    def diagnose(self, statuses: Callable[[int], list[DiagnosticStatus]]) -> None:
+        """Publish ``/diagnostics`` once a second: what ``statuses`` returns for a rack time (ns)."""
+        self._statuses = statuses
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        scheduler, key = self.site.rack.scheduler, EventKey(EventClass.OBSERVE, 0, self.get_name())
+        scheduler.every(DIAGNOSTICS_PERIOD_NS, scheduler.now_ns, key, lambda now, _: self.publish_diagnostics(now))
+
+    def publish_diagnostics(self, now_ns: int) -> None:
+        """Publish the state at a rack time, with the stamp that all messages of that instant have."""
+        stamp = self.site.stream.stamp(now_ns)
+        message = DiagnosticArray(status=self._statuses(now_ns))
+        message.header.stamp = Time(sec=stamp // NS_PER_S, nanosec=stamp % NS_PER_S)
+        self._diagnostics.publish(message)
+
+    def status(self, part: str, level: bytes, text: str, slot: int, values: Mapping[str, str]) -> DiagnosticStatus:
+        """Return the health of a part of the module in a slot (REP-107)."""
+        return DiagnosticStatus(
+            level=level,
+            name=f"{self.get_name()}: {part}",
+            message=text,
+            hardware_id=f"{self.site.rack.config.name} slot {slot}",
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )
 
     def misfit(self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo) -> None:
         """Tell of a reader or writer with an incompatible quality of service; ``what`` says what is lost."""

@@ -15,23 +15,20 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
-from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.tunables import Tunable, tunables_of
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.observers import Operation
 from automax_ros.running.error_log import LogEntry
-from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.running.views import Write
 
-DIAGNOSTICS_PERIOD_NS = NS_PER_S
 ERROR_INTERVAL_S = 1.0
 """A task's run-time errors are reported at most this often ..."""
 ERRORS_SHOWN = 5
@@ -52,7 +49,6 @@ class ProcessorNode(ModuleNode):
             for topic in stream.module_topics
             if topic.slot == self._slot
         }
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(self._tasks)}
         for tunable in self._tunables.values():
             self.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor())
@@ -62,8 +58,7 @@ class ProcessorNode(ModuleNode):
         self._skipped_reported = dict.fromkeys((task.name for task in self._tasks), 0)
         stream.add_sink(outlets.get)
         rack.observe(self)
-        key = EventKey(EventClass.OBSERVE, 0, self.get_name())
-        rack.scheduler.every(DIAGNOSTICS_PERIOD_NS, rack.now_ns, key, lambda now, _: self._publish_diagnostics(now))
+        self.diagnose(self._health)
 
     # RackObserver
 
@@ -118,12 +113,8 @@ class ProcessorNode(ModuleNode):
                 if tunable is not None:
                     self._rack.tune(tunable.task, tunable.variable, parameter.value)
 
-    def _publish_diagnostics(self, now_ns: int) -> None:
-        statuses = [self._status(task, now_ns) for task in self._tasks]
-        message = DiagnosticArray(status=statuses)
-        stamp = self.site.stream.stamp(now_ns)
-        message.header.stamp = Time(sec=stamp // NS_PER_S, nanosec=stamp % NS_PER_S)
-        self._diagnostics.publish(message)
+    def _health(self, now_ns: int) -> list[DiagnosticStatus]:
+        return [self._status(task, now_ns) for task in self._tasks]
 
     def _status(self, task: Task, now_ns: int) -> DiagnosticStatus:
         """Return a task's health: ERROR when faulted, WARN when stopped, erring or newly late, else OK (REP-107)."""
@@ -150,13 +141,8 @@ class ProcessorNode(ModuleNode):
             "mean_us": mean_ns / 1000,
             "longest_us": statistics.longest_ns / 1000,
         }
-        return DiagnosticStatus(
-            level=level,
-            name=f"{self.get_name()}: {task.name}",
-            message=text,
-            hardware_id=f"{self._rack.config.name} slot {task.slot}",
-            values=[KeyValue(key=key, value=f"{value:g}") for key, value in values.items()],
-        )
+        shown = {key: f"{value:g}" for key, value in values.items()}
+        return self.status(task.name, level, text, task.slot, shown)
 
 
 def _described(task: Task, entry: LogEntry) -> str:

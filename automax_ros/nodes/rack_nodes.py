@@ -23,9 +23,8 @@ from rclpy.context import Context
 from rclpy.utilities import get_default_context
 
 from automax_ros.core.types import Value
-from automax_ros.nodes.common_memory import CommonMemoryNode
-from automax_ros.nodes.module_node import ModuleNode, Site
-from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.nodes.module_node import Site
+from automax_ros.nodes.registry import nodes_of
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
@@ -69,9 +68,7 @@ class RackNodes:
         self.lock = self._site.lock
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
-        memory = CommonMemoryNode(self._site)
-        processors = [ProcessorNode(self._site, processor) for processor in self.rack.task_modules]
-        self.nodes: tuple[ModuleNode, ...] = (memory, *processors)
+        self.nodes = nodes_of(self._site)
 
     def add_to(self, executor: Any) -> None:
         """Let an executor of rclpy serve the nodes: any kind, alone or with nodes of your own."""

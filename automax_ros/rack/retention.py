@@ -58,10 +58,6 @@ class Retention:
         self._rack = rack
         self.path = folder / _FILE
         self._views = [view for view, variable in enumerate(rack.config.variables) if variable.non_volatile]
-        self._tunables = [(task, name) for task in rack.tasks for name in _tunables(task)]
-        self._sources = {
-            task.name: hashlib.sha256(rack.sources[task.name].text.encode()).hexdigest() for task in rack.tasks
-        }
         self._saved: list[list[Any]] = self._present()
 
     def restore(self) -> Restored:
@@ -98,6 +94,16 @@ class Retention:
             raise self._fault(f"cannot be written: {error.strerror}") from error
         self._saved = present
         return True
+
+    @property
+    def _tunables(self) -> list[tuple[Task, str]]:
+        """The tunables of the tasks as they are now: a task may have been reloaded."""
+        return [(task, name) for task in self._rack.tasks for name in _tunables(task)]
+
+    @property
+    def _sources(self) -> dict[str, str]:
+        sources = self._rack.sources.items()
+        return {name: hashlib.sha256(source.text.encode()).hexdigest() for name, source in sources}
 
     def _present(self) -> list[list[Any]]:
         memory = self._rack.memory
@@ -144,9 +150,10 @@ class Retention:
     def _tune(self, tasks: dict[str, Any]) -> int:
         """Set the tunables of tasks that are as they were; all of them fit, or none is set."""
         wanted = []
+        sources = self._sources
         for task, name in self._tunables:
             kept = tasks.get(task.name)
-            if kept is not None and kept["source"] == self._sources[task.name]:
+            if kept is not None and kept["source"] == sources[task.name]:
                 value = task.tuning(name, kept["tunables"][name])
                 if value != task.value(name):
                     wanted.append((task, name, value))

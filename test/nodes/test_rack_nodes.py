@@ -188,3 +188,52 @@ def test_face_of_the_room_needs_no_rclpy():
     assert all(hasattr(automax_ros.nodes, name) for name in automax_ros.nodes.__all__)
     with pytest.raises(AttributeError):
         _ = automax_ros.nodes.nothing
+
+
+def test_every_kind_of_module_has_its_node_or_none():
+    from automax_ros.nodes.registry import NODES
+    from automax_ros.rack.modules.registry import KINDS
+
+    assert set(NODES) == set(KINDS)
+
+
+def test_digital_modules_show_their_registers(context, tmp_path):
+    """A push button that ROS presses reaches the word that diagnostics show."""
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.node import Node
+    from std_msgs.msg import Bool
+
+    from automax_ros.nodes import RackNodes
+
+    (tmp_path / "rack.yaml").write_text(
+        "rack: IO\nslots:\n  0: {module: 57C413}\n  1: {module: 57C435, tasks: {T: {priority: 5}}}\n"
+        "  5: {module: 57C419}\n"
+        "common:\n  START_PB@: {slot: 5, register: 0, bit: 3, ros: in}\n  SEEN@: {ros: out}\n"
+    )
+    (tmp_path / "T.BLK").write_text(
+        "10 COMMON START_PB@, SEEN@\n100 CALL SCAN_LOOP(TICKS=1)\n110 SEEN@ = START_PB@\n120 END\n"
+    )
+    executor = SingleThreadedExecutor(context=context)
+    button = Node("button", context=context)
+    arrays = []
+    button.create_subscription(DiagnosticArray, "/diagnostics", arrays.append, 10)
+    publisher = button.create_publisher(Bool, "/io/common/START_PB/set", 10)
+    executor.add_node(button)
+
+    def shown():
+        statuses = [status for array in arrays for status in array.status if status.name == "digital_io_5: 57C419"]
+        return {pair.key: pair.value for status in statuses[-1:] for pair in status.values}
+
+    with RackNodes(tmp_path / "rack.yaml", context=context) as nodes:
+        names = [node.get_name() for node in nodes.nodes]
+        assert names == ["common_memory", "processor_1", "digital_io_5"]
+        nodes.add_to(executor)
+        nodes.start()
+        spin_until(executor, lambda: shown() == {"register_0": "0000H", "register_1": "0000H"})
+        spin_until(executor, publisher.get_subscription_count)
+        publisher.publish(Bool(data=True))
+        spin_until(executor, lambda: nodes.rack.value("SEEN@"))
+        spin_until(executor, lambda: shown() == {"register_0": "0008H", "register_1": "0000H"})
+    button.destroy_node()
+    executor.shutdown()

@@ -1,0 +1,32 @@
+"""The node ``digital_io_SLOT``: a digital input or output module.
+
+Publishes: ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once a second with its registers. Its points are common
+variables, which have topics of their own (``common_memory``).
+"""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.rack.modules.kind import Module
+
+
+class DigitalIoNode(ModuleNode):
+    """Serves one digital module."""
+
+    def __init__(self, site: Site, module: Module) -> None:
+        """Create the publisher."""
+        super().__init__(site, module.config.name)
+        self._module = module.config
+        self._bank = site.rack.backplane.bank(module.config.slot)
+        self.diagnose(self._health)
+
+    def _health(self, _: int) -> list[DiagnosticStatus]:
+        """Return the registers as hexadecimal words; the module itself is always well."""
+        values = {}
+        if self._bank is not None:
+            for register in range(self._bank.registers):
+                word = self.site.rack.memory.read_now(self._bank.view, register)
+                values[f"register_{register}"] = f"{int(word) & 0xFFFF:04X}H"
+        return [self.status(self._module.model, DiagnosticStatus.OK, "running", self._module.slot, values)]

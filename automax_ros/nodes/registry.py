@@ -1,0 +1,35 @@
+"""Which node a module has: one entry for each kind that has one of its own.
+
+The common memory is the rack's, with a module for it or without: its node is there always, and first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from automax_ros.nodes.common_memory import CommonMemoryNode
+from automax_ros.nodes.digital_io import DigitalIoNode
+from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.rack.modules.common_memory import COMMON_MEMORY
+from automax_ros.rack.modules.digital_io import DIGITAL_IO
+from automax_ros.rack.modules.kind import Module, ModuleKind
+from automax_ros.rack.modules.processor import PROCESSOR
+from automax_ros.rack.modules.registry import SUPPORTED
+
+NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
+    PROCESSOR: ProcessorNode,
+    COMMON_MEMORY: None,
+    DIGITAL_IO: DigitalIoNode,
+}
+"""The node of each kind of module; None where the rack's common memory node is enough."""
+
+
+def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
+    """Create the nodes of a rack: that of common memory, then those of its modules by slot."""
+    made: list[ModuleNode] = [CommonMemoryNode(site)]
+    for module in site.rack.modules:
+        node = NODES[SUPPORTED[module.config.model]]
+        if node is not None:
+            made.append(node(site, module))
+    return tuple(made)
