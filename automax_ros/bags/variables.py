@@ -10,7 +10,7 @@ from automax_ros.core.names import element
 from automax_ros.core.types import DataType
 from automax_ros.wire.messages import Variable, VariableTable
 
-_NAME = re.compile(r"[A-Z_][A-Z0-9_]{0,63}[%!@$]?")
+_NAME = re.compile(r"[A-Z_][A-Z0-9_]{0,63}[%!@$]?|SLOT:[0-9]{1,2}%")
 
 
 @dataclass(frozen=True)

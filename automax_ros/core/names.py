@@ -1,7 +1,8 @@
 """Names of variables as people write them, with subscripts: which variable, and which element of an array, they mean.
 
 ``REF%``, ``TABLE%(3)``, ``grid[1, 2]``: case and blanks do not matter, square brackets are round ones (decision).
-An array's elements are counted with the last subscript fastest, from 0 on.
+An array's elements are counted with the last subscript fastest, from 0 on. The registers of the module in slot 5 are
+the array ``SLOT:5%``, a name that no task can declare (decision).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.text import near_or_listed, quoted
 
 _NAME = re.compile(
-    r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?)(?:[(\[](?P<subscripts>[0-9]{1,9}(?:,[0-9]{1,9}){0,3})[)\]])?"
+    r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?|SLOT:[0-9]{1,2}%)(?:[(\[](?P<subscripts>[0-9]{1,9}(?:,[0-9]{1,9}){0,3})[)\]])?"
 )
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from automax_ros.bags.common_log import CommonLog, Entry, Key
 from automax_ros.bags.run_facts import RunFacts
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Value
-from automax_ros.rack.config import CommonVariable
-from automax_ros.rack.views import view_specs
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.running.registers import RegisterMap
 from automax_ros.wire.messages import CommonImage, CommonWrite
 
@@ -24,22 +24,24 @@ class UnknownValue(Exception):
 
 
 class RecordedCommons(CommonLog):
-    """All of common memory as the recording has told it so far; ``rack`` are the variables of the recorded rack's file.
+    """All of common memory as the recording has told it so far; ``rack`` is the recorded rack's configuration.
 
+    ``backplane`` finds the registers of its modules.
     ``gaps`` counts places where writes are missing; after one nothing is known until the next image. ``forced`` are the
     values that a force holds; ``on_forces`` are called when they change.
     """
 
-    def __init__(self, bag: Path, facts: RunFacts, rack: Sequence[CommonVariable]) -> None:
+    def __init__(self, bag: Path, facts: RunFacts, rack: RackConfig) -> None:
         super().__init__(bag, facts)
-        self.rack = tuple(rack)
-        self.registers = RegisterMap(view_specs(rack))
+        self.rack = rack.variables
+        self.backplane = backplane_of(rack)
+        self.registers = RegisterMap(view_specs(rack.variables))
         self.gaps = 0
         self.forced: frozenset[Key] = frozenset()
         self.on_forces: list[Callable[[], None]] = []
         self._start: list[int] = []
         size = 0
-        for item in rack:
+        for item in rack.variables:
             self._start.append(size)
             size += item.elements
         self._cells: list[Value | None] = [None] * size

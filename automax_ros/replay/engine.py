@@ -140,7 +140,7 @@ class _Run:
         self._bag, self._rack, self._sources, self._options = bag, rack, sources, options
         self._watcher = watcher
         self._start = facts.table.stamp
-        self._commons = RecordedCommons(bag, facts, rack.config.variables)
+        self._commons = RecordedCommons(bag, facts, rack.config)
         self._all_tasks = frozenset(rack.task_names)
         self._tallies = Tallies(self._start, options.max_differences)
         self._begin = self._start + options.from_ns

@@ -58,7 +58,7 @@ class TaskReplay:
         self._bag, self._source, self._commons, self._tallies = bag, source, commons, tallies
         self._tolerance = tolerance
         self._starts_at = starts_at
-        self._task = Task(source.compiled, self.memory)
+        self._task = Task(source.compiled, self.memory, backplane=commons.backplane)
         self._task.record_scans()
         self._layout = self._task.layout
         self._layout_hash = self._layout.hash
