@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-import yaml
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 from automax_ros.bags.errors import BagError
@@ -19,15 +18,16 @@ from automax_ros.bags.opening import no_recording, opened, size_of
 from automax_ros.bags.schemas import require_known
 from automax_ros.bags.sent_order import HOLD_NS, in_sent_order
 from automax_ros.core.text import printable
+from automax_ros.core.yaml_text import Flaw, YamlFault, read_data
 from automax_ros.wire.cdr import CdrError, Message, decoder
 
 MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read, in bytes (decision: a bound on memory for untrusted recordings)."""
-_MAX_YAML_DEPTH = 16
+_MAX_YAML_NODES = 2_000_000
+"""More keys and values than MAX_METADATA_BYTES hold."""
 _MAX_FILES = 10_000
 _PROGRESS_MASK = 0x3FF
 """Progress is told once in so many records."""
-_Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 """Leaves every scalar a string: numbers and dates of a hostile file cost nothing."""
 
 
@@ -301,19 +301,13 @@ def load_yaml(path: object, text: bytes) -> Any:
     Raises:
         BagError: it is not YAML of that kind; ``path`` names it.
     """
-    depth = 0
     try:
-        for event in yaml.parse(text, Loader=_Loader):
-            if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
-                depth += 1
-            elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
-                depth -= 1
-            if depth > _MAX_YAML_DEPTH or isinstance(event, yaml.AliasEvent):
-                raise BagError("AMX6814", path, f"is nested deeper than {_MAX_YAML_DEPTH} or uses aliases")
-        return yaml.load(text, Loader=_Loader)
-    except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
-        reason = str(error).split("\n", 1)[0]
-        raise BagError("AMX6813", path, f"is not readable YAML: {reason}") from error
+        return read_data(text.decode(), nodes=_MAX_YAML_NODES)
+    except YamlFault as fault:
+        code = "AMX6813" if fault.flaw is Flaw.SYNTAX else "AMX6814"
+        raise BagError(code, path, f"is not readable YAML: {fault.message}", fault.hint) from fault
+    except UnicodeDecodeError as error:
+        raise BagError("AMX6813", path, f"is not readable YAML: {error.reason}") from error
 
 
 def _data_files(folder: Path, information: dict[str, Any]) -> list[Path]:

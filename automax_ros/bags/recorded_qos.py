@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import yaml
-
+from automax_ros.core.yaml_text import YamlFault, read_data
 from automax_ros.wire.qos import QosProfile
 
 MAX_QOS_BYTES = 1 << 16
@@ -19,7 +18,6 @@ _NESTING = 6
 _RELIABILITY = {"1": "reliable", "2": "best_effort"}
 _DURABILITY = {"1": "transient_local", "2": "volatile"}
 _HISTORY = {"1": "keep_last", "2": "keep_all"}
-_Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
 def recorded_qos(text: str) -> QosProfile:
@@ -47,16 +45,10 @@ def _depth(profile: dict[Any, Any]) -> int:
 
 
 def _loaded(text: str) -> Any:
-    """Load YAML of bounded depth without aliases, None if it is none."""
+    """Load YAML of bounded depth without aliases, None where the text is something else."""
     if len(text) > MAX_QOS_BYTES:
         return None
-    depth = 0
     try:
-        for event in yaml.parse(text, Loader=_Loader):
-            depth += isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent))
-            depth -= isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent))
-            if depth > _NESTING or isinstance(event, yaml.AliasEvent):
-                return None
-        return yaml.load(text, Loader=_Loader)
-    except (yaml.YAMLError, ValueError):
+        return read_data(text, depth=_NESTING)
+    except YamlFault:
         return None

@@ -2,7 +2,7 @@
 
 - ``config`` says what a rack's file means, as frozen dataclasses;
 - ``loader`` reads a file into them and finds everything wrong with it: ``load(path)``;
-- ``yaml_text`` reads YAML without its dangerous parts, ``sections`` and ``scalars`` check mappings and values;
+- ``sections`` and ``scalars`` check mappings and values of the tree that ``core/yaml_text`` reads;
 - ``slots``, ``tasks``, ``commons``, ``points``, ``names``, ``presets`` check one part of the file each;
 - ``modules/`` has a file for each kind of module, ``files`` reads files within bounds;
 - ``rack`` is what runs, ``operations`` what can be done with it, ``observers`` who is told;

@@ -8,6 +8,7 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.kinds import Direction
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType, bare_name
+from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
@@ -17,7 +18,6 @@ from automax_ros.rack.presets import preset_value
 from automax_ros.rack.reserved import is_reserved
 from automax_ros.rack.scalars import boolean_value, number_value, text_value, wrong_kind
 from automax_ros.rack.sections import Section, entries_of, report_twice
-from automax_ros.rack.yaml_text import Node, Scalar
 
 UNIT_LIMIT = 16
 DESCRIPTION_LIMIT = 200

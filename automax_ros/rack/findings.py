@@ -5,9 +5,11 @@ from __future__ import annotations
 from automax_ros.core.diagnostics import Diagnostic, Note, Span, in_order
 from automax_ros.core.problems import PROBLEMS, Severity
 from automax_ros.core.text import quoted
+from automax_ros.core.yaml_text import Flaw
 
 MAX_FINDINGS = 200
 """Most errors, and most warnings, that one file reports (decision: nobody reads more; hostile files have millions)."""
+_YAML_CODES = {Flaw.SYNTAX: "AMX6003", Flaw.EXTRA: "AMX6004", Flaw.SIZE: "AMX6005"}
 
 
 class Findings:
@@ -31,6 +33,11 @@ class Findings:
         """Report that the text at a place cannot be taken for what it is; later problems of that place are not new."""
         self.add(code, message, span, hint)
         self._refused.add(span)
+
+    def yaml_flaw(self, flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
+        """Report what ``read_yaml`` finds: AMX6003 syntax, AMX6004 parts of YAML that are not read, AMX6005 size."""
+        report = self.refuse if flaw is Flaw.EXTRA else self.add
+        report(_YAML_CODES[flaw], message, span, hint)
 
     def upper_case(self, text: str, span: Span) -> str:
         """Return a name of the rack in upper case; the first that was not gets a warning (semantics, BASIC)."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.text import quoted
+from automax_ros.core.yaml_text import Node, read_yaml
 from automax_ros.rack.commons import CommonReader
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault, read_bytes
@@ -20,7 +21,6 @@ from automax_ros.rack.sections import Section, entries_of
 from automax_ros.rack.slots import SlotReader
 from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.views import bank_variables
-from automax_ros.rack.yaml_text import Node, read_yaml
 
 _START = Span(1, 1, 2)
 _KEYS = ("rack", "operator", "slots", "common")
@@ -57,7 +57,7 @@ def load_stored(source: SourceText, path: Path) -> LoadResult:
 
 
 def _loaded(source: SourceText, tasks: TaskReader, path: Path, findings: Findings) -> LoadResult:
-    root = read_yaml(source, findings) if not findings.errors else None
+    root = read_yaml(source.text, findings.yaml_flaw) if not findings.errors else None
     config = _RackReader(path, source.text, tasks, findings).read(root) if root is not None else None
     return LoadResult(config if not findings.errors else None, findings.in_order(), source)
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import value_of, wanted
+from automax_ros.core.yaml_text import Node, Sequence
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import VariableName
 from automax_ros.rack.scalars import is_plain_word, kind_of, number_hint, text_value
-from automax_ros.rack.yaml_text import Node, Sequence
 
 _CODE = "AMX6406"
 

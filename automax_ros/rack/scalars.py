@@ -9,8 +9,8 @@ from typing import TypeGuard, TypeVar
 from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import is_number, number, value_of, whole_number
+from automax_ros.core.yaml_text import Mapping, Node, Scalar, Sequence
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.yaml_text import Mapping, Node, Scalar, Sequence
 
 _OCTAL = re.compile(r"[-+]?0+[0-9]")
 """Leading zeros make another number in YAML."""

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.scalars import wrong_kind
-from automax_ros.rack.yaml_text import Mapping, Node, Scalar
 
 Entry = tuple[Scalar, Node]
 

@@ -6,6 +6,7 @@ import re
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import quoted
+from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
@@ -13,7 +14,6 @@ from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_
 from automax_ros.rack.scalars import text_value, wrong_kind
 from automax_ros.rack.sections import Entry, Section, entries_of
 from automax_ros.rack.tasks import TaskReader
-from automax_ros.rack.yaml_text import Mapping, Node, Scalar
 
 _SLOT = re.compile(r"[0-9]{1,3}\Z")
 

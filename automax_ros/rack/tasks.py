@@ -8,13 +8,13 @@ from typing import TypeGuard
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.files import FileFault, is_inside, lies_next_to, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import NameFault, check_task_name
 from automax_ros.rack.scalars import integer_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 from automax_ros.rack.task_config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
-from automax_ros.rack.yaml_text import Node, Scalar
 
 _OTHER_TASKS = {
     ".BAS": "BASIC tasks",

@@ -182,7 +182,7 @@ METADATA = """rosbag2_bagfile_information:
         ("rosbag2_bagfile_information: 5", "AMX6813"),
         ("{{{", "AMX6813"),
         ("\0", "AMX6813"),
-        ("a: !!python/object/apply:os.system [ls]", "AMX6813"),
+        ("a: !!python/object/apply:os.system [ls]", "AMX6814"),
         (METADATA.replace("mcap\n", "sqlite3\n"), "AMX6811"),
         (METADATA + "  compression_mode: FILE\n", "AMX6811"),
         (METADATA.replace("[scans_0.mcap]", "[]"), "AMX6813"),

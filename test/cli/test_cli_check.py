@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from automax_ros.cli import terminal
 from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.text import count_of
 
 from .support import TASK, WRONG
 
@@ -304,7 +304,7 @@ def test_source_cannot_drive_the_terminal(automax):
 
 
 def test_nouns_follow_their_numbers():
-    assert [terminal.count_of(number, "error") for number in (0, 1, 2)] == ["0 errors", "1 error", "2 errors"]
+    assert [count_of(number, "error") for number in (0, 1, 2)] == ["0 errors", "1 error", "2 errors"]
 
 
 def test_name_warning_is_a_warning():

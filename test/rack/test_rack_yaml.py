@@ -7,11 +7,11 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.core.diagnostics import SourceText, render_all
+from automax_ros.core.diagnostics import render_all
+from automax_ros.core.yaml_text import MAX_DEPTH, Mapping, Node, Scalar, read_yaml
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.findings import MAX_FINDINGS, Findings
 from automax_ros.rack.loader import LoadResult, load
-from automax_ros.rack.yaml_text import MAX_DEPTH, Mapping, Node, Scalar, read_yaml
 
 from .helpers import HEAD, codes, loaded, write
 
@@ -36,7 +36,7 @@ common:
 
 def places(text: str) -> list[tuple[str, int, int, int]]:
     findings = Findings()
-    read_yaml(SourceText("rack.yaml", text), findings)
+    read_yaml(text, findings.yaml_flaw)
     return [(item.code, item.span.line, item.span.column, item.span.end_column) for item in findings.in_order()]
 
 
@@ -94,7 +94,7 @@ def test_trees_come_back_as_yaml_wrote_them(tree, flow):
     """An independent writer, PyYAML's emitter, and the reader agree."""
     text = yaml.safe_dump(tree, default_flow_style=flow, allow_unicode=True)
     findings = Findings()
-    node = read_yaml(SourceText("x", text), findings)
+    node = read_yaml(text, findings.yaml_flaw)
     if findings.errors:
         allowed = {"AMX6005"} | ({"AMX6004"} if "<<" in text else set())
         assert {item.code for item in findings.in_order()} <= allowed

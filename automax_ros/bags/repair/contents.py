@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import yaml
 from mcap.records import Channel, Schema
 
 from automax_ros.bags.metadata import FileSummary, TopicSummary
 from automax_ros.bags.schemas import is_known
+from automax_ros.core.yaml_text import YamlFault, read_data
 from automax_ros.wire.cdr import CdrError, decode, decoder
 
 SCAN, WRITE, TABLE = (f"automax_msgs/msg/{name}" for name in ("Scan", "CommonWrite", "VariableTable"))
@@ -102,9 +102,9 @@ def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
 def _qos(text: str) -> list[dict[str, object]]:
     """Return the profiles that a channel tells in YAML; what is not of their form is left out."""
     profiles: Any = None
-    if len(text) <= _MAX_QOS_TEXT and "&" not in text and "*" not in text:
-        with contextlib.suppress(yaml.YAMLError, ValueError, OverflowError, RecursionError):
-            profiles = yaml.safe_load(text)
+    if len(text) <= _MAX_QOS_TEXT:
+        with contextlib.suppress(YamlFault):
+            profiles = read_data(text, typed=True)
     if not isinstance(profiles, list):
         return []
     return [item for item in profiles[:_MAX_QOS] if isinstance(item, dict) and all(map(_is_policy, item.items()))]

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from automax_ros.core.ticks import DEFAULT_TICK_NS, tick_ns
+from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule, Module, ModuleState, Parts, Registers
 from automax_ros.rack.scalars import wrong_kind
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.task_config import TaskConfig
-from automax_ros.rack.yaml_text import Node, Scalar
 
 MAX_PROCESSORS = 4
 """Processors of one rack (J2-3106-1 p. 2-5)."""
