@@ -117,4 +117,4 @@ def _require_block_task(path: Path) -> None:
         return
     if suffix in _OTHER_TASKS:
         raise UsageError(f"{path}: {_OTHER_TASKS[suffix]} ({suffix}) are not supported yet, only {TASK_SUFFIX} tasks")
-    raise UsageError(f"{path}: a task's source is a {TASK_SUFFIX} file")
+    raise UsageError(f"{path} is not a task: a task's source is a {TASK_SUFFIX} file")
