@@ -1,7 +1,8 @@
 """CDR, the byte form of ROS 2 messages: classic (XCDR1), little-endian, as Fast DDS writes it.
 
-The functions of a type are generated from its definition at first use. Own, not rosbags' serializer: that takes 9.0 us
-for a scan of the example, with building the message, this 1.6; rclpy's needs ROS 2, without which a bag can be read.
+The functions of a type are generated from its definition at first use. Own, not rosbags' serializer: that takes 9 us
+to build and encode a scan of the example, this 2 us; rclpy's takes more than 30 us and needs ROS 2, which the library
+runs without.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from automax_ros.wire.cdr_parts import (
     together,
 )
 from automax_ros.wire.definitions import TIME, Field, message_types
-from automax_ros.wire.messages import CLASSES
+from automax_ros.wire.messages import CLASSES, NO_VALUES, Values
 
 MAX_TRAILING = 64
 """Bytes that may follow a message: ROS sizes its buffers as if padding followed empty sequences."""
@@ -185,6 +185,8 @@ def _arguments(fields: Sequence[Field], prefix: str = "") -> str:
 @functools.cache
 def _empty(type_name: str) -> Any:
     """Return the empty message of a type that has only sequences; None for other types."""
+    if CLASSES[type_name] is Values:
+        return NO_VALUES
     fields = _fields(type_name)
     return CLASSES[type_name](*[()] * len(fields)) if all(field.array for field in fields) else None
 

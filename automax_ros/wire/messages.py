@@ -22,6 +22,7 @@ class Values(NamedTuple):
 
 
 NO_VALUES = Values()
+"""The one empty Values: most messages of a recording hold it, and the codec knows it by its identity."""
 
 
 class CommonWrite(NamedTuple):

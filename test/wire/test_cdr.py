@@ -19,6 +19,7 @@ from automax_ros.wire.definitions import TIME, message_types, schema_text
 from automax_ros.wire.messages import (
     CLASSES,
     NAMES,
+    NO_VALUES,
     Bool,
     Clock,
     CommonWrite,
@@ -314,6 +315,12 @@ def test_encoders_in_one_step_refuse_what_does_not_fit() -> None:
         encode(Scan(0, 1, "A", 1, latched=values))
     with pytest.raises(CdrError, match="CommonWrite"):
         encode(CommonWrite(0, 1, 1, 1, 1, 1, values))
+
+
+def test_empty_values_are_the_one_that_the_encoder_knows() -> None:
+    scan: Any = decode("automax_msgs/msg/Scan", encode(Scan(0, 1, "A", 1, latched=Values((), (), (), ()))))
+    assert scan.latched is NO_VALUES
+    assert scan.committed is NO_VALUES
 
 
 def test_a_plain_tuple_is_as_good_as_the_class() -> None:
