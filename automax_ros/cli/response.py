@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 
@@ -134,7 +133,7 @@ def _check(arguments: argparse.Namespace) -> None:
     if arguments.points is not None and not 2 <= arguments.points <= _MOST_POINTS:
         raise UsageError(f"--points {arguments.points}: it must be 2 to {_MOST_POINTS}")
     for name, value in (("--from", arguments.low), ("--to", arguments.high), ("--duration", arguments.duration)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
+        if value is not None and value <= 0.0:
             raise UsageError(f"{name} {value:g}: it must be a number above 0")
     if arguments.low is not None and arguments.high is not None and arguments.low >= arguments.high:
         raise UsageError(f"--from {arguments.low:g} must be below --to {arguments.high:g}")

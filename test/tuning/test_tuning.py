@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import optimize, signal
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.tuning.integrate_rate import RATE_FACTOR, rate_gain, rate_limits
+from automax_ros.tuning.integrate_rate import RATE_FACTOR, Rate, RateFault, rate_gain, rate_limits
 from automax_ros.tuning.tuning import (
     Verdict,
     range_of,
@@ -330,3 +330,9 @@ def test_notch_edges_by_search():
 
     assert found.corners[0].rad_s == pytest.approx(optimize.brentq(excess, 10.0, 29.9))
     assert found.corners[2].rad_s == pytest.approx(optimize.brentq(excess, 30.1, 90.0))
+
+
+@pytest.mark.parametrize(("y", "x"), [(math.nan, 10.0), (10.0, math.inf)])
+def test_a_rate_is_made_of_numbers(y, x):
+    with pytest.raises(RateFault, match="both must be numbers"):
+        Rate.of(y, x, None)
