@@ -1,7 +1,7 @@
 """Step response and Bode diagram of one dynamic block of a task (.BLK) as it runs, rounding to counts included.
 
 The block's own step is driven from rest: by a step, and by sines over whole periods, of which OUTPUT's share at that
-frequency is the measured gain. Beside it stand its discrete design without rounding and the Laplace function. Without
+frequency is the measured gain. Next to it stand its discrete design without rounding and the Laplace function. Without
 --output tables are printed. A point that rounding leaves uncertain by 0.5 dB or more, or where the block ran into a
 limit, is marked "~" (hollow in the picture). A PID is driven in ERROR, at its LOOP_TIME.
 """

@@ -1,4 +1,4 @@
-"""The picture of ``automax response --output``: step response, gain and phase, measured beside both designs."""
+"""The picture of ``automax response --output``: step response, gain and phase, measured next to both designs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from automax_ros.tuning.response import BlockResponse, Point, followed
 _LAPLACE, _DESIGN, _MEASURED, _MARK = "#d1892f", "#1f4e9c", "black", "#7a7a7a"
 _CURVE, _STEPS, _TIMES = 300, 2000, 400
 _NEAR_A_MARK = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064)
-"""Where a curve has further points beside a corner, as shares of it: a notch is narrow."""
+"""Where a curve has further points next to a corner, as shares of it: a notch is narrow."""
 _LOWEST_DB = -100.0
 """Gains below are drawn here."""
 

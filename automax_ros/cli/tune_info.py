@@ -4,7 +4,7 @@ For every such block: Laplace and discrete transfer function, corner frequencies
 and the limits of sections 36 and 41 to 50 as numbers; what comes within 10 % of one is marked with "!". A coefficient
 that is a variable has a tunable's CURRENT, or what --set gives it.
 
---ki Y X gives the KI with which INTEGRATE gains Y counts a second at a constant INPUT of X (section 42.3). FILE, or
+--ki Y X gives the KI with which INTEGRATE gains Y counts per second at a constant INPUT of X (section 42.3). FILE, or
 --ticks with --tick-ms, tells the scan time against which it is checked.
 """
 
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ki", nargs=2, type=number, metavar=("Y", "X"), help="KI for Y counts/s at a constant INPUT of X counts"
     )
-    parser.add_argument("--ticks", type=whole_number, metavar="N", help="with --ki and no FILE: ticks a scan")
+    parser.add_argument("--ticks", type=whole_number, metavar="N", help="with --ki and no FILE: ticks per scan")
     parser.add_argument("--json", action="store_true", help="print all as JSON")
 
 

@@ -22,7 +22,7 @@ MOST_SCANS = 3_000_000
 """Scans for one frequency, transient and window together; a slower one is not measured."""
 MOST_SCANS_IN_ALL = 8_000_000
 _WINDOW = 1000
-"""Least scans in the window: so many different phases that the roundings average out."""
+"""Least scans in the window: enough different phases that the roundings average out."""
 _SHARE = 0.9
 """How much of the room up to a limit an amplitude that is chosen here takes."""
 _LEFT = 1e-6
@@ -157,7 +157,7 @@ def integral_gain(transfer: Transfer) -> float:
 
 
 def rounding_error(amplitude: float, scans: int) -> float:
-    """Return the greatest error in counts of the fundamental of a sine rounded to whole counts, over so many scans.
+    """Return the greatest error in counts of the fundamental of a sine rounded to whole counts, over this many scans.
 
     The roundings of a sine of ``a`` counts have the fundamental sum over k of 2 J1(2 pi k a) / (pi k), at most
     0.53 / sqrt(a); what single scans miss of it adds 1.22 / sqrt(scans), three standard deviations. That of any error

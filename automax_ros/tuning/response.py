@@ -1,4 +1,4 @@
-"""What ``automax response`` measures of a block, and what stands beside it."""
+"""What ``automax response`` measures of a block, and what stands next to it."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _frequencies(wanted: Range, tuning: Tuning) -> list[tuple[float, str]]:
 
 
 def _points(transfer: Transfer, wanted: Sequence[tuple[float, str]], found: Sequence[Measured | None]) -> list[Point]:
-    """Return the points; what stands beside a measurement holds at the very frequency it was made at."""
+    """Return the points; what stands next to a measurement holds at the very frequency it was made at."""
     exact = [item.rad_s if item is not None else rad_s for (rad_s, _), item in zip(wanted, found, strict=True)]
     order = sorted(range(len(exact)), key=lambda place: exact[place])
     rising = [exact[place] for place in order]

@@ -15,12 +15,12 @@ _TRUE_DIGITS = 1e-5
 
 
 def number(value: float, digits: int = 6) -> str:
-    """Return a number with so many digits at most, with an exponent only where it is very large or small."""
+    """Return a number with at most this many digits, with an exponent only where it is very large or small."""
     return f"{value:.{digits}g}"
 
 
 def fixed(value: float, places: int, sign: str = "") -> str:
-    """Return a number with so many decimal places, 0 without a minus sign; ``sign`` is a format's, such as ``+``."""
+    """Return a number with this many decimal places, 0 without a minus sign; ``sign`` is a format's, such as ``+``."""
     return f"{round(value, places) + 0.0:{sign}.{places}f}"
 
 

@@ -49,3 +49,35 @@ def test_outputs_are_a_copy():
     block = run("SUMMER")
     block.scan(input1=1, input2=1)["output"] = 99
     assert block.outputs == {"output": 2}
+
+
+@pytest.mark.parametrize(
+    ("name", "literals", "standing", "carrier"),
+    [
+        ("LAG", {}, {"wlg": 20.0}, "input"),
+        ("PROP_INT", {"wm": 3.0}, {"kp": 2.0, "wld": 4.0, "limit_plus": 900}, "input"),
+        ("PID", {"loop_time": 0.022, "action": True}, {"kp": 2.0, "ki": 1.0, "input": 50}, "feedback"),
+        ("RAMP", {"scale": 10}, {"accel_rate": 33}, "input"),
+        ("LATCH", {}, {"clock": True}, "input"),
+        ("SUMMER", {}, {"input2": 30000}, "input1"),
+    ],
+)
+def test_driving_is_scanning(name, literals, standing, carrier):
+    """Also from where a scan left the block, and back: outputs, states and error go on."""
+    one, two = run(name, 22_000_000, **literals), run(name, 22_000_000, **literals)
+    signal = [n * 7919 % 4001 - 2000 for n in range(200)]
+    if name == "LATCH":
+        signal = [value > 0 for value in signal]
+    for part in (signal[:150], signal[150:]):
+        scanned = [dict(one.scan(**standing, **{carrier: value}), **one.state) for value in part]
+        driven = [dict(zip(two.results, result, strict=False)) for result in two.drive(carrier, part, **standing)]
+        assert driven == scanned
+        assert (two.outputs, two.state, two.error) == (one.outputs, one.state, one.error)
+        assert two.scan(**standing, **{carrier: part[0]}) == one.scan(**standing, **{carrier: part[0]})
+
+
+def test_driving_needs_what_scanning_needs():
+    with pytest.raises(InstanceError, match="RAMP has no input SPEED"):
+        next(run("RAMP").drive("speed", [1]))
+    with pytest.raises(InstanceError, match="LAG needs WLG"):
+        next(run("LAG").drive("input", [1]))
