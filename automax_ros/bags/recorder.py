@@ -7,9 +7,11 @@ from pathlib import Path
 
 import automax_ros
 from automax_ros.bags.errors import RecordingError
+from automax_ros.bags.recording import Recording
 from automax_ros.bags.writer import BagWriter, StorageOptions
 from automax_ros.rack.rack import Rack
 from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.wire.rack_files import files_of
 from automax_ros.wire.stream import RackStream, Take, Topic
 
 _FIRST = EventKey(EventClass.OUTSIDE, -1, "")
@@ -30,7 +32,7 @@ class RecordingOptions:
     every_state: bool = False
 
 
-class Recorder:
+class Recorder(Recording):
     """Records one run. Make it before the rack is started; ``close`` finishes the bag.
 
     When the disk refuses, recording ends and ``failure`` tells why; the rack goes on.
@@ -42,22 +44,14 @@ class Recorder:
         Raises:
             RecordingError: the folder exists already or cannot be written.
         """
-        self.failure: RecordingError | None = None
-        self._rack, self._stream = rack, stream
         options = options or RecordingOptions()
-        config = rack.config
-        self._writer = BagWriter(
-            folder,
-            custom_data={
-                "rack": config.name,
-                "version": automax_ros.__version__,
-                "fingerprint": f"{rack.fingerprint:016x}",
-            },
-            options=options.storage,
-        )
-        self._writer.attach("rack.yaml", "application/yaml", config.text.encode())
-        for name, source in rack.sources.items():
-            self._writer.attach(f"{name}.BLK", "text/plain", source.text.encode("utf-8", "replace"))
+        provenance = {
+            "rack": rack.config.name,
+            "version": automax_ros.__version__,
+            "fingerprint": f"{rack.fingerprint:016x}",
+        }
+        super().__init__(BagWriter(folder, custom_data=provenance, options=options.storage), files_of(rack))
+        self._rack, self._stream = rack, stream
         self._split_posted = False
         self._splits_by_size = options.storage.split_bytes > 0
         if options.split_ns:
@@ -70,32 +64,11 @@ class Recorder:
 
         On the wall clock to be called every now and then; in simulated time the next message does it.
         """
-        if self.failure is None:
-            try:
-                self._writer.flush(self._stream.stamp(now_ns))
-            except RecordingError as error:
-                self.failure = error
-
-    def sync(self) -> None:
-        """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
-        self._writer.sync()
-
-    def sync_at_end(self) -> None:
-        """Wait until the disk itself has the closed bag; a disk that refuses is a ``failure`` as before."""
-        self.sync()
-        if self.failure is None:
-            try:
-                self._writer.require_synced()
-            except RecordingError as error:
-                self.failure = error
+        self._flush(self._stream.stamp(now_ns))
 
     def close(self) -> None:
-        """Finish the bag; a disk that refuses is a ``failure`` as before."""
-        if self.failure is None:
-            try:
-                self._writer.close()
-            except RecordingError as error:
-                self.failure = error
+        """Finish the bag."""
+        self._finish()
 
     def _sink(self, topic: Topic) -> Take:
         """Return what records a topic."""
@@ -122,8 +95,6 @@ class Recorder:
         self._split_posted = False
         if self.failure is not None:
             return
-        try:
+        with self._enduring():
             self._writer.split()
-        except RecordingError as error:
-            self.failure = error
         self._stream.repeat_facts(self._takes)

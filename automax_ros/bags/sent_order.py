@@ -10,6 +10,7 @@ import heapq
 from collections.abc import Iterator
 from typing import TypeVar
 
+from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import RawMessage
 from automax_ros.core.ticks import NS_PER_S
 
@@ -23,17 +24,27 @@ Source = TypeVar("Source")
 
 
 def in_sent_order(records: Iterator[tuple[Source, RawMessage]]) -> Iterator[tuple[Source, RawMessage]]:
-    """Return the messages by their times of sending; those of one time in the order in which they stand."""
+    """Return the messages by their times of sending; those of one time in the order in which they stand.
+
+    Raises:
+        BagError: ``records`` has raised it; everything before has been handed out.
+    """
     waiting: list[tuple[int, int, Source, RawMessage]] = []
     held = newest = 0
-    for number, (source, taken) in enumerate(records):
-        heapq.heappush(waiting, (taken.publish_time, number, source, taken))
-        held += len(taken.data)
-        newest = max(newest, taken.publish_time)
-        while waiting and (waiting[0][0] <= newest - HOLD_NS or len(waiting) > MOST_HELD or held > MOST_HELD_BYTES):
-            *_, its_source, record = heapq.heappop(waiting)
-            held -= len(record.data)
-            yield its_source, record
+    failure: BagError | None = None
+    try:
+        for number, (source, taken) in enumerate(records):
+            heapq.heappush(waiting, (taken.publish_time, number, source, taken))
+            held += len(taken.data)
+            newest = max(newest, taken.publish_time)
+            while waiting and (waiting[0][0] <= newest - HOLD_NS or len(waiting) > MOST_HELD or held > MOST_HELD_BYTES):
+                *_, its_source, record = heapq.heappop(waiting)
+                held -= len(record.data)
+                yield its_source, record
+    except BagError as error:  # what was read before the damage is handed out first
+        failure = error
     while waiting:
         *_, its_source, record = heapq.heappop(waiting)
         yield its_source, record
+    if failure is not None:
+        raise failure

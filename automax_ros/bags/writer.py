@@ -8,12 +8,9 @@ process loses little and no instant by half.
 from __future__ import annotations
 
 import contextlib
-import os
 import re
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import FileIO
 from pathlib import Path
 from types import TracebackType
 
@@ -21,6 +18,7 @@ from mcap.records import Attachment, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
 
 import automax_ros
+from automax_ros.bags.data_file import DataFile, sync_path
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.mcap_output import ChunkBuilder, McapOutput
 from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary, data_file_name, yaml_text
@@ -83,44 +81,6 @@ class Channel:
         self.type_name = type_name
         self.qos = qos
         self.message_count = 0
-
-
-class _DataFile:
-    """The mcap file, unbuffered; what a failed write left behind is cut off again."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._file = FileIO(path, "xb")
-        self._size = 0
-        self._lock = threading.Lock()
-
-    def write(self, data: bytes) -> int:
-        rest = memoryview(data)
-        try:
-            while rest:
-                rest = rest[self._file.write(rest) or 0 :]
-        except OSError:
-            self._file.truncate(self._size)
-            raise
-        self._size += len(data)
-        return len(data)
-
-    def tell(self) -> int:
-        return self._size
-
-    def sync(self) -> None:
-        """Wait until everything has reached the disk itself. May be called from another thread."""
-        with self._lock:
-            descriptor = -1 if self._file.closed else os.dup(self._file.fileno())
-        if descriptor >= 0:
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
-
-    def close(self) -> None:
-        with self._lock:
-            self._file.close()
 
 
 class BagWriter:
@@ -286,7 +246,7 @@ class BagWriter:
         """
         try:
             while self._finished:
-                _sync_path(self._finished.pop())
+                sync_path(self._finished.pop())
             self._file.sync()
         except OSError as error:
             self._sync_error = error
@@ -319,7 +279,7 @@ class BagWriter:
         self.require_synced()
 
     def _begin_file(self) -> None:
-        self._file = _DataFile(self.folder / data_file_name(len(self._files)))
+        self._file = DataFile(self.folder / data_file_name(len(self._files)))
         self._finished.append(self.folder)
         self._mcap = McapOutput(
             self._file,
@@ -414,21 +374,8 @@ class BagWriter:
         self._open, self._stamp = False, None
         with contextlib.suppress(OSError):
             self._file.close()
-        return self._write_error(error)
+        kept = "what was recorded so far is kept, `automax bag repair` makes a whole recording of it"
+        return self._write_error(error, f"check free space and permissions; {kept}")
 
-    def _write_error(self, error: OSError) -> RecordingError:
-        return RecordingError(
-            "AMX6801",
-            self.folder,
-            f"cannot write the recording: {error.strerror or error}",
-            "check free space and permissions; what was recorded so far is kept",
-        )
-
-
-def _sync_path(path: Path) -> None:
-    """Wait until a file or folder is on the disk itself."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    def _write_error(self, error: OSError, hint: str = "check free space and permissions") -> RecordingError:
+        return RecordingError("AMX6801", self.folder, f"cannot write the recording: {error.strerror or error}", hint)

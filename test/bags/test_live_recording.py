@@ -452,7 +452,7 @@ def test_full_disk_ends_the_recording(wire, tmp_path, monkeypatch):
     def refuse(*_: object) -> int:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(writer._DataFile, "write", refuse)
+    monkeypatch.setattr(writer.DataFile, "write", refuse)
     recording.flush(10_000_000_000)
     assert recording.failure is not None
     assert "No space left" in str(recording.failure)

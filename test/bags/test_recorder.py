@@ -192,7 +192,7 @@ def test_full_disk_ends_the_recording_and_not_the_rack(tmp_path, monkeypatch):
     def refuse(_: Any, __: bytes) -> int:
         raise OSError(28, "full")
 
-    monkeypatch.setattr(writer._DataFile, "write", refuse)
+    monkeypatch.setattr(writer.DataFile, "write", refuse)
     rack.run(3.0)
     assert recorder.failure is not None
     assert "full" in str(recorder.failure)

@@ -263,8 +263,8 @@ def test_recording_that_breaks_off_is_told_and_the_run_goes_on(run, automax, mon
             raise OSError(28, "No space left on device")
         return original(self, data)
 
-    original = writer._DataFile.write
-    monkeypatch.setattr(writer._DataFile, "write", full)
+    original = writer.DataFile.write
+    monkeypatch.setattr(writer.DataFile, "write", full)
     result = run("--duration", "100", "--record", "bag")
     assert result.code == 1
     assert "ran 100.000 s" in result.out

@@ -17,6 +17,8 @@ from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.provenance import provenance
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
 from automax_ros.bags.live.tracks import Gap, TaskTrack
+from automax_ros.bags.recording import Recording
+from automax_ros.bags.write_log import WriteLog
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
 from automax_ros.core.kinds import WriterKind
 from automax_ros.wire.cdr import CdrError, decode
@@ -33,7 +35,7 @@ _RESTARTED = "the rack was started again"
 _MALFORMED_NAMED = 3
 
 
-class LiveRecording:
+class LiveRecording(Recording):
     """One recording of a running rack; ``take`` every message in order, ``close`` finishes the bag.
 
     ``failure`` tells why the disk ended the recording, ``ended`` why the rack did; both None while all is well.
@@ -59,7 +61,8 @@ class LiveRecording:
             RecordingError: the folder exists already or cannot be written.
             CdrError: the table is malformed.
         """
-        self.failure: RecordingError | None = None
+        self._facts: VariableTable = _decoded(table)
+        super().__init__(BagWriter(folder, options=storage), files)
         self.ended: str | None = None
         self.notes: list[str] = []
         self.gaps: list[Gap] = []
@@ -68,13 +71,11 @@ class LiveRecording:
         self.last_stamp = 0
         self.replayable_from: int | None = None
         self._topics, self._table, self._files = topics, table, files
-        self._facts: VariableTable = _decoded(table)
-        self._run_id = self._facts.run_id
+        self._log = WriteLog(self._facts.run_id)
         names = [writer.name for writer in self._facts.writers if writer.kind == WriterKind.TASK]
         self._tasks = {name: TaskTrack() for name in names if tasks is None or name in tasks}
         self._wrong_sources: list[str] = []
         self._recording = False
-        self._sequence = 0
         self._image: tuple[int, WriteHead, bytes] | None = None
         self._pending: list[tuple[str, int, bytes]] = []
         self._proven_ns = 0
@@ -95,9 +96,6 @@ class LiveRecording:
             topics.states: self._record_state,
             **dict.fromkeys(topics.values, self._record_value),
         }
-        self._writer = BagWriter(folder, options=storage)
-        for file in files:
-            self._writer.attach(file.name, file.media_type, file.data)
         self._channels: dict[str, Channel] = {
             name: self._writer.channel(name, kind.type_name, kind.qos) for name, kind in topics.all.items()
         }
@@ -148,41 +146,19 @@ class LiveRecording:
 
     def flush(self, passed_ns: int) -> None:
         """Hand what is recorded to the operating system if its time is over: so long ago came the last message."""
-        if self.failure is None:
-            try:
-                self._writer.flush(self.last_stamp + passed_ns)
-            except RecordingError as error:
-                self.failure = error
-
-    def sync(self) -> None:
-        """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
-        self._writer.sync()
-
-    def sync_at_end(self) -> None:
-        """Wait until the disk itself has the closed bag; a disk that refuses is a ``failure``."""
-        self.sync()
-        if self.failure is None:
-            try:
-                self._writer.require_synced()
-            except RecordingError as error:
-                self.failure = error
+        self._flush(self.last_stamp + passed_ns)
 
     def close(self) -> None:
-        """Finish the bag; a disk that refuses is a ``failure``."""
+        """Finish the bag."""
         if self.failure is None and self.ended is None:
-            try:
+            with self._enduring():
                 self._settle(at_end=True)
-            except RecordingError as error:
-                self.failure = error
         if self.failure is None:
             replayable_s = None if self.replayable_from is None else self.seconds(self.replayable_from)
             gaps = [f"{self.seconds(gap.stamp):.6f} s: {gap}" for gap in self.gaps]
             data = provenance(self._facts.rack, self._files, self.lacks, replayable_s, gaps, self.ended)
             self._writer.custom_data.update(data)
-            try:
-                self._writer.close()
-            except RecordingError as error:
-                self.failure = error
+            self._finish()
 
     def _take_table(self, topic: str, sent_ns: int, payload: bytes) -> None:  # noqa: ARG002
         self._check_run(_decoded(payload).run_id)
@@ -193,15 +169,16 @@ class LiveRecording:
             return
         if self._image is not None and head.sequence == self._image[1].sequence:
             self._begin()  # no write came between the two, so none is missing
-        if self._recording and head.sequence <= self._sequence:
-            if head.sequence == self._sequence:
+        missing = self._log.missing(head.sequence, image=True)
+        if self._recording and missing <= 0:
+            if not missing:
                 self._prove(sent_ns)
                 if self._split_due:
                     self._split(head.stamp)
                 self._write(topic, sent_ns, head.stamp, payload)
             return
         if self._recording:
-            self._rest(head.stamp, head.sequence - self._sequence)
+            self._rest(head.stamp, missing)
         self._drop_pending()
         self._image, self._proven_ns = (sent_ns, head, payload), sent_ns
 
@@ -216,13 +193,14 @@ class LiveRecording:
             elif head.sequence > image:
                 self._image = None
                 self._drop_pending()
-        if not self._recording or head.sequence <= self._sequence:
+        missing = self._log.missing(head.sequence, image=False)
+        if not self._recording or missing < 0:
             return
-        if head.sequence != self._sequence + 1:
-            self._rest(head.stamp, head.sequence - self._sequence - 1)
+        if missing:
+            self._rest(head.stamp, missing)
             return
         self._prove(sent_ns)
-        self._sequence = head.sequence
+        self._log.sequence = head.sequence
         self.writes += 1
         self._write(topic, sent_ns, head.stamp, payload)
 
@@ -332,8 +310,9 @@ class LiveRecording:
         if self._open_gap is not None:
             # By now it is known how many writes the bag lacks: those that did not come, and those before the image.
             number, self._open_gap = self._open_gap, None
-            self.gaps[number] = replace(self.gaps[number], missing=head.sequence - self._sequence)
-        self._recording, self._sequence = True, head.sequence
+            missing = self._log.missing(head.sequence, image=True)
+            self.gaps[number] = replace(self.gaps[number], missing=missing)
+        self._recording, self._log.sequence = True, head.sequence
         if self.first_stamp is None:
             self.first_stamp = head.stamp
             self._plan_split(head.stamp)
@@ -385,9 +364,9 @@ class LiveRecording:
 
     def _check_run(self, run_id: int) -> bool:
         """Return whether a message is one of this run of the rack; a message of another run ends the recording."""
-        if run_id != self._run_id:
+        if run_id != self._log.run_id:
             self._end(_RESTARTED)
-        return run_id == self._run_id
+        return run_id == self._log.run_id
 
     def _end(self, reason: str) -> None:
         """End the recording with what still waits of this run."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from io import FileIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +10,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 import automax_ros
+from automax_ros.bags.data_file import DataFile
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder, McapOutput
 from automax_ros.bags.metadata import BagMetadata, yaml_text
@@ -24,22 +24,6 @@ from automax_ros.wire.cdr import CdrError, decode
 _LOOSE_BYTES = 1 << 20
 """Messages that stood outside of chunks are gathered in chunks of this size."""
 _OWN = "automax_msgs/msg/"
-
-
-class _Whole:
-    """A file that takes all that is written."""
-
-    def __init__(self, file: FileIO) -> None:
-        self._file = file
-
-    def write(self, data: bytes) -> int:
-        rest = memoryview(data)
-        while rest:
-            rest = rest[self._file.write(rest) or 0 :]
-        return len(data)
-
-    def tell(self) -> int:
-        return self._file.tell()
 
 
 class Found(NamedTuple):
@@ -107,9 +91,9 @@ class Rewriting:
         self._salvage = salvage
         self._provenance = provenance
         self._loose = ChunkBuilder()
-        self._file = FileIO(target, "xb")
+        self._file = DataFile(target)
         self._output = McapOutput(
-            _Whole(self._file), library=f"automax_ros {automax_ros.__version__}", compression=definitions.compression
+            self._file, library=f"automax_ros {automax_ros.__version__}", compression=definitions.compression
         )
         self._output.schemas, self._output.channels = definitions.schemas, definitions.channels
 

@@ -1,0 +1,57 @@
+"""What the recorder of a rack of ours and that of a rack elsewhere have in common: a bag that may fail and says why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+from automax_ros.bags.errors import RecordingError
+from automax_ros.bags.writer import BagWriter
+from automax_ros.wire.rack_files import RackFile
+
+
+class Recording:
+    """A bag being recorded, with the rack's files in it.
+
+    When the disk refuses, recording ends and ``failure`` says why; whoever sends the messages goes on.
+    """
+
+    def __init__(self, writer: BagWriter, files: Iterable[RackFile]) -> None:
+        """Store the files.
+
+        Raises:
+            RecordingError: the disk refuses at once.
+        """
+        self.failure: RecordingError | None = None
+        self._writer = writer
+        for file in files:
+            writer.attach(file.name, file.media_type, file.data)
+
+    def sync(self) -> None:
+        """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
+        self._writer.sync()
+
+    def sync_at_end(self) -> None:
+        """Wait until the disk itself has the closed bag."""
+        self.sync()
+        with self._enduring():
+            self._writer.require_synced()
+
+    @contextmanager
+    def _enduring(self) -> Iterator[None]:
+        """Let a disk that refuses end the recording; once it has, that stays the failure."""
+        try:
+            yield
+        except RecordingError as error:
+            self.failure = self.failure or error
+
+    def _flush(self, stamp: int) -> None:
+        """Hand the open chunk to the operating system if its time is over at a stamp."""
+        if self.failure is None:
+            with self._enduring():
+                self._writer.flush(stamp)
+
+    def _finish(self) -> None:
+        if self.failure is None:
+            with self._enduring():
+                self._writer.close()
