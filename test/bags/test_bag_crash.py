@@ -110,7 +110,7 @@ def assert_moments(folder: Path, first: int, last: int) -> None:
     for number, (seconds, options) in enumerate(moments(first, last)):
         here = folder / f"run{number}"
         here.mkdir()
-        end = killed_after(here, seconds, "--simulated", *options)
+        end = killed_after(here, seconds, "--simulated", "--duration", "1000000", *options)
         report = assert_little_is_lost(here / "bag", end)
         kept += [report] if report is not None else []
     assert len(kept) >= (last - first) // 2

@@ -21,6 +21,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from automax_ros.bags import data_file
 from automax_ros.bags import writer as writer_module
 from automax_ros.bags.errors import BagError, RecordingError
 from automax_ros.bags.reader import BagReader
@@ -250,7 +251,7 @@ def test_chunks_end_by_size(tmp_path: Path) -> None:
 
 def test_log_times_increase_and_stamps_are_kept(tmp_path: Path) -> None:
     stamps = [0, 0, 0, 5, 5, 6, 3, 1_000_000_000, 999_999_999, 1_000_000_002]
-    with BagWriter(tmp_path / "a") as writer:
+    with BagWriter(tmp_path / "a", custom_data={"version": "0.1.0"}) as writer:
         channel = writer.channel("/a", INT16, VALUE)
         for stamp in stamps:
             writer.write(channel, stamp, encode(Int16(1)))
@@ -315,7 +316,7 @@ def test_an_exception_of_the_caller_still_finishes_the_recording(tmp_path: Path)
 
 
 def test_a_full_disk_is_reported_and_keeps_whole_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class FullDisk(writer_module.FileIO):
+    class FullDisk(data_file.FileIO):
         room = 3000
 
         def write(self, data: Any) -> int:
@@ -325,7 +326,7 @@ def test_a_full_disk_is_reported_and_keeps_whole_chunks(tmp_path: Path, monkeypa
                 return super().write(data[: self.room - self.tell()])
             return super().write(data)
 
-    monkeypatch.setattr(writer_module, "FileIO", FullDisk)
+    monkeypatch.setattr(data_file, "FileIO", FullDisk)
     writer = BagWriter(tmp_path / "a")
     channel = writer.channel("/a", INT16, VALUE)
 

@@ -34,6 +34,9 @@ class RecordedMemory:
     def view(self, name: str) -> int:
         return self._views[name]
 
+    def is_forced(self, view: int) -> bool:  # noqa: ARG002
+        return False
+
     def watch_forces(self, changed: object) -> None:
         """Nothing is forced in the runs that are executed again here."""
 
