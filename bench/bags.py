@@ -78,7 +78,7 @@ def print_recording(folder: Path) -> None:
     bag, table_file = folder / "bag", folder / "out.csv"
     print_rate("write", timeit.timeit(lambda: record(bag, payloads, table), number=1), size)
     on_disk = sum(path.stat().st_size for path in bag.iterdir())
-    print(f"{'on disk':28}{on_disk / MESSAGES:12.1f} bytes a message of {size / MESSAGES:.0f}")
+    print(f"{'on disk':28}{on_disk / MESSAGES:12.1f} bytes per message of {size / MESSAGES:.0f}")
     print_rate("read", timeit.timeit(lambda: sum(1 for _ in BagReader(bag).messages()), number=1), size)
     print_rate("export 10 variables to CSV", timeit.timeit(lambda: export_csv(bag, table_file), number=1), size)
 

@@ -58,7 +58,7 @@ def plant(rack: Rack, step: int) -> None:
 
 
 def record(config: RackConfig, bag: Path, moves: Callable[[Rack, int], None] | None) -> float:
-    """Record a run; return the scans a second of rack time."""
+    """Record a run; return the scans per second of rack time."""
     rack = Rack(config)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, bag)

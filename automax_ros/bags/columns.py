@@ -33,7 +33,7 @@ class Table(Protocol):
 
     @property
     def columns(self) -> Sequence[Column]:
-        """The columns behind the time."""
+        """The columns after the time."""
 
     def rows(self) -> Iterator[tuple[int, Mapping[int, Cell | None]]]:
         """The rows, to be read once."""

@@ -1,4 +1,4 @@
-"""Recordings as NumPy files (.npz): one array a column, the same rows as the CSV table."""
+"""Recordings as NumPy files (.npz): one array per column, the same rows as the CSV table."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from automax_ros.core.types import DataType, type_of_name
 from automax_ros.wire.messages import TaskState
 
 NOT_COMMON = -1
-"""``Watched.variable`` of a column that is no common variable."""
+"""``Watched.variable`` of a column that is not a common variable."""
 _NAME = re.compile(r"(?P<task>[A-Z][A-Z0-9_]{0,63})\.(?P<field>[^()\[\]]{1,80}?) ?(?:[(\[](?P<index>\d{1,9})[)\]])?")
 _HINT = "write TASK.NAME, such as SPEED.RATIO%, or TASK.NAME(3) for an element"
 
@@ -43,7 +43,7 @@ class WatchedLocals:
         """Watch one more local, in the column of that index unless it has one already; return its description."""
         match = _NAME.fullmatch(" ".join(asked.upper().split()))
         if match is None:
-            raise BagError("AMX6821", self._bag, f"{asked[:80]!r} is no name of a local", _HINT)
+            raise BagError("AMX6821", self._bag, f"{asked[:80]!r} is not a name of a local", _HINT)
         task, field, index = match["task"], match["field"], int(match["index"] or 0)
         kind = type_of_name(field)
         if kind is DataType.STRING:
@@ -80,7 +80,7 @@ class WatchedLocals:
         missing = [task for task in self._asked if task not in self._places]
         if missing:
             hint = f"it tells those of {', '.join(list(self._places)[:8])}" if self._places else ""
-            raise BagError("AMX6827", self._bag, f"tells no states of a task {missing[0][:40]!r}", hint)
+            raise BagError("AMX6827", self._bag, f"holds no states of a task {missing[0][:40]!r}", hint)
 
     def _found(self, state: TaskState, asked: Sequence[tuple[int, str, int]]) -> list[tuple[int, int]]:
         """Where the fields that were asked for stand in the values of a state: (column, place)."""

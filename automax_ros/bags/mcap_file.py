@@ -105,7 +105,7 @@ class McapFile:
         self._read_summary(file)
 
     def _read_summary(self, file: BinaryIO) -> None:
-        """Read what stands behind the data; only its checksum and its end matter here."""
+        """Read what stands after the data; only its checksum and its end matter here."""
         self._crc = 0
         opcode: int = Opcode.DATA_END
         while opcode != Opcode.FOOTER:

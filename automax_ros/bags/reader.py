@@ -27,8 +27,7 @@ _MAX_YAML_NODES = 2_000_000
 """More keys and values than MAX_METADATA_BYTES hold."""
 _MAX_FILES = 10_000
 _PROGRESS_MASK = 0x3FF
-"""Progress is told once in so many records."""
-"""Leaves every scalar a string: numbers and dates of a hostile file cost nothing."""
+"""Progress is reported once per this many records."""
 
 
 class BagMessage(NamedTuple):
@@ -322,7 +321,7 @@ def _data_files(folder: Path, information: dict[str, Any]) -> list[Path]:
             )
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
-        hint = "`automax bag repair` writes metadata.yaml anew"
+        hint = "`automax bag repair` writes metadata.yaml again"
         raise BagError("AMX6813", folder / METADATA_FILE, f"lists the data file {twice[:80]!r} twice", hint)
     missing = next((name for name in names if not (folder / name).is_file()), None)
     if missing is not None:

@@ -23,7 +23,7 @@ class RecordingOptions:
     """What is recorded, and into how many files.
 
     A file ends at each multiple of ``split_ns`` of rack time, 0 for never. ``tasks`` are those whose scans and states
-    are recorded, None for all; common memory is always recorded whole. ``every_state``: a state behind each such scan.
+    are recorded, None for all; common memory is always recorded whole. ``every_state``: a state after each such scan.
     """
 
     storage: StorageOptions = field(default_factory=StorageOptions)

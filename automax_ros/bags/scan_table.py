@@ -29,7 +29,7 @@ _OWN = (
 
 
 class ScanTable:
-    """The scans of one task: a row a scan from scan 1 on, in the window.
+    """The scans of one task: one row per scan from scan 1 on, in the window.
 
     Columns: ``scan``, ``duration_ns``, ``skipped``, ``errors`` (how many), ``error_line``, ``error_code`` (of the
     first), then ``in.NAME`` for each variable that the task latches and ``out.NAME`` for each that its END writes back.
@@ -55,7 +55,7 @@ class ScanTable:
 
     @property
     def columns(self) -> Sequence[Column]:
-        """The columns behind the time."""
+        """The columns after the time."""
         return self._columns
 
     def rows(self) -> Iterator[tuple[int, Mapping[int, Cell | None]]]:

@@ -102,7 +102,7 @@ class Series:
         if not found and self.columns:
             last = f"the recording ends at {seconds_text(self.end_ns)} s"
             start = seconds_text(self._window.start_ns)
-            raise BagError("AMX6825", self._bag, f"tells nothing from {start} s on, in the range asked for", last)
+            raise BagError("AMX6825", self._bag, f"holds no value from {start} s on, in the range asked for", last)
 
     def _watched(self, variables: dict[str, Variable], watch: Sequence[str] | None) -> list[Watched]:
         if watch is None:

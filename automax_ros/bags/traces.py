@@ -19,7 +19,7 @@ from automax_ros.core.types import DataType
 from automax_ros.wire.messages import Scan
 
 MAX_POINTS = 1 << 16
-"""As many points of a line are kept as they are; a longer one is thinned to four points a column."""
+"""As many points of a line are kept as they are; a longer one is thinned to four points per column."""
 COLUMNS = 1 << 12
 """Columns that a line is thinned to: no picture is wider."""
 MAX_LINES = 64

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: written under another name beside their place, renamed at the end."""
+"""Files that are there whole or not at all: written under another name next to their place, renamed at the end."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ def written_whole(path: Path) -> Iterator[Path]:
         return
     target = Path(os.path.realpath(path))  # a link stays a link
     mode = _mode_of(target)
-    beside = _new_file_beside(target, path.suffix)
+    temporary = _new_file_next_to(target, path.suffix)
     try:
         if mode is not None:
-            beside.chmod(mode)
-        yield beside
-        os.replace(beside, target)
+            temporary.chmod(mode)
+        yield temporary
+        os.replace(temporary, target)
     except BaseException:
         with contextlib.suppress(OSError):
-            beside.unlink()
+            temporary.unlink()
         raise
 
 
@@ -58,12 +58,12 @@ def _mode_of(target: Path) -> int | None:
     return mode
 
 
-def _new_file_beside(target: Path, suffix: str) -> Path:
+def _new_file_next_to(target: Path, suffix: str) -> Path:
     if len(suffix) > _LONGEST_SUFFIX:
         suffix = ""
     for number in range(_MOST_TRIES):
-        beside = target.with_name(f".automax-{os.getpid()}-{number}{suffix}")
+        temporary = target.with_name(f".automax-{os.getpid()}-{number}{suffix}")
         with contextlib.suppress(FileExistsError):
-            os.close(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-            return beside
+            os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+            return temporary
     raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target))

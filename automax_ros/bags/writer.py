@@ -61,7 +61,7 @@ class StorageOptions:
             ValueError: an unknown compression, or a size or time out of range.
         """
         if self.compression not in COMPRESSIONS:
-            raise ValueError(f"{self.compression!r} is no compression: there are {', '.join(COMPRESSIONS)}")
+            raise ValueError(f"{self.compression!r} is not a compression: there are {', '.join(COMPRESSIONS)}")
         if self.split_bytes and self.split_bytes < MIN_SPLIT_BYTES:
             raise ValueError(
                 f"files of {self.split_bytes} bytes are too small: at least {MIN_SPLIT_BYTES}, or 0 for no limit"
@@ -147,7 +147,7 @@ class BagWriter:
         """Return the channel of a topic; the first call for a topic makes it.
 
         Raises:
-            RecordingError: the topic is no ROS name or has another type already, or recordings do not know the type.
+            RecordingError: the topic is not a ROS name or has another type already, or recordings do not know the type.
         """
         channel = self._channels.get(topic)
         if channel is not None:
@@ -172,7 +172,7 @@ class BagWriter:
     def write(self, channel: Channel, stamp: int, payload: bytes) -> None:
         """Add a message (CDR bytes) at a time in nanoseconds; messages of one time belong to one instant.
 
-        Its log time is the stamp, or one nanosecond behind the message before if that is later: log times increase.
+        Its log time is the stamp, or one nanosecond after the message before if that is later: log times increase.
 
         Raises:
             RecordingError: time or length out of range, writer closed, or the disk refuses.
@@ -295,7 +295,7 @@ class BagWriter:
             self._define(definition)
 
     def _finish_file(self) -> None:
-        """Write what is behind the messages of a file: description, index, summary."""
+        """Write what is after the messages of a file: description, index, summary."""
         self._end_chunk()
         statistics = self._mcap.statistics
         start, end = statistics.message_start_time, statistics.message_end_time

@@ -1,4 +1,4 @@
-"""The control blocks of J-3676-5, a family a file; each is declared once as data plus one step function."""
+"""The control blocks of J-3676-5, one family per file; each is declared once as data plus one step function."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def sampled_average_step(
     shown_highest: int,
     shown_lowest: int,
 ) -> tuple[bool, int, int, int, int, int, int, int, int, int, int]:
-    """Average samples until there are enough, show the result, begin anew; the quotient truncates toward zero (27).
+    """Average samples until there are enough, show the result, begin again; the quotient truncates toward zero (27).
 
     A REQUIRED_SAMPLES that changes meanwhile is compared with the samples taken so far, whose average is shown. Up to
     the first update the outputs are what RESET makes them (decisions).

@@ -10,7 +10,7 @@ from automax_ros.core.numbers import stored_real
 
 TWO_TO_MINUS_18 = 2.0**-18
 LARGEST_HISTORY = 2.0**31
-"""A filter of second order or more whose history leaves 32 bits starts anew from the edge of 16 bits (decision).
+"""A filter of second order or more whose history leaves 32 bits starts again from the edge of 16 bits (decision).
 No signal comes near it, but coefficients that change all the time can make such a filter grow without end."""
 
 

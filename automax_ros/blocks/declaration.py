@@ -247,7 +247,7 @@ class Relation:
 
 @dataclass(frozen=True)
 class Coefficients:
-    """What a dynamic block computes outside its step function, once and again when a variable parameter changes.
+    """What a dynamic block computes outside its step function, at first and again when a variable parameter changes.
 
     ``parameters`` are the inputs they come from; ``names`` the values handed to the step function;
     ``compute(period_s, values)`` returns them, from parameters already limited. A parameter that is not programmed,

@@ -15,7 +15,7 @@ _PLACE_HOLDERS = {DataType.REAL: "nnn.n", DataType.BOOLEAN: "TRUE", DataType.STR
 
 
 def summary(blocks: Iterable[Block]) -> str:
-    """Return one line a block: name, section of the manual, what it does."""
+    """Return one line per block: name, section of the manual, what it does."""
     rows = [(block.name, block.section, block.title, block.function) for block in blocks]
     return "".join(f"{row}\n" for row in _table(rows))
 

@@ -39,7 +39,7 @@ class Example:
 
 
 def table_of(example: Example) -> list[list[str]]:
-    """Run an example and return its table: a head of names, then a row a scan."""
+    """Run an example and return its table: a head of names, then one row per scan."""
     shift_names = [f"SHIFT: {name}" for name in example.shift]
     rows = [["scan", *shift_names, *example.varied, *example.shown]]
     instance, maker = _instances(example)

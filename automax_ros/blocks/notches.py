@@ -197,7 +197,7 @@ def notchn_step(
     y3: float,
     y4: float,
 ) -> tuple[int, int, int, int, int, float, float, float, float]:
-    """Direct form I; only the output is clamped; a history beyond ``LARGEST_HISTORY`` starts anew (decision).
+    """Direct form I; only the output is clamped; a history beyond ``LARGEST_HISTORY`` starts again (decision).
 
     Order 4 is D D y = N N x with polynomials N and D of second order. It is taken step by step, P = D y and Q = N x,
     since the coefficients of D D would miss where its poles lie. While RESET is TRUE all of INPUT's history

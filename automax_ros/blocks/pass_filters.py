@@ -77,7 +77,7 @@ def pass_filter_step(
 ) -> tuple[int, int, int, int, float, float, float]:
     """Direct form I; b1 to b3 are whole, so that a constant INPUT sums up exactly; only the output is clamped.
 
-    A history beyond ``LARGEST_HISTORY`` starts anew from the edge of 16 bits (decision).
+    A history beyond ``LARGEST_HISTORY`` starts again from the edge of 16 bits (decision).
     While RESET is TRUE all of INPUT's history is INPUT, all of OUTPUT's INITIAL_VALUE: no step follows (decision).
     """
     if reset:

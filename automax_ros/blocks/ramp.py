@@ -63,7 +63,7 @@ RAMP = Block(
     name="RAMP",
     section="22",
     title="Ramp",
-    function="OUTPUT moves toward INPUT by at most ACCEL_RATE / SCALE or DECEL_RATE / SCALE counts a scan",
+    function="OUTPUT moves toward INPUT by at most ACCEL_RATE / SCALE or DECEL_RATE / SCALE counts per scan",
     inputs=(
         Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
         Input(
@@ -83,7 +83,7 @@ RAMP = Block(
             "SCALE",
             DataType.INTEGER,
             "SC",
-            "divides both rates: with scans a second here they are in counts/s",
+            "divides both rates: with scans per second here they are in counts/s",
             default=1,
             form=Form.LITERAL,
             low=1,

@@ -116,7 +116,7 @@ S_CURVE = Block(
             "SCALE",
             DataType.INTEGER,
             "SC",
-            "divides the rates and the jerk rate: with scans a second here the rates are in counts/s",
+            "divides the rates and the jerk rate: with scans per second here the rates are in counts/s",
             default=1,
             form=Form.LITERAL,
             low=1,

@@ -158,7 +158,7 @@ def _words(facts: Mapping[str, Value]) -> int:
 _NOTES = (
     "What enters on one shift leaves MCOL - 1 shifts later.",
     "Without a shift the outputs are not written.",
-    "READ and WRITE blocks of the same task, before or behind it, work on the same data structure.",
+    "READ and WRITE blocks of the same task, before or after it, work on the same data structure.",
 )
 
 SHIFT_BITS = Block(

@@ -34,7 +34,7 @@ def _head(content: Mapping[str, Any]) -> list[str]:
     if content["compression"]:
         size += f", chunks compressed {content['compression']:.1f} : 1"
     if content["bytes_per_scan"]:
-        size += f", {content['bytes_per_scan']:.0f} bytes a scan"
+        size += f", {content['bytes_per_scan']:.0f} bytes per scan"
     return [
         f"{printable(content['bag'])}: {rack}",
         f"  {_when(content)}",

@@ -2,7 +2,7 @@
 
 The recording itself is never changed: what can be saved goes into a new folder, with index, summary and
 metadata.yaml, and what was lost is told. A sound recording is left alone. Exit code 0: the recording is sound, or a
-repaired one stands beside it; 2: nothing of it can be used.
+repaired one stands next to it; 2: nothing of it can be used.
 """
 
 from __future__ import annotations

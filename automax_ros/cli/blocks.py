@@ -1,4 +1,4 @@
-"""Describe the control blocks: one line a block; with NAME all about one, ending with a template to paste."""
+"""Describe the control blocks: one line per block; with NAME all about one, ending with a template to paste."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ def _overlap(one: Span, other: Span) -> bool:
 
 
 def _note(span: Span, text: str, lines: list[str], source: SourceText) -> dict[str, object]:
-    """Return the object that marks a form which no source confirms: it is no problem and has no code."""
+    """Return the object that marks a form which no source confirms: it is not a problem and has no code."""
     return {
         "file": source.name,
         **dataclasses.asdict(span),
@@ -192,7 +192,7 @@ def _note(span: Span, text: str, lines: list[str], source: SourceText) -> dict[s
 
 
 def _statement(line: int, lines: list[str]) -> int | None:
-    """Return the BASIC line number in force on a physical line; lines behind an ``&`` have none of their own."""
+    """Return the BASIC line number in force on a physical line; lines after an ``&`` have none of their own."""
     while line > 1 and lines[line - 2].rstrip().endswith("&"):
         line -= 1
     number = _LINE_NUMBER.match(lines[line - 1])

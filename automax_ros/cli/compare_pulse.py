@@ -1,9 +1,9 @@
 """Run PULSE_MULT and the Logix PMUL that takes its place over the same feedback, and print where they differ.
 
-FEEDBACK.csv has a header and then a row a scan, such as the output of `automax trace` or a logger's table. A cell is an
-INTEGER; an empty one repeats the row before, at first 0 (resets: FALSE). --word-size and --multiplier are those of the
-CALL PULSE_MULT; left out they are its defaults, 0 (absolute mode) and a gain of exactly 1. Exit code: 0 no difference,
-1 differences, 2 wrong usage or unreadable file.
+FEEDBACK.csv has a header and then one row per scan, such as the output of `automax trace` or a logger's table. A cell
+is an INTEGER; an empty one repeats the row before, at first 0 (resets: FALSE). --word-size and --multiplier are those
+of the CALL PULSE_MULT; left out they are its defaults, 0 (absolute mode) and a gain of exactly 1. Exit code: 0 no
+difference, 1 differences, 2 wrong usage or unreadable file.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ _HEADER = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax compare pulse``."""
-    parser.add_argument("--input", type=Path, required=True, metavar="FEEDBACK.csv", help="the feedback, a row a scan")
+    parser.add_argument(
+        "--input", type=Path, required=True, metavar="FEEDBACK.csv", help="the feedback, one row per scan"
+    )
     parser.add_argument("--column", metavar="NAME", help="its column (not needed where there is only one)")
     parser.add_argument("--reset", metavar="NAME", help="a column of 0 and 1 for RESET and Initialize")
     parser.add_argument("--word-size", default="0", metavar="N", help="WORD_SIZE, 0 or 2 to 16 (default: 0)")
@@ -182,7 +184,7 @@ def _scans(table: CsvTable, columns: _Columns) -> Iterator[tuple[int, bool]]:
     """Yield feedback and reset of each row.
 
     Raises:
-        CsvFault: a cell of these columns is no INTEGER or no BOOLEAN, or a row is at fault.
+        CsvFault: a cell of these columns is not an INTEGER or not a BOOLEAN, or a row is at fault.
     """
     feedback, reset = 0, False
     for line, cells in table.numbered_rows():

@@ -1,4 +1,4 @@
-"""A CSV table that a subcommand reads: a header with names of variables, then a row a scan, one line each.
+"""A CSV table that a subcommand reads: a header with names of variables, then one row per scan, a line each.
 
 The table is read line by line, so that one of millions of rows takes no more memory than one of ten.
 """
@@ -49,7 +49,7 @@ class CsvTable:
 
         Raises:
             UsageError: the file cannot be read.
-            CsvFault: the header is no line of CSV.
+            CsvFault: the header is not a line of CSV.
         """
         self.path = path
         self.separator = ","
@@ -91,7 +91,7 @@ class CsvTable:
     def numbered_rows(self) -> Iterator[tuple[int, list[str]]]:
         """Yield each row's line and its cells, as many as the header has.
 
-        Empty lines at the end are no rows; in a table of one column an empty line before is a row with an empty cell.
+        Empty lines at the end are not rows; in a table of one column an empty line before is a row with an empty cell.
 
         Raises:
             UsageError: the file cannot be read any more.

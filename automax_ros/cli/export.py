@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         help="the table to write: OUT.csv, or OUT.npz for NumPy",
     )
-    add_watch_argument(parser, "every simple common that is no string")
+    add_watch_argument(parser, "every simple common that is not a string")
     parser.add_argument("--scans", metavar="TASK", help="the scans of a task instead of common memory")
     add_window_arguments(parser)
     add_grid_argument(parser)

@@ -30,7 +30,7 @@ SUBCOMMANDS: dict[str, str] = {
     "bag": "tell what a recording holds, repair one",
     "export": "write common memory or scans of a recording to a table",
     "plot": "draw variables of a recording",
-    "compare": "run a block beside the Logix instruction it becomes",
+    "compare": "compare a block with the Logix instruction that replaces it",
     "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
     "explain": "say what a problem code means and how to cure it",

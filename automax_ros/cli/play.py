@@ -228,5 +228,5 @@ def _namespace(text: str | None) -> str | None:
     if text is None:
         return None
     if not _SPACE.fullmatch(text) or "__" in text:
-        raise UsageError(f"--namespace: {quoted(text)} is no ROS namespace")
+        raise UsageError(f"--namespace: {quoted(text)} is not a ROS namespace")
     return "/" + text.strip("/")

@@ -76,5 +76,5 @@ def _size(text: str) -> tuple[int, int]:
         if size[0] in _SIZES_PX and size[1] in _SIZES_PX:
             return size
     raise argparse.ArgumentTypeError(
-        f"{text[:40]!r} is no size: WIDTHxHEIGHT in pixels, {_SIZES_PX.start} to {_SIZES_PX.stop - 1} each"
+        f"{text[:40]!r} is not a size: WIDTHxHEIGHT in pixels, {_SIZES_PX.start} to {_SIZES_PX.stop - 1} each"
     )

@@ -22,9 +22,9 @@ _ANALOG_IN, _ROW_IN, _HEAD_IN = 2.2, 0.32, 1.1
 _HIGHEST_IN = 40.0
 _ROW_FILL = 0.7
 _THICKEST = 1.9
-"""Lines get thinner one after the other, so that one behind another is still seen."""
+"""Lines get thinner one after the other, so that one under another is still seen."""
 _MOST_LONG_MARKS = 40
-"""Up to so many errors are marked by a line through all lanes too."""
+"""Up to this many errors are marked by a line through all lanes too."""
 _LABEL_PX = 90
 """Room that the code of an error takes."""
 
@@ -145,7 +145,7 @@ def _draw_logic(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int)
 
 
 def _draw_errors(axis: Any, tasks: Sequence[str], traces: Traces, width_px: int) -> None:
-    """A row a task, a tick an error; codes are written where there is room."""
+    """A row for each task, a mark for each error; codes are written where there is room."""
     room = (traces.end_s - traces.start_s) * _LABEL_PX / width_px
     for row, task in enumerate(tasks):
         marks = [mark for mark in traces.errors if mark.task == task]

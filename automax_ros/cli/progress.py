@@ -19,7 +19,7 @@ _SHARES = 1000
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
-    """Shows on standard error how much of ``total`` is done; nothing where that is no terminal or ``total`` is 0."""
+    """Shows on standard error how much of ``total`` is done; nothing where that is not a terminal or ``total`` is 0."""
 
     def __init__(self, title: str, total: int, *, wanted: bool = True) -> None:
         self._title = title

@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", metavar="S", help="seconds after which the recording ends by itself")
     parser.add_argument("--tasks", metavar="A,B", help="record scans and states of these tasks only (default: all)")
     parser.add_argument(
-        "--split-mb", metavar="MB", help="begin a new file when one has so many megabytes (1 MB is 10^6 bytes)"
+        "--split-mb", metavar="MB", help="begin a new file when one reaches MB megabytes (1 MB is 10^6 bytes)"
     )
     parser.add_argument("--split-s", metavar="S", help="begin a new file each S seconds of rack time")
     parser.add_argument("--compression", metavar="zstd|lz4|none", help="how the files are compressed (default: zstd)")
@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record until Ctrl-C, the duration has passed or the rack starts anew; 1 where recording broke off."""
+    """Record until Ctrl-C, the duration has passed or the rack starts again; 1 where recording broke off."""
     duration_ns = _seconds("--duration", arguments.duration) if arguments.duration is not None else None
     wait_ns = _seconds("--wait", arguments.wait)
     storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
@@ -166,7 +166,7 @@ class _Session:
             offered = []
         if not offered:
             if not self._stop.requested:
-                source = "those beside the YAML file are stored" if own else "name its YAML file to store those"
+                source = "those next to the YAML file are stored" if own else "name its YAML file to store those"
                 self._line.message(f"warning: the rack does not offer its files on {self._space}/config: {source}")
             return own
         texts = {item.name: item.sha256 for item in offered}
@@ -285,7 +285,7 @@ def _from_file(path: Path) -> tuple[str, list[RackFile]]:
 
     result = load(path, allow_outside=True)
     if result.config is None or has_errors(result.diagnostics):
-        raise UsageError(f"{path} is not a sound rack file", f"automax check {path} tells what is wrong")
+        raise UsageError(f"{path} is not a sound rack file", f"`automax check {path}` shows what is wrong")
     sources = [RackFile(f"{task.name}.BLK", source.text) for task, source, _ in check_tasks(result.config)]
     return f"/{result.config.namespace}", [RackFile(RACK_FILE, result.config.text), *sources]
 
@@ -315,5 +315,5 @@ def _seconds(option: str, text: str) -> int:
     except ValueError as error:
         raise UsageError(f"{option}: {error}") from error
     if found == 0:
-        raise UsageError(f"{option}: 0 s is no time")
+        raise UsageError(f"{option}: 0 s is too short: give more")
     return found

@@ -23,7 +23,7 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--record-...``."""
     group = parser.add_argument_group("recording", "how --record records")
     group.add_argument(
-        "--record-split-mb", metavar="MB", help="begin a new file when one has so many megabytes (1 MB is 10^6 bytes)"
+        "--record-split-mb", metavar="MB", help="begin a new file when one reaches MB megabytes (1 MB is 10^6 bytes)"
     )
     group.add_argument("--record-split-s", metavar="S", help="begin a new file each S seconds of rack time")
     group.add_argument(
@@ -39,7 +39,7 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--record-locals",
         action="store_true",
-        help="record the task's locals and block states behind every recorded scan, not only every 10 s",
+        help="record the task's locals and block states after every recorded scan, not only every 10 s",
     )
 
 

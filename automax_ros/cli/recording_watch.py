@@ -12,7 +12,7 @@ from automax_ros.cli.status import StatusDisplay
 from automax_ros.core.ticks import NS_PER_MS
 
 LIVE_CHUNK_NS = 500 * NS_PER_MS
-"""On the wall clock chunks end twice a second: with the time until somebody looks, less than a second is ever open."""
+"""On the wall clock chunks end twice per second: with the time until somebody looks, under a second is ever open."""
 SYNC_PERIOD_S = 0.4
 """Pause between two waits for the disk itself, so that a power failure costs about a second too."""
 

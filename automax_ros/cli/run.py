@@ -105,7 +105,7 @@ def _duration(text: str | None) -> int | None:
     except ValueError as error:
         raise UsageError(f"--duration: {error}") from error
     if duration_ns == 0:
-        raise UsageError("--duration: 0 s is no time to run")
+        raise UsageError("--duration: 0 s is too short to run: give more")
     return duration_ns
 
 

@@ -41,7 +41,7 @@ def stop_signals() -> Iterator[StopRequest]:
 
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end the block by SystemExit, as Ctrl-C does by KeyboardInterrupt: it tidies up behind it.
+    """Let SIGTERM and SIGHUP end the block by SystemExit, as Ctrl-C does by KeyboardInterrupt, so that it cleans up.
 
     A signal that is ignored stays so; outside of the main thread, which alone takes signals, nothing is changed.
     """

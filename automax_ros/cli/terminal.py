@@ -19,7 +19,7 @@ def wants_colour(stream: TextIO) -> bool:
 
 
 def rewrites_lines(stream: TextIO) -> bool:
-    """Whether a stream is a terminal that can write its last line anew."""
+    """Whether a stream is a terminal that can write its last line again."""
     return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 

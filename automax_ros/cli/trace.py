@@ -113,7 +113,7 @@ class _Trace:
         return self._lone.task.status is Status.RUNNING
 
     def _show_printed(self) -> None:
-        """Pass on the lines of PRINT, beside the table."""
+        """Pass on the lines of PRINT, apart from the table."""
         task = self._lone.task
         while task.printed:
             print(f"{task.name}: {printable(task.printed.popleft())}", file=sys.stderr)

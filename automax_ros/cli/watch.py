@@ -1,4 +1,4 @@
-"""The list of variables behind ``--watch``."""
+"""The list of variables given with ``--watch``."""
 
 from __future__ import annotations
 

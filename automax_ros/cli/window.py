@@ -54,5 +54,5 @@ def _seconds(text: str) -> int:
     except (ValueError, InvalidOperation, OverflowError):
         raise argparse.ArgumentTypeError(f"{text[:40]!r} is not a number of seconds from 0 on") from None
     if whole != exact:
-        raise argparse.ArgumentTypeError(f"{text[:40]} s is no whole number of nanoseconds")
+        raise argparse.ArgumentTypeError(f"{text[:40]} s is not a whole number of nanoseconds")
     return whole

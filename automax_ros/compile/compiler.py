@@ -54,7 +54,7 @@ class ScanTooLong(Exception):
 
 
 class ScanIo(Protocol):
-    """What a compiled scan touches beside its own state."""
+    """What a compiled scan touches apart from its own state."""
 
     def latch(self) -> Latched:
         """Return the latched commons in the order of ``CompiledTask.latched``."""

@@ -61,7 +61,7 @@ class Emitter:
 
     @contextmanager
     def statement(self, line: int) -> Iterator[None]:
-        """Frame one BASIC statement: temporaries start anew, its first overflow is logged at its end."""
+        """Frame one BASIC statement: temporaries start again, its first overflow is logged at its end."""
         self.line, self._temporaries, self._overflows = line, 0, False
         target, position = self.body, len(self.body)
         yield

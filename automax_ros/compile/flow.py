@@ -64,7 +64,7 @@ def count_statements(statements: tuple[Statement, ...]) -> int:
 
 @dataclass
 class Flow:
-    """Basic blocks under construction. Block numbers count from 0; the end is the number behind the last."""
+    """Basic blocks under construction. Block numbers count from 0; the end is the number after the last."""
 
     blocks: list[list[ast.stmt]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
@@ -164,7 +164,7 @@ def _dispatched(blocks: list[list[ast.stmt]], first: int) -> list[ast.stmt]:
 
 
 def _turning(suite: list[ast.stmt], number: int) -> list[ast.stmt]:
-    """Return the end of block ``number`` with ``continue`` behind each jump that does not surely lead forward."""
+    """Return the end of block ``number`` with ``continue`` after each jump that does not surely lead forward."""
     last = suite[-1]
     if isinstance(last, ast.If):
         return [*suite[:-1], ast.If(last.test, _turning(last.body, number), _turning(last.orelse, number))]

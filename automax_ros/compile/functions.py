@@ -84,7 +84,7 @@ def real_power(base: float, exponent: float) -> Fallible:
 
 
 def whole(value: float) -> int:
-    """Return a REAL without its fraction; what is no number is 0, an infinite one lies beyond 32 bits."""
+    """Return a REAL without its fraction; what is not a number is 0, an infinite one lies beyond 32 bits."""
     if math.isnan(value):
         return 0
     if value >= 1e18:
@@ -268,7 +268,7 @@ def data_value(value: Value, suffix: str, limit: int) -> tuple[Value, int]:
 
 @dataclass(frozen=True)
 class Builtin:
-    """How a BASIC function is carried out: ``fallible`` ones return a problem beside the result.
+    """How a BASIC function is carried out: ``fallible`` ones return a problem with the result.
 
     ``low`` and ``high`` bound an integer result.
     """

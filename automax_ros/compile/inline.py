@@ -46,7 +46,7 @@ class Binding:
 
 @dataclass(frozen=True)
 class Inlined:
-    """Statements that carry a block out. ``outputs`` and ``error`` are expressions valid behind them.
+    """Statements that carry a block out. ``outputs`` and ``error`` are expressions valid after them.
 
     ``error`` is None where the block cannot log anything as it is programmed.
     """

@@ -110,7 +110,7 @@ class Layout:
         return [field.fresh() for field in self.fields]
 
     def restart(self, state: list[StateValue]) -> None:
-        """Put a state where RUN puts it: blocks and stacks start anew, locals and tunables keep (2.4.5)."""
+        """Put a state where RUN puts it: blocks and stacks start again, locals and tunables keep (2.4.5)."""
         for position, field in enumerate(self.fields):
             if field.role in (Role.BLOCK, Role.STACK):
                 state[position] = field.fresh()

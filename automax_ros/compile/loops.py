@@ -36,7 +36,7 @@ STEP_IS_ZERO = 7027
 class Loop:
     """A loop that has begun: its limit and step are literals or locals named after ``place``, its line.
 
-    A second loop of one line has ``.2`` behind the line, and so on.
+    A second loop of one line has ``.2`` after the line, and so on.
     """
 
     statement: For

@@ -72,7 +72,7 @@ def _without(body: list[ast.stmt], names: Mapping[str, ast.expr]) -> list[ast.st
 
 
 def log_in_place(body: list[ast.stmt], error: ast.expr, log: Callable[[ast.expr], ast.stmt]) -> list[ast.stmt]:
-    """Return the body with an error logged where it arises, or behind the body where more than one may arise."""
+    """Return the body with an error logged where it arises, or after the body where more than one may arise."""
     if isinstance(error, ast.Name) and _only_literals(body, error.id) and _most_errors(body, error.id) <= 1:
         return _logging(body, error.id, log)
     return [*body, build.when(error, [log(error)])]

@@ -65,7 +65,7 @@ class StatementLowering:
     _loops: dict[int, int] = field(default_factory=dict)
 
     def lower_all(self, statements: tuple[Statement, ...]) -> None:
-        """Emit the statements; END behind them is left to the caller."""
+        """Emit the statements; END after them is left to the caller."""
         statements = _before_end(statements)
         self._targets = jump_targets(statements)
         if any(is_jumping(statement, self._targets) for statement in statements):
@@ -364,7 +364,7 @@ class StatementLowering:
 
 
 def _before_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
-    """Return the statements before the task's END, behind which only remarks stand; all if something jumps to those."""
+    """Return the statements before the task's END, after which only remarks stand; all if something jumps to those."""
     targets = jump_targets(statements)
     for position, statement in enumerate(statements):
         if isinstance(statement, End):

@@ -2,7 +2,7 @@
 
 Publishes: ``variables`` (automax_msgs/VariableTable, latched), ``config`` (std_msgs/String, latched: the rack's YAML
 file and the tasks' sources as JSON), ``backplane`` (automax_msgs/CommonWrite), ``backplane/snapshot``
-(automax_msgs/CommonImage, latched, sent anew to each late joiner of either), ``common/NAME`` (std_msgs, latched) for
+(automax_msgs/CommonImage, latched, sent again to each late joiner of either), ``common/NAME`` (std_msgs, latched) for
 each variable with ``ros: out`` or ``ros: in``.
 
 Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, and for no other.

@@ -1,6 +1,6 @@
 """The node ``digital_io_SLOT``: a digital input or output module.
 
-Publishes: ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once a second with its registers. Its points are common
+Publishes: ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second with its registers. Its points are common
 variables, which have topics of their own (``common_memory``).
 """
 

@@ -1,7 +1,7 @@
 """What keeps a client's message or request from ending a program.
 
 rclpy lets an exception of any callback leave ``spin_once``, those of its own services and conversions included: a
-``ParameterValue`` of an unknown type is enough, or a string that is not UTF-8. Behind a guard the program goes on.
+``ParameterValue`` of an unknown type is enough, or a string that is not UTF-8. After a guard the program goes on.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from automax_ros.running.health import Health
 FAILED = "failed callback"
 """What ``Health`` counts them as."""
 MOST_TOLD, MOST_LOGGED = 300, 20
-"""So many characters of an error are told, and so many failures are logged: a client may go on and on."""
+"""Most characters of an error, and most failures, that are logged: a client may go on and on."""
 _LAST_TYPE = ParameterType.PARAMETER_STRING_ARRAY
 
 

@@ -31,7 +31,7 @@ def domain_id() -> int:
     """
     text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not (text.isascii() and text.isdigit() and len(text) <= 3 and int(text) <= MAX_DOMAIN):
-        raise RosUnavailable(f"ROS_DOMAIN_ID={quoted(text)} is no number from 0 to {MAX_DOMAIN}")
+        raise RosUnavailable(f"ROS_DOMAIN_ID={quoted(text)} is not a number from 0 to {MAX_DOMAIN}")
     return int(text)
 
 

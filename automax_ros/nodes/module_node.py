@@ -88,7 +88,7 @@ class ModuleNode(Node):  # type: ignore[misc]
         return lambda _, payload: publish(payload)
 
     def diagnose(self, statuses: Callable[[int], list[DiagnosticStatus]]) -> None:
-        """Publish ``/diagnostics`` once a second: what ``statuses`` returns for a rack time (ns)."""
+        """Publish ``/diagnostics`` once per second: what ``statuses`` returns for a rack time (ns)."""
         self._statuses = statuses
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         scheduler, key = self.site.rack.scheduler, EventKey(EventClass.OBSERVE, 0, self.get_name())

@@ -1,7 +1,7 @@
 """The node ``player``: sends the messages of a recording again, on absolute deadlines of the wall clock.
 
 Publishes: each topic of the recording, with its recorded quality of service; ``/clock`` (rosgraph_msgs/Clock) with the
-time of the recording, 100 times a second of the wall clock.
+time of the recording, 100 times per second of the wall clock.
 
 Services: ``~/pause`` and ``~/resume`` (std_srvs/Trigger).
 """
@@ -51,7 +51,7 @@ _NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 
 @dataclass
 class Lateness:
-    """How far behind their deadlines messages were sent, in ns."""
+    """How late after their deadlines messages were sent, in ns."""
 
     count: int = 0
     total: int = 0
@@ -124,7 +124,7 @@ class Player:
 
     @property
     def clock_taken(self) -> bool:
-        """Whether another node sends ``/clock`` beside us."""
+        """Whether another node sends ``/clock`` too."""
         return self._clock is not None and self._node.count_publishers("/clock") > 1
 
     def open(self) -> None:

@@ -1,7 +1,7 @@
 """The node ``processor_SLOT``: a Processor module with its tasks.
 
 Publishes: ``/RACK/scans`` (automax_msgs/Scan) and ``/RACK/states`` (automax_msgs/TaskState) of its tasks, with a state
-and a full Scan of each for whoever joins late; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once a second and
+and a full Scan of each for whoever joins late; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second and
 when a task's state changes.
 
 Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the
@@ -32,7 +32,7 @@ from automax_ros.running.views import Write
 ERROR_INTERVAL_S = 1.0
 """A task's run-time errors are reported at most this often ..."""
 ERRORS_SHOWN = 5
-"""... and then so many of one scan."""
+"""... and then this many of one scan."""
 
 
 class ProcessorNode(ModuleNode):
@@ -80,7 +80,7 @@ class ProcessorNode(ModuleNode):
                 self.get_logger().warning(describe())
 
     def written(self, writes: list[Write]) -> None:
-        """Writes from outside are no matter of a Processor."""
+        """Writes from outside do not concern a Processor."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
         """Who tunes a task tells its parameter."""
@@ -93,7 +93,7 @@ class ProcessorNode(ModuleNode):
             self._publish_diagnostics(operation.at_ns)
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
-        """Refuse what a task would refuse, before any of the parameters is set; those that are no tunables pass."""
+        """Refuse what a task would refuse, before any of the parameters is set; those that are not tunables pass."""
         for parameter in parameters:
             tunable = self._tunables.get(parameter.name)
             if tunable is None:

@@ -143,7 +143,7 @@ class LiveRecorder:
         """Wait for the rack's table; None if it does not come.
 
         Raises:
-            CdrError: what comes is no table.
+            CdrError: what comes is not a table.
         """
         source = RawSubscription(self._node, self._topics.variables, self._topics.all[self._topics.variables])
         try:

@@ -64,7 +64,7 @@ def _on_grid(value: float, low: float, step: float) -> bool:
 
 
 def tunables_of(tasks: Sequence[Task]) -> list[Tunable]:
-    """Return all tunables; two of a task that differ only in type get the type's word behind the name."""
+    """Return all tunables; two of a task that differ only in type get the type's word after the name."""
     found = []
     for task in tasks:
         symbols = [symbol for symbol in task.compiled.program.symbols.values() if symbol.tuning is not None]

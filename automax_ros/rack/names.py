@@ -34,7 +34,7 @@ class NameFault(ValueError):
     """A name breaks a rule: ``code`` of the problem, the message, and a hint where there is one."""
 
     def __init__(self, code: str, message: str, hint: str | None = None) -> None:
-        """Keep the code and the hint beside the message."""
+        """Keep the code and the hint with the message."""
         super().__init__(message)
         self.code = code
         self.hint = hint

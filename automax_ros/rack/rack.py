@@ -35,7 +35,7 @@ from automax_ros.running.views import MemoryValueError
 
 @dataclass(frozen=True)
 class RackState:
-    """All that the future of a rack depends on, beside its configuration and sources.
+    """All that the future of a rack depends on, apart from its configuration and sources.
 
     ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``modules`` by slot.
     """

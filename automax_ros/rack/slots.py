@@ -98,7 +98,7 @@ class SlotReader:
             self._findings.add("AMX6203", f"the {model} ({NOT_YET[model]}) is not supported yet", node.span)
         else:
             hint = f"the emulator has {', '.join(SUPPORTED)}"
-            self._findings.add("AMX6202", f"{quoted(text)} is no module that the emulator knows", node.span, hint)
+            self._findings.add("AMX6202", f"{quoted(text)} is not a module that the emulator knows", node.span, hint)
         return None
 
 

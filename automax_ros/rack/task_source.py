@@ -12,7 +12,7 @@ from automax_ros.rack.files import read_bytes
 def read_task_source(path: Path) -> SourceText:
     """Return a task's source, named by its path.
 
-    A text that is not UTF-8 is read with one character a byte (Latin-1): editors of the rack's time wrote such bytes
+    A text that is not UTF-8 is read with one character per byte (Latin-1): editors of the rack's time wrote such bytes
     into remarks, and every column stays where it is (decision).
 
     Raises:

@@ -105,7 +105,7 @@ class TaskReader:
         path = self.rack_file.parent / text
         if not self.allow_outside and not _stays_inside(text, path, self.rack_file):
             message = f"{quoted(text)} lies outside the rack file's folder"
-            hint = "put the source beside the rack file, or allow it with --allow-outside"
+            hint = "put the source next to the rack file, or allow it with --allow-outside"
             self.findings.add("AMX6305", message, span, hint)
             return None
         return path if self._readable(text, path, span) else None

@@ -31,7 +31,7 @@ _MOST_COUNTED = 100_000
 
 
 class Found(NamedTuple):
-    """What differs behind one scan; ``counts`` is FALSE where it lies within the tolerance."""
+    """What differs after one scan; ``counts`` is FALSE where it lies within the tolerance."""
 
     kind: Kind
     key: Hashable
@@ -66,7 +66,7 @@ class _Run:
         self._zero_scan, self._zero_time_s, self._zeros = scan, time_s, 0
 
     def add(self, scan: int, time_s: float, difference: float) -> None:
-        """Go on by a scan; outside of the band, and behind a stretch of equality, a new stretch begins."""
+        """Go on by a scan; outside of the band, and after a stretch of equality, a new stretch begins."""
         if difference:
             was_equal, self._zeros = self._zeros >= SETTLED_SCANS, 0
         else:
@@ -105,7 +105,7 @@ class _Tally:
         self._run: _Run | None = None
 
     def differs(self, found: Found, scan: int, time_s: float) -> None:
-        """Count a scan behind which it differs."""
+        """Count a scan after which it differs."""
         self._scans += found.counts
         if self.kind is not Kind.VARIABLE:
             return
@@ -118,7 +118,7 @@ class _Tally:
         self._goes_on(scan, time_s, difference, BAND_COUNTS if isinstance(difference, int) else 0)
 
     def agrees(self, scan: int, time_s: float) -> None:
-        """Count a scan behind which it does not differ."""
+        """Count a scan after which it does not differ."""
         if self._run is not None:
             self._run.add(scan, time_s, 0)
 
@@ -249,7 +249,7 @@ def within(recorded: Value, replayed: Value, tolerance: float) -> bool:
 
 
 def _difference(recorded: Value, replayed: Value) -> float | None:
-    """How much is replayed more than was recorded; None if they are no numbers."""
+    """How much is replayed more than was recorded; None if they are not numbers."""
     for value in (recorded, replayed):
         if isinstance(value, (bool, str)):
             return None

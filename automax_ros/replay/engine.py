@@ -34,7 +34,7 @@ _TYPES = frozenset(
 _STATES = frozenset({"automax_msgs/msg/TaskState"})
 
 Watcher = Callable[[TaskReplay, Scan], None]
-"""Is told of each scan that was executed again, behind it."""
+"""Called after each scan that was executed again."""
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ class ScanMemory:
         self._untold = set(range(len(self._views)))
 
     def follow(self, scan: Scan) -> None:
-        """Take over what a scan latched anew; to be called for each scan, executed or not.
+        """Take over what a scan newly latched; to be called for each scan, executed or not.
 
         Raises:
             BagError: the scan does not fit the variables of the rack.
@@ -200,7 +200,7 @@ class ScanMemory:
         return self._writes
 
     def after_recorded(self, key: Key) -> Value:
-        """Return a value as it was behind the recorded scan.
+        """Return a value as it was after the recorded scan.
 
         Raises:
             UnknownValue: the recording has not told it.

@@ -33,7 +33,7 @@ _RECORDED, _REPLAYED = "#1f4e9c", "#c1272d"
 
 @dataclass
 class Trace:
-    """One variable of one task around the first difference: values behind each scan, times since the run's start."""
+    """One variable of one task around the first difference: values after each scan, times since the run's start."""
 
     difference: Difference
     variable: CommonVariable
@@ -49,7 +49,7 @@ def can_be_drawn(report: ReplayReport) -> bool:
 
 
 def traces(replay: Replay, report: ReplayReport, on_progress: Callable[[float], None] | None = None) -> list[Trace]:
-    """Execute the recording once more, up to behind the first difference, and return what is to be drawn.
+    """Execute the recording once more, up to after the first difference, and return what is to be drawn.
 
     Raises:
         BagError: the recording cannot be read.

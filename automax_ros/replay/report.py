@@ -14,7 +14,7 @@ from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 
 OPEN_LOOP = (
-    "Open loop: each task scans on the recorded inputs. Behind a first difference the values from other tasks, from "
+    "Open loop: each task scans on the recorded inputs. After a first difference the values from other tasks, from "
     "ROS and from the plant stay those that were recorded."
 )
 _LONGEST_LIST = 40
@@ -67,7 +67,7 @@ class Settled:
 class Difference:
     """Something of one task that differs in at least one scan; ``lines`` are the BASIC lines that can write it.
 
-    ``scans`` is the number of scans behind which it differs (for a state: the recorded states).
+    ``scans`` is the number of scans after which it differs (for a state: the recorded states).
     """
 
     task: str

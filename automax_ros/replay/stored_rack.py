@@ -66,7 +66,7 @@ class ReplaySource:
 
 @dataclass(frozen=True)
 class StoredRack:
-    """What a recording stores beside its messages."""
+    """What a recording stores with its messages."""
 
     bag: Path
     config: RackConfig

@@ -104,9 +104,9 @@ class TaskReplay:
 
     @property
     def end_in_doubt(self) -> bool:
-        """Whether only one of the recorded task and an edited one seems to have ended behind the last scan.
+        """Whether only one of the recorded task and an edited one seems to have ended after the last scan.
 
-        The recording does not tell why a task scans no more; its own source, executed again, does.
+        The recording does not tell why a task no longer scans; its own source, executed again, does.
         """
         if not self._source.edited or self._source.recorded is None or not self._synchronous:
             return False
@@ -278,7 +278,7 @@ class TaskReplay:
         if self._stopped_in is None:
             return
         reason = self._end_text()
-        self._note(f"stopped in scan {self._stopped_in}, {reason}; the scans behind it are not compared")
+        self._note(f"stopped in scan {self._stopped_in}, {reason}; the scans after it are not compared")
         self._stopped_in = None
         found = [Found(Kind.STATUS, _STOPPED_KEY, "runs", reason)]
         self._different += self._tallies.scan(self.name, scan.scan, scan.stamp, found, self._label, self._seen)
@@ -322,7 +322,7 @@ class TaskReplay:
             )
 
     def _lose(self, scan: Scan, error: UnknownValue) -> None:
-        """A value is missing: behind a gap in the write log the task waits for a state, otherwise that is an error."""
+        """A value is missing: after a gap in the write log the task waits for a state, otherwise that is an error."""
         variable = self._variable(error.key)
         if not self._commons.gaps:
             symbol = self._source.compiled.program.symbols.get(variable.name)

@@ -49,7 +49,7 @@ class RegisterMap:
                 yield other, 0, shown
 
     def apart_from(self, bank: int, outputs: range, registers: int) -> frozenset[tuple[int, int]]:
-        """Return view and element of all that shows registers of a bank that are no outputs: its inputs."""
+        """Return view and element of all that shows registers of a bank that are not outputs: its inputs."""
         inputs = [register for register in range(registers) if register not in outputs]
         points = (view for register in inputs for view in self._points.get((bank, register), ()))
         return frozenset([*((bank, register) for register in inputs), *((view, 0) for view in points)])

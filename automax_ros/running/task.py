@@ -180,7 +180,7 @@ class Task:
         memory.watch_forces(self._look_at_forces)
 
     def install(self, compiled: CompiledTask) -> None:
-        """Begin anew, with this or another program: state and error log are as at installation (2.4.5)."""
+        """Begin again, with this or another program: state and error log are as at installation (2.4.5)."""
         self._put_down()
         self.compiled = compiled
         self.plan = self.memory.plan([self.memory.view(name) for name in compiled.latched])
@@ -224,7 +224,7 @@ class Task:
         self._recording = on
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
-        """Put the task into RUN: blocks start anew, the statements before SCAN_LOOP execute once.
+        """Put the task into RUN: blocks start again, the statements before SCAN_LOOP execute once.
 
         Returns the record of that part, as scan 0, if scans are recorded.
         """
@@ -336,11 +336,11 @@ class Task:
         assert not isinstance(low, str)
         assert not isinstance(high, str)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise ValueError(f"{name} cannot be {value!r}: that is no number")
+            raise ValueError(f"{name} cannot be {value!r}: that is not a number")
         # A limit such as 0.1 is held in single precision too, so the stored value is what must lie inside.
         stored = stored_real(float(value))[0] if symbol.type is DataType.REAL else int(value)
         if symbol.type is not DataType.REAL and stored != value:
-            raise ValueError(f"{name} = {value} is no whole number")
+            raise ValueError(f"{name} = {value} is not a whole number")
         if not low <= stored <= high:
             raise ValueError(f"{name} = {value:.8g} lies outside {low:.8g} to {high:.8g}")
         return stored

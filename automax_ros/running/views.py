@@ -144,4 +144,4 @@ def fitting(spec: ViewSpec, value: Value) -> Value:
             low, high = kind.range
             if low <= value <= high and value == int(value):
                 return int(value)
-    raise MemoryValueError(f"{value!r} is no value for {spec.name}, type {kind.word}")
+    raise MemoryValueError(f"{value!r} is not a value for {spec.name}, type {kind.word}")

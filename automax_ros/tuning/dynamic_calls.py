@@ -266,7 +266,7 @@ def _chosen(label: str, bound: Mapping[str, tuple[BoundCall, str]], program: Pro
     if name in bound:
         return name
     there = {item.line for item in program.calls.values()}
-    what = "that is no dynamic block" if line in there else "there is no block on this line"
+    what = "that is not a dynamic block" if line in there else "there is no block on this line"
     raise NoDynamicBlock(f"{name}: {what}", _listed(bound))
 
 

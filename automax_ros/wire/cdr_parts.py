@@ -36,7 +36,7 @@ COUNTS = tuple(struct.Struct(f"<{-position % 4}xI") for position in range(4))
 MOST_TOGETHER = 64
 """Sequences with more items are read one by one: there the gain is small, and the layouts would be many."""
 MOST_LAYOUTS = 4096
-"""So many layouts of a message are kept: a rack has few, a stranger could make many."""
+"""Most layouts of a message that are kept: a rack has few, a stranger could make many."""
 MOST_HEAD_TEXT = 64
 """Longest text in a head, in bytes with its closing zero byte: a task's name has 8 characters (decision)."""
 
@@ -60,20 +60,20 @@ class Layout:
         self._position = position - len(HEADER)
 
     def add(self, code: str, count: int = 1) -> None:
-        """Add so many numbers of one code."""
+        """Add this many numbers of one code."""
         size = size_of(code)
         padding = -self._position % size
         self.text += f"{padding}x{count}{code}" if padding else f"{count}{code}"
         self._position += padding + count * size
 
     def add_text(self, size: int) -> None:
-        """Add a string of so many bytes with its closing zero byte: two arguments, the size and the text."""
+        """Add a string of this many bytes with its closing zero byte: two arguments, the size and the text."""
         self.add("I")
         self.text += f"{size}s"
         self._position += size
 
     def add_sequence(self, code: str, count: int) -> None:
-        """Add a sequence of so many numbers: its length and they are the arguments."""
+        """Add a sequence of this many numbers: its length and they are the arguments."""
         self.add("I")
         if count:
             self.add(code, count)

@@ -65,7 +65,7 @@ def files_from_text(text: str) -> list[RackFile]:
     """Return the files in a text of the topic ``config``.
 
     Raises:
-        RackFilesError: too long, not of that form, or a file does not have the hash that stands beside it.
+        RackFilesError: too long, not of that form, or a file does not have the hash given with it.
     """
     if len(text) > MAX_TEXT:
         raise RackFilesError(f"{len(text)} characters, at most {MAX_TEXT} are read")
@@ -98,5 +98,5 @@ def _file(entry: Any) -> RackFile:
         raise RackFilesError(f"a file named {entry['name'][:80]!r}")
     file = RackFile(entry["name"], entry["text"])
     if file.sha256 != entry["sha256"]:
-        raise RackFilesError(f"{file.name} does not have the hash that stands beside it")
+        raise RackFilesError(f"{file.name} does not have the hash given with it")
     return file

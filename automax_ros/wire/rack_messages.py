@@ -145,7 +145,7 @@ class RackMessages:
         self._tasks = {task: _TaskFacts(task) for task in rack.tasks}
 
     def reinstalled(self, task: Task) -> None:
-        """Describe a task anew if it executes another program than before."""
+        """Describe a task again if it executes another program than before."""
         if task.compiled is not self._tasks[task].compiled:
             self._tasks[task] = _TaskFacts(task)
 
@@ -223,7 +223,7 @@ class RackMessages:
         return _new(CommonWrite, fields)
 
     def scan(self, task: Task, record: ScanRecord, *, full: bool) -> Scan:
-        """Return the message of a scan; unless ``full``, only what was latched anew since the task's last message."""
+        """Return the message of a scan; unless ``full``, only what was newly latched since the task's last message."""
         known = self._tasks[task]
         latched, before, views = record.latched, known.latched, known.views
         known.latched = latched if record.scan else None

@@ -228,16 +228,16 @@ def test_chosen_tasks_and_whole_memory(tmp_path: Path, whole: Path) -> None:
 
 def test_locals_of_every_scan(tmp_path: Path) -> None:
     bag = recorded(tmp_path, RecordingOptions(split_ns=2 * NS_PER_S, tasks=frozenset({"SPEED"}), every_state=True), 5.0)
-    behind: dict[int, int] = {}
+    after: dict[int, int] = {}
     for item in BagReader(bag).messages(topics={"/line1/scans", "/line1/states"}):
         if type(item.message).__name__ == "Scan":
-            behind[item.message.scan] = 0
+            after[item.message.scan] = 0
         else:
-            behind[item.message.scan] += 1
-    assert len(behind) == 455 + 1
-    assert min(behind.values()) == 1
+            after[item.message.scan] += 1
+    assert len(after) == 455 + 1
+    assert min(after.values()) == 1
     (tmp_path / "again").mkdir()
-    assert Reexecution(bag, tmp_path / "again").execute().states["SPEED"] == sum(behind.values())
+    assert Reexecution(bag, tmp_path / "again").execute().states["SPEED"] == sum(after.values())
 
 
 def test_a_writer_splits_when_told(tmp_path: Path) -> None:

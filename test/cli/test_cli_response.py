@@ -291,7 +291,7 @@ def test_extreme_values_end_without_a_fault(automax, line):
     ("options", "told"),
     [
         (("--block", "999"), "--block 999: there is no block on this line\n  hint: dynamic blocks are 100 LAG, "),
-        (("--block", "170"), "--block 170: that is no dynamic block\n  hint: dynamic blocks are 100 LAG, "),
+        (("--block", "170"), "--block 170: that is not a dynamic block\n  hint: dynamic blocks are 100 LAG, "),
         (("--block", "140"), "140 PROP_INT -> E%: the value of WLD = GAIN is not known\n  hint: give --set GAIN=VALUE"),
         (("--block", "140", "--set", "GAIM=1"), "--set: the task has no variable 'GAIM'\n  hint: did you mean GAIN?"),
         (("--block", "140", "--set", "KP1=0.1"), "--set KP1: 0.1 is beyond its tuning limits, 0.5 to 10.0"),
@@ -346,7 +346,7 @@ def test_thermal_overload_has_no_frequency_response(automax):
 def test_task_without_dynamic_blocks(automax):
     text = "10 LOCAL A%, B%\n20 CALL SCAN_LOOP(TICKS=4)\n30 CALL INVERTER(INPUT=A%, OUTPUT=B%)\n40 END\n"
     result = automax("response", automax.write("T.BLK", text), "--block", "30")
-    assert result.err.endswith("--block 30: that is no dynamic block\n  hint: the task has no dynamic block\n")
+    assert result.err.endswith("--block 30: that is not a dynamic block\n  hint: the task has no dynamic block\n")
 
 
 def test_task_with_errors_shows_what_check_shows(automax):

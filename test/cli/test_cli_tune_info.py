@@ -188,8 +188,8 @@ def test_one_block(automax):
     ("options", "told"),
     [
         (("--block", "999"), "--block 999: there is no block on this line\n  hint: dynamic blocks are 100 LAG, "),
-        (("--block", "170"), "--block 170: that is no dynamic block\n  hint: dynamic blocks are 100 LAG, "),
-        (("--block", "170.9"), "--block 170.9: that is no dynamic block"),
+        (("--block", "170"), "--block 170: that is not a dynamic block\n  hint: dynamic blocks are 100 LAG, "),
+        (("--block", "170.9"), "--block 170.9: that is not a dynamic block"),
         (("--block", "LAG"), "--block 'LAG' is not a BASIC line such as 210 or 210.2"),
         (("--set", "GAIN"), "--set: 'GAIN' is not NAME=VALUE"),
         (("--set", "GAIM=1"), "--set: the task has no variable 'GAIM'\n  hint: did you mean GAIN?"),

@@ -345,7 +345,7 @@ def test_plain_line_comes_every_five_seconds(rack, capsys, monkeypatch):
         rack.scheduler.run_until(second * 1_000_000_000)
         display.update(rack.now_ns)
     lines = capsys.readouterr().out.splitlines()
-    # 91 scans a second of 110 us each are 1 % of the Processor's time.
+    # 91 scans per second of 110 us each are 1 % of the Processor's time.
     assert [line.split("  ")[-3:] for line in lines] == [["91 scans/s", "P0 1.0 % late 0", "REF%=5"]] * 2
 
 

@@ -251,7 +251,7 @@ def test_task_that_stops_by_itself_is_told(bag):
     )
     work = report.tasks[1]
     assert work.scans == 46
-    assert "stopped in scan 45, ended by STOP; the scans behind it are not compared" in work.notes
+    assert "stopped in scan 45, ended by STOP; the scans after it are not compared" in work.notes
 
 
 def test_endless_loop_of_an_edited_task_ends(bag):

@@ -286,7 +286,7 @@ def test_malformed_message_ends_the_playback(ros_domain_id, tmp_path):
         (("--rate", "1_0"), "--rate: '1_0' is not a number"),
         (("--from", "-1"), "--from: -1 s is negative"),
         (("--from", "3"), "it lasts from 0.000 to 2.497 s of the run"),
-        (("--namespace", "a b"), "--namespace: 'a b' is no ROS namespace"),
+        (("--namespace", "a b"), "--namespace: 'a b' is not a ROS namespace"),
         (("--topics", "/line1/scan"), "did you mean /line1/scans?"),
     ],
 )

@@ -205,7 +205,7 @@ def test_existing_folder_is_not_recorded_into(tmp_path):
     [
         (("a b",), "neither a rack's name or namespace nor a YAML file"),
         (("none.yaml",), "none.yaml is not a sound rack file"),
-        (("TYPES", "--duration", "0"), "--duration: 0 s is no time"),
+        (("TYPES", "--duration", "0"), "--duration: 0 s is too short: give more"),
         (("TYPES", "--wait", "x"), "--wait: "),
     ],
 )

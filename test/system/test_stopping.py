@@ -216,8 +216,8 @@ def test_fault_before_the_first_scan_is_told_once(ros_domain_id):
 @pytest.mark.parametrize(
     ("variable", "value", "words"),
     [
-        ("ROS_DOMAIN_ID", "x", "ROS_DOMAIN_ID='x' is no number from 0 to 232"),
-        ("ROS_DOMAIN_ID", "500", "ROS_DOMAIN_ID='500' is no number from 0 to 232"),
+        ("ROS_DOMAIN_ID", "x", "ROS_DOMAIN_ID='x' is not a number from 0 to 232"),
+        ("ROS_DOMAIN_ID", "500", "ROS_DOMAIN_ID='500' is not a number from 0 to 232"),
         ("ROS_LOG_DIR", "/dev/null/log", "ROS 2 does not start"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What a recording made from outside says of itself, beside its messages."""
+"""What a recording made from outside says of itself, apart from its messages."""
 
 from __future__ import annotations
 

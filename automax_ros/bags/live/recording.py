@@ -29,7 +29,7 @@ from automax_ros.wire.rack_files import RACK_FILE, RackFile
 SETTLE_NS = 1_000_000_000
 """When for so long no write has come, none is missing."""
 MAX_PENDING = 100_000
-"""So many messages wait for the next write at most."""
+"""Most messages that wait for the next write."""
 _SECOND = 1_000_000_000
 _RESTARTED = "the rack was started again"
 _MALFORMED_NAMED = 3
@@ -54,8 +54,8 @@ class LiveRecording(Recording):
     ) -> None:
         """Create the bag with the rack's files in it. ``table`` is the VariableTable, ``tasks`` those to record.
 
-        A further file begins with the first image behind each multiple of ``split_ns`` of rack time, 0 for never, or
-        behind the size that ``storage`` tells; the rack is asked for that image.
+        A further file begins with the first image after each multiple of ``split_ns`` of rack time, 0 for never, or
+        after the size that ``storage`` tells; the rack is asked for that image.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.

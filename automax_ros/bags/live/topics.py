@@ -28,7 +28,7 @@ class LiveTopics:
     def __init__(self, space: str, table: VariableTable | None = None) -> None:
         """Name the topics; without a table those of common variables are not known.
 
-        ``left_out`` are so many topics of common variables beyond the limit.
+        ``left_out`` is how many topics of common variables lie beyond the limit.
         """
         self.variables = f"{space}/variables"
         self.snapshot = f"{space}/backplane/snapshot"

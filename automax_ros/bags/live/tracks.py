@@ -51,7 +51,7 @@ class TaskTrack:
         self.last, self.stamp = scan, stamp
 
     def take_state(self, scan: int) -> None:
-        """Note a state behind a scan."""
+        """Note a state after a scan."""
         self.state = scan
         self._join(self.follows and scan == self.last)
 

@@ -1,7 +1,7 @@
 """Repairs recordings: whose writer was killed, whose disk was full, that were cut or damaged.
 
 The original is never changed. Sound files are copied byte for byte; of the others everything sound goes into a new file
-with index and summary. Behind the last whole chunk only whole instants count: a scan without the writes that it made
+with index and summary. After the last whole chunk only whole instants count: a scan without the writes that it made
 would not be what the rack has done.
 """
 
@@ -86,7 +86,7 @@ def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float],
     """Check a recording, a folder or one .mcap file, and write a repaired one unless it is sound.
 
     ``output`` is the folder to write, ``<BAG>_repaired`` by default; with one, a sound recording is copied. The default
-    for one file of a recording's folder lies beside that folder.
+    for one file of a recording's folder lies next to that folder.
 
     Raises:
         BagError: there is no recording, or nothing in it can be used.
@@ -142,7 +142,7 @@ def _require_outside(bag: Path, target: Path) -> None:
             "AMX6824",
             target,
             f"lies inside {folder}, the recording itself, which is never changed",
-            "name a folder beside it with --output",
+            "name a folder next to it with --output",
         )
 
 
@@ -243,7 +243,7 @@ def _check_metadata(bag: Path, report: RepairReport, provenance: Provenance) -> 
 
 
 def _in_time(files: list[FileReport]) -> list[FileReport]:
-    """Return the files in the order of their first log times; one without messages stays behind the one before it."""
+    """Return the files in the order of their first log times; one without messages stays after the one before it."""
     times: list[int] = []
     for file in files:
         times.append(file.contents.first_log if file.contents.messages else times[-1] if times else 0)

@@ -78,7 +78,7 @@ class Definitions:
 
 
 class Rewriting:
-    """One file being written anew. ``write`` does it, ``close`` in any case; then the counts tell how it went."""
+    """One file being written again. ``write`` does it, ``close`` in any case; then the counts tell how it went."""
 
     def __init__(self, target: Path, salvage: Salvage, definitions: Definitions, provenance: Provenance) -> None:
         """Create the file."""

@@ -1,7 +1,7 @@
 """Reads what is sound in one mcap file, however it was cut or damaged: whole chunks, and the beginning of a cut one.
 
 A record counts if it lies in the file as a whole and can be parsed; a chunk or attachment with a checksum counts if the
-checksum is right. Behind a place where records cannot be told apart, the next compressed chunk is looked for.
+checksum is right. After a place where records cannot be told apart, the next compressed chunk is looked for.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _MARK_PLACE = RECORD_HEAD.size + 28
 """Where in a chunk's record the name of its compression stands."""
 _SEARCH_BYTES = 1 << 20
 _MAX_RESUMED = 1000
-"""So many places that make no sense are passed over in one file."""
+"""Most places that make no sense that are passed over in one file."""
 _MAX_REASONS = 20
 _KNOWN = frozenset(int(opcode) for opcode in Opcode)
 _FIRST_PRIVATE = 0x80
@@ -63,7 +63,7 @@ class Salvage:
 
     path: Path
     finished: bool = False
-    """Whether the end of the data was reached; what is missing behind it can be made anew."""
+    """Whether the end of the data was reached; what is missing after it can be made again."""
     damage: list[str] = field(default_factory=list)
     """What was found damaged, for the person."""
     lost_chunks: int = 0
@@ -75,7 +75,7 @@ class Salvage:
         """Return what is sound, in the order of the file.
 
         Raises:
-            BagError: the file cannot be read or is beyond the limits, or is no recording of ROS 2 at all.
+            BagError: the file cannot be read or is beyond the limits, or is not a recording of ROS 2 at all.
         """
         with opened(self.path) as file:
             size = file.seek(0, io.SEEK_END)
@@ -166,7 +166,7 @@ class Salvage:
         return SoundChunk(data, compression=compression, cut=len(data) < size)
 
     def _resume(self, file: BinaryIO, position: int, size: int) -> int:
-        """Return where the next chunk begins behind a place that makes no sense, or the end of the file."""
+        """Return where the next chunk begins after a place that makes no sense, or the end of the file."""
         self._resumed += 1
         start = size if self._resumed > _MAX_RESUMED else _next_chunk(file, position + 1, size)
         end = "the end" if start == size else f"byte {start}"

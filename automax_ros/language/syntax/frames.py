@@ -108,7 +108,7 @@ class FrameStack:
             ends.clear()
 
     def abandon(self) -> list[Statement]:
-        """Close what is open without a word and return the task's statements."""
+        """Close silently what is open and return the task's statements."""
         while self._frames:
             self._pop()
         return self._module.body

@@ -20,7 +20,7 @@ from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import Scheduler
 
 ModuleState = Mapping[str, Any]
-"""What a module keeps beside common memory, as numbers, texts, lists and mappings: ``{}`` where that is nothing."""
+"""What a module keeps next to common memory, as numbers, texts, lists and mappings: ``{}`` where that is nothing."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Module(Protocol):
         ...
 
     def state(self) -> ModuleState:
-        """Return what it keeps beside common memory."""
+        """Return what it keeps apart from common memory."""
         ...
 
     def load(self, state: ModuleState) -> None:
