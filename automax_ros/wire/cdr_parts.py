@@ -13,7 +13,6 @@ from typing import Any
 
 HEADER = b"\x00\x01\x00\x00"
 """What a message starts with: classic CDR (XCDR1), little-endian."""
-SECOND = 1_000_000_000
 CODES = {
     "bool": "?",
     "byte": "B",

@@ -13,11 +13,11 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr_parts import (
     CODES,
     COUNT,
     HEADER,
-    SECOND,
     CdrError,
     SequencePackings,
     WholePackings,
@@ -47,7 +47,7 @@ _Read = Callable[[bytes, int], tuple[Any, int]]
 _HELPERS: dict[str, Any] = {
     "HEADER": HEADER,
     "MAX_TRAILING": MAX_TRAILING,
-    "SECOND": SECOND,
+    "SECOND": NS_PER_S,
     "CdrError": CdrError,
     "misfits": (struct.error, OverflowError, TypeError, AttributeError, ValueError),
     "malformed": (struct.error, UnicodeDecodeError),
