@@ -89,6 +89,12 @@ def test_ament_index_marker_is_there_and_empty():
     assert (ROOT / "resource" / "automax_ros").read_bytes() == b""
 
 
+def test_rooms_are_told_in_their_order():
+    assert f"\n{', '.join(ROOMS)}.\n" in str(automax_ros.__doc__)
+    house = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+)/` \|", house, re.MULTILINE) == ROOMS
+
+
 def test_every_folder_of_the_package_is_a_room():
     folders = {path.parent.relative_to(PACKAGE).parts[0] for path in PACKAGE.glob("*/**/*.py")}
     assert folders <= set(ROOMS)
@@ -136,6 +142,11 @@ def file_imports() -> dict[str, set[str]]:
         found = {name if name in modules else name.rpartition(".")[0] for name in names}
         graph[module] = found & set(modules) - {automax_ros.__name__}
     return graph
+
+
+def test_no_file_of_the_package_has_more_than_400_lines():
+    long = {path.relative_to(ROOT): path.read_text(encoding="utf-8").count("\n") for path in PACKAGE.rglob("*.py")}
+    assert {str(path): lines for path, lines in long.items() if lines > 400} == {}
 
 
 def test_no_file_imports_itself_through_others():

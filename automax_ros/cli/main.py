@@ -80,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: list[str]) -> int:
     from automax_ros.core.faults import Fault
 
-    # The options in front of the subcommand take no values, so the first word is its name.
+    # The options before the subcommand take no values, so the first word is its name.
     name = next((word for word in argv if not word.startswith("-")), None)
     try:
         if name is not None and name not in SUBCOMMANDS:

@@ -36,7 +36,7 @@ def require_picture_file(path: Path) -> None:
     """Refuse a picture that could not be written, before the work for it begins.
 
     Raises:
-        UsageError: its name has no suffix of a format, or there is no such folder.
+        UsageError: its suffix names no format of pictures, or there is no such folder.
     """
     if path.suffix.lower() not in PICTURE_FORMATS:
         raise UsageError(f"{path} names no format of pictures", f"end it with {', '.join(PICTURE_FORMATS)}")

@@ -1,4 +1,4 @@
-"""ROS 2 for a subcommand that cannot do without."""
+"""ROS 2 for a subcommand that needs it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ def prepare_ros(hint: str | None = None) -> int:
     """Make ROS 2 usable, before any input is read, and return the domain; ``hint`` says what to do without it.
 
     Raises:
-        UsageError: it is not there, or the domain is none.
+        UsageError: it is not there, or ROS_DOMAIN_ID names no domain.
     """
     from automax_ros.nodes.environment import RosUnavailable, prepare
 

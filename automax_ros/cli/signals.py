@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 _SIGNALLED = 128
-"""Exit code of a command that a signal has ended: so much more than the signal's number, as the shell has it."""
+"""Exit code of a command that a signal has ended, less the signal's number: what the shell adds."""
 
 
 @dataclass

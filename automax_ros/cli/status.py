@@ -33,8 +33,7 @@ class StatusDisplay:
 
     def update(self, now_ns: int) -> None:
         """Show news, and the state at a rack time if it is time to."""
-        for text in self._health.news() if self._health else ():
-            self.message(printable(text))
+        self._tell_news()
         passed = self._line.due()
         if passed:
             self._show(now_ns, passed)
@@ -51,6 +50,7 @@ class StatusDisplay:
 
     def finish(self, bag: Path | None, *, complete: bool = True) -> None:
         """Print the last state and the summary; ``complete`` tells whether all of the run is in the recording."""
+        self._tell_news()
         self._line.clear()
         rack = self._rack
         seconds, took = rack.now_ns / NS_PER_S, (time.monotonic_ns() - self._line.began_ns) / NS_PER_S
@@ -77,6 +77,10 @@ class StatusDisplay:
             rest = "" if complete else f", not to the end of the run; to complete the file: automax bag repair {bag}"
             print(f"recorded {bag}: {size / 1e6:.2f} MB{rest}")
         sys.stdout.flush()
+
+    def _tell_news(self) -> None:
+        for text in self._health.news() if self._health else ():
+            self.message(printable(text))
 
     def _show(self, now_ns: int, passed_ns: int) -> None:
         scans = sum(item.scans for item in self._rack.statistics.values())

@@ -1,4 +1,4 @@
-"""Run a task (.BLK) without a rack, one scan a row of a CSV table, and print its variables after each scan.
+"""Run a task (.BLK) without a rack, one scan per row of a CSV table, and print its variables after each scan.
 
 The header of IN.csv names variables with their type character: REF%, RUN@, GAIN, TABLE%(3). A cell sets its variable
 before the scan latches; an empty cell leaves it as it is. Commons, locals and tunables can be set. What stands before
