@@ -28,7 +28,6 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, as_json, has_errors, in_order
 from automax_ros.core.problems import Severity
 from automax_ros.core.text import count_of
-from automax_ros.rack.config import RackConfig
 
 _LINE_NUMBER = re.compile(r"\s*([0-9]{1,6})")
 
@@ -106,7 +105,7 @@ def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
         UsageError: the rack file itself cannot be read.
     """
     # Whoever checks a task alone need not wait until the reader of racks is loaded.
-    from automax_ros.cli.rack_file import is_text, load_rack_file
+    from automax_ros.cli.rack_file import is_text, load_rack_file, size_of
     from automax_ros.rack.tasks_check import check_tasks
 
     rack = load_rack_file(path, allow_outside=allow_outside)
@@ -116,7 +115,7 @@ def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
             rack.source,
             rack.diagnostics,
             [],
-            size=_size(rack.config) if rack.config is not None else "",
+            size=size_of(rack.config) if rack.config is not None else "",
             usable=is_text(rack),
         ),
         *(_Findings(item.source, item.result.diagnostics, item.result.unconfirmed) for item in tasks),
@@ -153,13 +152,6 @@ def _print(findings: list[_Findings], files: int) -> None:
             if one.size:
                 print(f"{one.source.name}: {one.size}")
         print(", ".join(counts) or f"no problems in {count_of(files, 'file')}")
-
-
-def _size(rack: RackConfig) -> str:
-    """Return what a rack consists of, in words."""
-    processors, tasks, commons = len(rack.task_modules), len(rack.placed_tasks), len(rack.declared)
-    counts = ((processors, "Processor"), (tasks, "task"), (commons, "common"))
-    return ", ".join(count_of(number, thing) for number, thing in counts)
 
 
 def _records(findings: _Findings) -> list[dict[str, object]]:

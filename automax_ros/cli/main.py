@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 SUBCOMMANDS: dict[str, str] = {
     "check": "find everything that is wrong with tasks and rack files",
-    "new": "make a rack file from a folder of tasks",
     "trace": "run a task scan by scan on a CSV table",
     "compile": "print the function that a task becomes",
     "tune-info": "coefficients and limits of dynamic blocks in a task",
     "response": "step response and Bode diagram of a dynamic block",
+    "new": "make a rack file from a folder of tasks",
     "run": "run a rack",
     "record": "record a rack that runs",
     "replay": "execute a recording again and show the first scan that differs",

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from automax_ros.cli.task_files import TASK_SUFFIX
 from automax_ros.cli.usage import UsageError
+from automax_ros.core.text import count_of
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import LoadResult, load
 
 DEFAULT_RACK_FILE = "rack.yaml"
@@ -31,6 +33,13 @@ def load_rack_file(path: Path, *, allow_outside: bool) -> LoadResult:
 def is_text(result: LoadResult) -> bool:
     """Whether a rack file could be read as text; too large, or not UTF-8, it counts as unreadable."""
     return not any(item.code in _NOT_A_TEXT for item in result.diagnostics)
+
+
+def size_of(rack: RackConfig) -> str:
+    """Return what a rack consists of, in words."""
+    processors, tasks, commons = len(rack.task_modules), len(rack.placed_tasks), len(rack.declared)
+    counts = ((processors, "Processor"), (tasks, "task"), (commons, "common"))
+    return ", ".join(count_of(number, thing) for number, thing in counts)
 
 
 def _meant(path: Path) -> Path:

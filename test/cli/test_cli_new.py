@@ -197,13 +197,11 @@ def test_link_in_place_of_the_rack_file_is_not_written_through(plant):
     assert Path("precious").read_text() == "mine"
 
 
-def test_rack_file_over_the_limit_is_refused(plant):
-    for number in range(30):
-        lines = "".join(f"{n} COMMON {chr(65 + number % 26)}{number // 26}LONGNAME{n}%\n" for n in range(1, 2000))
-        plant.write(f"plant/M{number}.BLK", lines + "9000 CALL SCAN_LOOP(TICKS=4)\n9010 END\n")
+def test_rack_file_over_the_limit_is_refused(plant, monkeypatch):
+    monkeypatch.setattr("automax_ros.rack.drafting.MAX_BYTES", 500)
     result = plant("new", "plant")
     assert result.code == 2
-    assert "would have more than 1000000 bytes" in result.err
+    assert "would have more than 500 bytes" in result.err
     assert not Path("plant/rack.yaml").exists()
 
 
