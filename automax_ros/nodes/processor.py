@@ -90,7 +90,7 @@ class ProcessorNode(ModuleNode):
         if operation.what == "stop_all":
             self.get_logger().error(f"STOP ALL: {operation.reason}")
         if operation.task in ("", *(task.name for task in self._tasks)):
-            self._publish_diagnostics(operation.at_ns)
+            self.publish_diagnostics(operation.at_ns)
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         """Refuse what a task would refuse, before any of the parameters is set; those that are not tunables pass."""
