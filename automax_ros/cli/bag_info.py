@@ -13,7 +13,6 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from automax_ros.bags.errors import BagError
 from automax_ros.bags.info import BagInfo, bag_info
 from automax_ros.bags.info_tasks import TaskFacts, task_facts
 from automax_ros.cli.bag_info_text import lines_of
@@ -39,12 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read the recording and tell what it holds."""
-    try:
-        with share_shown("reading") as progress:
-            info = bag_info(arguments.bag, check=arguments.check, progress=progress)
-    except BagError as error:
-        print(error, file=sys.stderr)
-        return 2
+    with share_shown("reading") as progress:
+        info = bag_info(arguments.bag, check=arguments.check, progress=progress)
     content = as_data(info, task_facts(info), checked=arguments.check)
     if arguments.json:
         json.dump(content, sys.stdout, indent=2)

@@ -12,10 +12,8 @@ import json
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from automax_ros.bags.errors import BagError
 from automax_ros.bags.repair.repairing import FileReport, RepairReport, repair
 from automax_ros.cli.progress import ProgressBar
-from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 
@@ -35,11 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Repair the recording and tell what was lost."""
-    try:
-        with ProgressBar("repairing", _STEPS) as bar:
-            report = repair(arguments.bag, arguments.output, lambda share: bar.show(round(share * _STEPS)))
-    except BagError as error:
-        raise UsageError(str(error)) from error
+    with ProgressBar("repairing", _STEPS) as bar:
+        report = repair(arguments.bag, arguments.output, lambda share: bar.show(round(share * _STEPS)))
     print(json.dumps(_data(report), indent=2) if arguments.json else _text(report))
     return 0
 

@@ -27,7 +27,7 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_of, wanted, whole_number
 from automax_ros.logix.pulse_comparison import PulseComparison
-from automax_ros.logix.pulse_conversion import ConversionError, PulseParameters
+from automax_ros.logix.pulse_conversion import PulseParameters
 
 _ROWS_A_LOOK = 256
 """Rows between two looks at the clock for the progress bar."""
@@ -60,16 +60,12 @@ def run(arguments: argparse.Namespace) -> int:
     parameters = _parameters(arguments)
     require_different_files({"--input": arguments.input}, {"--output": arguments.output})
     comparison = PulseComparison(parameters)
-    try:
-        with ExitStack() as files:
-            table = files.enter_context(CsvTable(arguments.input))
-            columns = _columns(table, arguments)
-            output = files.enter_context(opened_for_writing(arguments.output)) if arguments.output else None
-            bar = files.enter_context(ProgressBar("compare", table.size))
-            _compare(comparison, table, columns, output, bar)
-    except CsvFault as fault:
-        print(fault.render(arguments.input), file=sys.stderr)
-        return 2
+    with ExitStack() as files:
+        table = files.enter_context(CsvTable(arguments.input))
+        columns = _columns(table, arguments)
+        output = files.enter_context(opened_for_writing(arguments.output)) if arguments.output else None
+        bar = files.enter_context(ProgressBar("compare", table.size))
+        _compare(comparison, table, columns, output, bar)
     if not comparison.scans:
         raise UsageError(f"{arguments.input} has no rows, there is nothing to compare")
     report = Report(str(arguments.input), columns.feedback, columns.reset, parameters, comparison)
@@ -91,14 +87,11 @@ def _parameters(arguments: argparse.Namespace) -> PulseParameters:
     if arguments.initial_value is not None and arguments.reset is None:
         raise UsageError("--initial-value counts on the scan that ends a reset", "name the column of resets: --reset")
     multiplier, initial_value = arguments.multiplier, arguments.initial_value
-    try:
-        return PulseParameters(
-            _number("--word-size", arguments.word_size),
-            None if multiplier is None else _number("--multiplier", multiplier),
-            0 if initial_value is None else _number("--initial-value", initial_value),
-        )
-    except ConversionError as error:
-        raise UsageError(str(error), error.hint) from error
+    return PulseParameters(
+        _number("--word-size", arguments.word_size),
+        None if multiplier is None else _number("--multiplier", multiplier),
+        0 if initial_value is None else _number("--initial-value", initial_value),
+    )
 
 
 def _number(option: str, text: str) -> int:
@@ -140,7 +133,7 @@ def _position(table: CsvTable, names: list[str], option: str, wanted: str) -> in
         )
         raise UsageError(f"{option}: {table.path} has no column {quoted(wanted)}", hint)
     if len(places) > 1:
-        raise CsvFault("AMX6912", 1, f"there are two columns for {quoted(names[places[0]], marks='')}")
+        raise table.fault("AMX6912", f"there are two columns for {quoted(names[places[0]], marks='')}")
     return places[0]
 
 
@@ -191,19 +184,19 @@ def _scans(table: CsvTable, columns: _Columns) -> Iterator[tuple[int, bool]]:
         if cell := cells[columns.feedback_at].strip():
             value = value_of(cell, DataType.INTEGER)
             if not isinstance(value, int):
-                raise _wrong_cell(columns.feedback, cell, wanted(DataType.INTEGER), line, _unsigned_hint(cell))
+                raise _wrong_cell(table, columns.feedback, cell, wanted(DataType.INTEGER), line, _unsigned_hint(cell))
             feedback = value
         if columns.reset_at is not None and (cell := cells[columns.reset_at].strip()):
             value = value_of(cell, DataType.BOOLEAN)
             if not isinstance(value, bool):
-                raise _wrong_cell(str(columns.reset), cell, wanted(DataType.BOOLEAN), line)
+                raise _wrong_cell(table, str(columns.reset), cell, wanted(DataType.BOOLEAN), line)
             reset = value
         yield feedback, reset
 
 
-def _wrong_cell(column: str, cell: str, takes: str, line: int, hint: str | None = None) -> CsvFault:
+def _wrong_cell(table: CsvTable, column: str, cell: str, takes: str, line: int, hint: str | None = None) -> CsvFault:
     message = f"{quoted(column, marks='')} = {quoted(cell, marks='')}, it must be {takes}"
-    return CsvFault("AMX6915", line, message, hint)
+    return table.fault("AMX6915", message, hint, line)
 
 
 def _unsigned_hint(cell: str) -> str | None:

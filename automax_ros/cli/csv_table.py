@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import TypeVar
 
 from automax_ros.cli.usage import UsageError
+from automax_ros.core.faults import Fault
 from automax_ros.core.text import printable
 
 MAX_LINE = 1_000_000
@@ -22,19 +23,8 @@ MAX_LINE = 1_000_000
 _Table = TypeVar("_Table", bound="CsvTable")
 
 
-class CsvFault(Exception):
-    """Something is wrong with a table: ``code`` AMX6910 to AMX6916, the line from 1, and what to do if known."""
-
-    def __init__(self, code: str, line: int, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.code = code
-        self.line = line
-        self.hint = hint
-
-    def render(self, path: Path) -> str:
-        """Return the fault as the person reads it."""
-        text = f"{path}:{self.line}: error[{self.code}]: {self}"
-        return f"{text}\n  hint: {self.hint}" if self.hint else text
+class CsvFault(Fault):
+    """Something is wrong with a table: ``code`` AMX6910 to AMX6916; ``place`` is the file and its line."""
 
 
 class CsvTable:
@@ -88,6 +78,10 @@ class CsvTable:
         """Bytes that were read so far."""
         return self._stream.tell() if self._stream.seekable() else 0
 
+    def fault(self, code: str, message: str, hint: str | None = None, line: int | None = None) -> CsvFault:
+        """Return a fault of a line, the one that was read last unless another is given."""
+        return CsvFault(message, hint, code=code, place=f"{self.path}:{line or self._line or 1}")
+
     def numbered_rows(self) -> Iterator[tuple[int, list[str]]]:
         """Yield each row's line and its cells, as many as the header has.
 
@@ -106,24 +100,24 @@ class CsvTable:
             last_row = self._line
             if len(cells) != len(self.header):
                 message = f"the row has {len(cells)} cells, the header {len(self.header)}"
-                raise CsvFault("AMX6914", self._line, message)
+                raise self.fault("AMX6914", message)
             yield self._line, cells
 
     def _empty_rows(self, lines: range) -> range:
         """Return the empty lines between two rows, as rows."""
         if lines and len(self.header) > 1:
-            raise CsvFault(
+            raise self.fault(
                 "AMX6914",
-                lines[0],
                 "the line is empty, and rows follow",
                 f"write every {self.separator} of an empty row",
+                lines[0],
             )
         return lines
 
     def _header(self) -> list[str]:
         names = self._next_line()
         if not names:
-            raise CsvFault("AMX6910", 1, "the first line must name the variables", "such as REF%,RUN@")
+            raise self.fault("AMX6910", "the first line must name the variables", "such as REF%,RUN@")
         return names
 
     def _next_line(self) -> list[str] | None:
@@ -136,7 +130,7 @@ class CsvTable:
             return None
         self._line += 1
         if len(line) > MAX_LINE:
-            raise CsvFault("AMX6910", self._line, f"the line has more than {MAX_LINE} bytes")
+            raise self.fault("AMX6910", f"the line has more than {MAX_LINE} bytes")
         if self._line == 1:
             line = line.removeprefix(codecs.BOM_UTF8)
         return self._cells(line)
@@ -146,7 +140,7 @@ class CsvTable:
             text = line.decode().rstrip("\r\n")
         except UnicodeDecodeError as error:
             message = f"the table is not UTF-8: here is a byte {line[error.start]:#04x}"
-            raise CsvFault("AMX6910", self._line, message, "save the table as UTF-8") from error
+            raise self.fault("AMX6910", message, "save the table as UTF-8") from error
         if not text.strip():
             return []
         if self._line == 1 and ";" in text:
@@ -157,4 +151,4 @@ class CsvTable:
             return next(csv.reader((text,), delimiter=self.separator, strict=True, skipinitialspace=True))
         except csv.Error as error:
             hint = "a cell with quotes begins and ends with them on one line"
-            raise CsvFault("AMX6910", self._line, f"not CSV: {printable(str(error))}", hint) from error
+            raise self.fault("AMX6910", f"not CSV: {printable(str(error))}", hint) from error

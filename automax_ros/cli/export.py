@@ -11,7 +11,6 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.columns import Table, require_another_file
-from automax_ros.bags.errors import BagError
 from automax_ros.bags.export import CommonTable, write_csv
 from automax_ros.bags.scan_table import ScanTable
 from automax_ros.bags.series import Progress
@@ -43,15 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Export the recording."""
     as_numpy = arguments.output.suffix.lower() == ".npz"
-    try:
-        require_another_file(arguments.bag, arguments.output)
-        if not as_numpy and arguments.output.suffix.lower() in _OTHER_FORMATS:
-            raise UsageError(f"{arguments.output}: this format cannot be written", "name it OUT.csv or OUT.npz")
-        with ended_by_signals(), share_shown("export") as progress:
-            rows = _written(arguments, as_numpy, progress)
-    except BagError as error:
-        print(error, file=sys.stderr)
-        return 2
+    require_another_file(arguments.bag, arguments.output)
+    if not as_numpy and arguments.output.suffix.lower() in _OTHER_FORMATS:
+        raise UsageError(f"{arguments.output}: this format cannot be written", "name it OUT.csv or OUT.npz")
+    with ended_by_signals(), share_shown("export") as progress:
+        rows = _written(arguments, as_numpy, progress)
     if sys.stderr.isatty():
         print(f"{arguments.output}: {count_of(rows, 'row')}", file=sys.stderr)
     return 0

@@ -95,7 +95,8 @@ def _run(argv: list[str]) -> int:
             return 2
         return _exit_code(module.run(arguments))
     except Fault as error:
-        print(f"automax{f' {name}' if name in SUBCOMMANDS else ''}: error: {error}", file=sys.stderr)
+        head = "" if error.place else f"automax{f' {name}' if name in SUBCOMMANDS else ''}: error: "
+        print(f"{head}{error}", file=sys.stderr)
         return 2
     except SystemExit as stop:  # argparse's way to end after --help, --version and wrong usage
         return _exit_code(stop.code)

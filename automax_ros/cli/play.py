@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -66,16 +65,12 @@ def run(arguments: argparse.Namespace) -> int:
     target = _namespace(arguments.namespace)
     with stop_signals() as stop:
         domain = prepare_ros()
-        try:
-            found = _survey(arguments.bag, begin, end, stop)
-            if found is None:
-                return 0
-            _choose(found, arguments.topics)
-            renaming = Renaming(found.spaces, target)
-            return _play(found, renaming, rate, arguments, stop, domain)
-        except BagError as error:
-            print(error, file=sys.stderr)
-            return 2
+        found = _survey(arguments.bag, begin, end, stop)
+        if found is None:
+            return 0
+        _choose(found, arguments.topics)
+        renaming = Renaming(found.spaces, target)
+        return _play(found, renaming, rate, arguments, stop, domain)
 
 
 def _survey(bag: Path, begin: int | None, end: int | None, stop: StopRequest) -> Survey | None:
@@ -98,18 +93,14 @@ def _choose(found: Survey, texts: list[str] | None) -> None:
 def _play(
     found: Survey, renaming: Renaming, rate: float, arguments: argparse.Namespace, stop: StopRequest, domain: int
 ) -> int:
-    from automax_ros.nodes.environment import RosUnavailable
     from automax_ros.nodes.player import Player
 
-    try:
-        with nullcontext() if arguments.force else _locks(found, renaming, domain):
-            player = Player(found, renaming, rate, clock=arguments.clock)
-            try:
-                return _Show(found, player, stop, domain).play(arguments)
-            finally:
-                player.close()
-    except RosUnavailable as error:
-        raise UsageError(str(error)) from error
+    with nullcontext() if arguments.force else _locks(found, renaming, domain):
+        player = Player(found, renaming, rate, clock=arguments.clock)
+        try:
+            return _Show(found, player, stop, domain).play(arguments)
+        finally:
+            player.close()
 
 
 @contextmanager

@@ -6,11 +6,9 @@ Variables of one unit share a lane. Values hold until they change; however long 
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from automax_ros.bags.columns import require_another_file
-from automax_ros.bags.errors import BagError
 from automax_ros.bags.traces import traces
 from automax_ros.cli.output_files import require_picture_file
 from automax_ros.cli.plot_figure import Layout, figure_of, save
@@ -53,18 +51,14 @@ def run(arguments: argparse.Namespace) -> int:
     if not names:
         raise UsageError("name a variable", "`automax bag info BAG` lists them")
     width, height = arguments.size
-    try:
-        require_another_file(arguments.bag, output)
-        with ended_by_signals(), share_shown("plot") as progress:
-            shown = traces(arguments.bag, names, window, progress)
-            title = f"{shown.rack[:80]}: {arguments.bag.resolve().name[:80]}"
-            if window.start_ns or window.end_ns is not None:
-                end = seconds_text(round(shown.end_s * 10**9))
-                title += f", {seconds_text(window.start_ns)} to {end} s"
-            save(figure_of(shown, Layout(title, width, height, arguments.separate)), output)
-    except BagError as error:
-        print(error, file=sys.stderr)
-        return 2
+    require_another_file(arguments.bag, output)
+    with ended_by_signals(), share_shown("plot") as progress:
+        shown = traces(arguments.bag, names, window, progress)
+        title = f"{shown.rack[:80]}: {arguments.bag.resolve().name[:80]}"
+        if window.start_ns or window.end_ns is not None:
+            end = seconds_text(round(shown.end_s * 10**9))
+            title += f", {seconds_text(window.start_ns)} to {end} s"
+        save(figure_of(shown, Layout(title, width, height, arguments.separate)), output)
     return 0
 
 

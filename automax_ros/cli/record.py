@@ -16,7 +16,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from automax_ros.bags.errors import BagError, RecordingError
+from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.writer import StorageOptions
 from automax_ros.cli.record_options import split_period, storage_options
@@ -75,19 +75,12 @@ def run(arguments: argparse.Namespace) -> int:
         if folder.exists():
             print(RecordingError("AMX6800", folder, "exists already, not overwriting"), file=sys.stderr)
             return 2
-        from automax_ros.nodes.environment import RosUnavailable
         from automax_ros.nodes.recorder import LiveRecorder
 
-        try:
-            recorder = LiveRecorder(own)
-        except RosUnavailable as error:
-            raise UsageError(str(error)) from error
+        recorder = LiveRecorder(own)
         session = _Session(recorder, own, domain, stop)
         try:
             return session.record(folder, wait_ns, duration_ns, how, own_files)
-        except BagError as error:
-            print(error, file=sys.stderr)
-            return 2
         finally:
             recorder.close()
 

@@ -10,22 +10,17 @@ from automax_ros.cli.run_plan import RunPlan, report_end, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
-from automax_ros.cli.usage import UsageError
-from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.launcher import LiveRack
-from automax_ros.nodes.lock import LockError, RackLock, domain_id
+from automax_ros.nodes.lock import RackLock, domain_id
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import default_folder
 
 
 def run_live(plan: RunPlan, stop: StopRequest) -> int:
     """Run until the duration has passed or a stop is requested; return the exit code."""
-    try:
-        domain = domain_id()
-        with RackLock(plan.config.namespace, domain):
-            return _run_locked(plan, stop, domain)
-    except (LockError, RosUnavailable) as error:
-        raise UsageError(str(error)) from error
+    domain = domain_id()
+    with RackLock(plan.config.namespace, domain):
+        return _run_locked(plan, stop, domain)
 
 
 def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:

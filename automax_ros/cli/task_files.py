@@ -15,7 +15,7 @@ from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.rack.files import FileFault
-from automax_ros.rack.names import NameFault, check_task_name
+from automax_ros.rack.names import DeclarationFault, check_task_name
 from automax_ros.rack.task_source import read_task_source
 
 TASK_SUFFIX = ".BLK"
@@ -105,9 +105,11 @@ def name_warning(path: Path) -> Diagnostic | None:
     stem = path.stem
     try:
         check_task_name(stem.upper() if stem.isascii() else stem)
-    except NameFault as fault:
+    except DeclarationFault as fault:
         hint = "rename the file; or name the task in a rack file, with file: and this name"
-        return Diagnostic("AMX6900", f"{quoted(stem)} cannot be the task's name: {fault}", Span(1, 1, 2), hint=hint)
+        return Diagnostic(
+            "AMX6900", f"{quoted(stem)} cannot be the task's name: {fault.message}", Span(1, 1, 2), hint=hint
+        )
     return None
 
 

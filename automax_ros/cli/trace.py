@@ -17,7 +17,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
-from automax_ros.cli.csv_table import CsvFault
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
@@ -64,16 +63,12 @@ def run(arguments: argparse.Namespace) -> int:
         {"FILE": arguments.file, "--input": arguments.input},
         {"--output": arguments.output, "--errors": arguments.errors},
     )
-    try:
-        with ExitStack() as files:
-            table = files.enter_context(InputTable(arguments.input, lone))
-            output = files.enter_context(opened_for_writing(arguments.output))
-            errors = files.enter_context(opened_for_writing(arguments.errors)) if arguments.errors else None
-            bar = files.enter_context(ProgressBar("trace", table.size, wanted=arguments.output is not None))
-            _Trace(lone, watched, output, errors).run(table, bar)
-    except CsvFault as fault:
-        print(fault.render(arguments.input), file=sys.stderr)
-        return 2
+    with ExitStack() as files:
+        table = files.enter_context(InputTable(arguments.input, lone))
+        output = files.enter_context(opened_for_writing(arguments.output))
+        errors = files.enter_context(opened_for_writing(arguments.errors)) if arguments.errors else None
+        bar = files.enter_context(ProgressBar("trace", table.size, wanted=arguments.output is not None))
+        _Trace(lone, watched, output, errors).run(table, bar)
     return _conclusion(lone, all_told=errors is not None)
 
 

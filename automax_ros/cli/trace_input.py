@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from automax_ros.cli.csv_table import CsvFault, CsvTable
+from automax_ros.cli.csv_table import CsvTable
 from automax_ros.core.names import NameFault, UnknownName
 from automax_ros.core.text import quoted
 from automax_ros.core.types import DataType
@@ -46,7 +46,7 @@ class InputTable(CsvTable):
         for line, cells in self.numbered_rows():
             for variable, cell in zip(self.columns, cells, strict=True):
                 if cell and variable is not None:
-                    _set(variable, self._decimal(cell, variable), line)
+                    self._set(variable, self._decimal(cell, variable), line)
             yield line
 
     def _decimal(self, cell: str, variable: LoneVariable) -> str:
@@ -63,28 +63,27 @@ class InputTable(CsvTable):
                     columns[name] = None
                     continue
                 code = "AMX6911" if isinstance(fault, UnknownName) else "AMX6913"
-                raise CsvFault(code, 1, fault.message, _header_hint(name) or fault.hint) from fault
+                raise self.fault(code, fault.message, _header_hint(name) or fault.hint) from fault
             if variable.label in columns:
-                raise CsvFault("AMX6912", 1, f"there are two columns for {variable.label}")
+                raise self.fault("AMX6912", f"there are two columns for {variable.label}")
             columns[variable.label] = variable
         return list(columns.values())
 
-
-def _set(variable: LoneVariable, cell: str, line: int) -> None:
-    """Set a variable to what a cell says, on a line of the table."""
-    symbol = variable.symbol
-    text = cell if symbol.type is DataType.STRING else cell.strip()
-    if not text:
-        return
-    value = value_of(text, symbol.type, symbol.length)
-    try:
-        if value is None:
-            raise ValueError
-        variable.write(value)
-    except ValueError:
-        tuned = symbol.tuning is not None and is_number(text)
-        message = f"{variable.label} = {quoted(text, marks='')}, it must be {_wanted(symbol, tuned=tuned)}"
-        raise CsvFault("AMX6916" if tuned else "AMX6915", line, message) from None
+    def _set(self, variable: LoneVariable, cell: str, line: int) -> None:
+        """Set a variable to what a cell says, on a line of the table."""
+        symbol = variable.symbol
+        text = cell if symbol.type is DataType.STRING else cell.strip()
+        if not text:
+            return
+        value = value_of(text, symbol.type, symbol.length)
+        try:
+            if value is None:
+                raise ValueError
+            variable.write(value)
+        except ValueError:
+            tuned = symbol.tuning is not None and is_number(text)
+            message = f"{variable.label} = {quoted(text, marks='')}, it must be {_wanted(symbol, tuned=tuned)}"
+            raise self.fault("AMX6916" if tuned else "AMX6915", message, line=line) from None
 
 
 def _wanted(symbol: Symbol, *, tuned: bool) -> str:

@@ -11,7 +11,7 @@ class Fault(Exception):
     """
 
     def __init__(self, message: str, hint: str | None = None, *, code: str = "", place: str = "") -> None:
-        super().__init__(message, hint)
+        super().__init__(message)
         self.message = message
         self.hint = hint
         self.code = code

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from automax_ros.core.faults import Fault
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.logix.pmul import GAIN_ONE, MIN_WORD_SIZE, PulseMultiplier
 
@@ -12,12 +13,8 @@ DEFAULT_MULTIPLIER = 32768
 MAX_WORD_SIZE = 16
 
 
-class ConversionError(ValueError):
-    """A parameter that PULSE_MULT does not take, or one without equivalent in PMUL; ``hint`` says what to do."""
-
-    def __init__(self, message: str, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
+class ConversionError(Fault):
+    """A parameter that PULSE_MULT does not take, or one without equivalent in PMUL."""
 
 
 @dataclass(frozen=True)

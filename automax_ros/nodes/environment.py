@@ -25,14 +25,17 @@ import sysconfig
 import tempfile
 from pathlib import Path
 
+from automax_ros.core.faults import Fault
+
 SETUP_COMMAND = "make setup"
 COLCON_COMMAND = "colcon build --base-paths src src/automax_ros/msg_defs"
+
 
 # Set for the process that prepare() starts in place of this one: a second restart could not do better.
 _RESTARTED = "AUTOMAX_ROS_RESTARTED"
 
 
-class RosUnavailable(Exception):
+class RosUnavailable(Fault):
     """ROS 2, its middleware or automax_msgs cannot be used here; the text names the command that helps."""
 
 

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 from types import TracebackType
 
+from automax_ros.core.faults import Fault
 from automax_ros.core.text import quoted
 from automax_ros.nodes.environment import RosUnavailable
 
@@ -15,7 +16,7 @@ MAX_DOMAIN = 232
 """Beyond it the ports of DDS end."""
 
 
-class LockError(Exception):
+class LockError(Fault):
     """The lock cannot be taken."""
 
 

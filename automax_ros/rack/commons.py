@@ -12,7 +12,7 @@ from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
-from automax_ros.rack.names import PREDEFINED, NameFault, VariableName, variable_name
+from automax_ros.rack.names import PREDEFINED, DeclarationFault, VariableName, variable_name
 from automax_ros.rack.points import KEYS, PointReader
 from automax_ros.rack.presets import preset_value
 from automax_ros.rack.reserved import is_reserved
@@ -78,8 +78,8 @@ class CommonReader:
     def _name(self, key: Scalar) -> VariableName | None:
         try:
             declared = variable_name(self._findings.upper_case(key.text, key.span))
-        except NameFault as fault:
-            self._findings.add(fault.code, f"{quoted(key.text)}: {fault}", key.span, fault.hint)
+        except DeclarationFault as fault:
+            self._findings.add(fault.code, f"{quoted(key.text)}: {fault.message}", key.span, fault.hint)
             return None
         bare = bare_name(declared.name)
         if is_reserved(declared.name):

@@ -30,7 +30,7 @@ from automax_ros.rack.config import (
 from automax_ros.rack.files import MAX_BYTES, FileFault, is_inside
 from automax_ros.rack.modules.common_memory import COMMON_REGISTERS
 from automax_ros.rack.modules.processor import MAX_PROCESSORS
-from automax_ros.rack.names import NameFault, variable_name
+from automax_ros.rack.names import DeclarationFault, variable_name
 from automax_ros.rack.task_config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY
 from automax_ros.rack.task_source import read_task_source
 from automax_ros.rack.tasks_check import check_source
@@ -207,7 +207,7 @@ def _add_common(found: Draft, task: DraftedTask, declared: Declared) -> None:
     )
     try:
         variable_name(declaration_text(spec.name, spec.dimensions, spec.length))
-    except NameFault:  # the check of the task says what is wrong with it
+    except DeclarationFault:  # the check of the task says what is wrong with it
         return
     known = found.commons.setdefault(spec.name, spec)
     if task.name not in found.users[known.name]:

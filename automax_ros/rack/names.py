@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from automax_ros.core.faults import Fault
 from automax_ros.core.types import (
     DEFAULT_STRING_LENGTH,
     MAX_ARRAY_ELEMENTS,
@@ -30,14 +31,11 @@ _DECLARATION = re.compile(
 _SIZE = re.compile(r"[0-9]{1,9}\Z")
 
 
-class NameFault(ValueError):
-    """A name breaks a rule: ``code`` of the problem, the message, and a hint where there is one."""
+class DeclarationFault(Fault):
+    """A name breaks a rule; ``code`` is the problem's."""
 
     def __init__(self, code: str, message: str, hint: str | None = None) -> None:
-        """Keep the code and the hint with the message."""
-        super().__init__(message)
-        self.code = code
-        self.hint = hint
+        super().__init__(message, hint, code=code)
 
 
 @dataclass(frozen=True)
@@ -59,31 +57,33 @@ def check_task_name(text: str) -> None:
     """Check a task's name in upper case.
 
     Raises:
-        NameFault: AMX6300, not 1 to 8 letters, digits and underscores, the first a letter (2.4.1).
+        DeclarationFault: AMX6300, not 1 to 8 letters, digits and underscores, the first a letter (2.4.1).
     """
     if not _TASK.match(text):
-        raise NameFault("AMX6300", "a task's name has letters, digits and underscores, and begins with a letter")
+        raise DeclarationFault("AMX6300", "a task's name has letters, digits and underscores, and begins with a letter")
     if len(text) > TASK_NAME_LIMIT:
-        raise NameFault("AMX6300", f"a task's name has at most {TASK_NAME_LIMIT} characters, this one {len(text)}")
+        raise DeclarationFault(
+            "AMX6300", f"a task's name has at most {TASK_NAME_LIMIT} characters, this one {len(text)}"
+        )
 
 
 def variable_name(text: str) -> VariableName:
     """Return what a key of ``common`` in upper case declares: ``A%``, ``TABLE%(10)``, ``MESSAGE$:50(3)``.
 
     Raises:
-        NameFault: AMX6400 not a name, AMX6404 subscripts, AMX6405 length of a string.
+        DeclarationFault: AMX6400 not a name, AMX6404 subscripts, AMX6405 length of a string.
     """
     match = _DECLARATION.match(text)
     if not match:
-        raise NameFault(
+        raise DeclarationFault(
             "AMX6400", "not a variable's name", "write NAME%, NAME!, NAME@, NAME$ or NAME, then (10) for an array"
         )
     bare = match["name"]
     if not _BARE.match(bare):
-        raise NameFault("AMX6400", "a variable's name has letters, digits and underscores, and no digit first")
+        raise DeclarationFault("AMX6400", "a variable's name has letters, digits and underscores, and no digit first")
     if len(bare) > NAME_LIMIT:
         message = f"a variable's name has at most {NAME_LIMIT} characters before its type, this one {len(bare)}"
-        raise NameFault("AMX6400", message)
+        raise DeclarationFault("AMX6400", message)
     kind = type_of_name(bare + match["type"])
     subscripts = match["round"] if match["round"] is not None else match["square"]
     length = _length(kind, match["length"])
@@ -93,12 +93,14 @@ def variable_name(text: str) -> VariableName:
 def _length(kind: DataType, text: str | None) -> int:
     if kind is not DataType.STRING:
         if text is not None:
-            raise NameFault("AMX6405", f"only a string has a length, not a {kind.word}", "a string's name ends in $")
+            raise DeclarationFault(
+                "AMX6405", f"only a string has a length, not a {kind.word}", "a string's name ends in $"
+            )
         return 0
     if text is None:
         return DEFAULT_STRING_LENGTH
     if not _SIZE.match(text) or not 1 <= int(text) <= MAX_STRING_LENGTH:
-        raise NameFault("AMX6405", f"the length of a string is 1 to {MAX_STRING_LENGTH}")
+        raise DeclarationFault("AMX6405", f"the length of a string is 1 to {MAX_STRING_LENGTH}")
     return int(text)
 
 
@@ -107,14 +109,18 @@ def _dimensions(text: str | None) -> tuple[int, ...]:
         return ()
     parts = [part.strip() for part in text.split(",")]
     if len(parts) > MAX_DIMENSIONS:
-        raise NameFault("AMX6404", f"an array has at most {MAX_DIMENSIONS} subscripts, this one {len(parts)}")
+        raise DeclarationFault("AMX6404", f"an array has at most {MAX_DIMENSIONS} subscripts, this one {len(parts)}")
     sizes: list[int] = []
     elements = 1
     for part in parts:
         if not _SIZE.match(part) or int(part) > MAX_SUBSCRIPT:
-            raise NameFault("AMX6404", f"the largest subscript of an array is a whole number from 0 to {MAX_SUBSCRIPT}")
+            raise DeclarationFault(
+                "AMX6404", f"the largest subscript of an array is a whole number from 0 to {MAX_SUBSCRIPT}"
+            )
         sizes.append(int(part) + 1)
         elements *= int(part) + 1
     if elements > MAX_ARRAY_ELEMENTS:
-        raise NameFault("AMX6404", f"the array has {elements} elements; at most {MAX_ARRAY_ELEMENTS} are possible")
+        raise DeclarationFault(
+            "AMX6404", f"the array has {elements} elements; at most {MAX_ARRAY_ELEMENTS} are possible"
+        )
     return tuple(sizes)

@@ -11,7 +11,7 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.files import FileFault, is_inside, lies_next_to, read_bytes
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.names import NameFault, check_task_name
+from automax_ros.rack.names import DeclarationFault, check_task_name
 from automax_ros.rack.scalars import integer_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 from automax_ros.rack.task_config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
@@ -70,8 +70,8 @@ class TaskReader:
         name = self.findings.upper_case(key.text, key.span)
         try:
             check_task_name(name)
-        except NameFault as fault:
-            self.findings.add(fault.code, f"{quoted(key.text)}: {fault}", key.span, fault.hint)
+        except DeclarationFault as fault:
+            self.findings.add(fault.code, f"{quoted(key.text)}: {fault.message}", key.span, fault.hint)
             return None
         if name in self.seen:
             report_twice(key, f"task {name}", self.seen[name], self.findings, "AMX6301")

@@ -164,7 +164,7 @@ def test_any_bytes_are_rows_or_a_fault_with_its_line(lone, data):
                 task.task.scan(0)
     except CsvFault as error:
         fault = error
-    assert fault is None or (fault.code in FAULTS and last <= fault.line <= lines)
+    assert fault is None or (fault.code in FAULTS and last <= int(fault.place.rpartition(":")[2]) <= lines)
 
 
 def traced(path, data):

@@ -4,7 +4,7 @@ import pytest
 
 from automax_ros.core.types import DataType
 from automax_ros.language.syntax.tokens import RESERVED_WORDS
-from automax_ros.rack.names import NameFault, VariableName, variable_name
+from automax_ros.rack.names import DeclarationFault, VariableName, variable_name
 
 from .helpers import HEAD, codes
 
@@ -53,7 +53,7 @@ def test_declarations(text, expected):
     ],
 )
 def test_declarations_that_break_a_rule(text, code):
-    with pytest.raises(NameFault) as caught:
+    with pytest.raises(DeclarationFault) as caught:
         variable_name(text)
     assert caught.value.code == code
 
