@@ -72,10 +72,11 @@ class Suggester:
         """Return near words in any case: twins of another type character first, then by letters in common."""
         if len(word) > _LONGEST_GUESS:
             return []
-        choices = {item.casefold(): item for item in sorted(known, reverse=True)}
-        self._left -= len(choices)
+        words = list(known)
+        self._left -= len(words)
         if self._left < 0:
             return []
+        choices = {item.casefold(): item for item in sorted(words, reverse=True)}
         asked = word.casefold()
         bare = bare_name(asked)
         twins = sorted(item for item in choices if bare_name(item) == bare and item != asked)
