@@ -15,7 +15,6 @@ from automax_ros.blocks.declaration import (
     Input,
     Limit,
     Output,
-    Relation,
     State,
     Time,
     Times,
@@ -101,6 +100,10 @@ TACHLOSS_OVERSPEED = Block(
 )
 
 
+SLACK = 1e-9
+"""What the rise may exceed its limit by, for the rounding of I_FDBK**2 / SCALE: exactly THRESHOLD % never trips."""
+
+
 def thermal_lag(values: Mapping[str, float]) -> float:
     """Return the frequency wlg of the filter in rad/s (36.1)."""
     bar, threshold = values["LIM_BAR"], values["THRESHOLD"]
@@ -116,15 +119,15 @@ def _laplace(values: Mapping[str, float]) -> str:
     return f"1 / (1 + s/{thermal_lag(values):.6g}) of I_FDBK**2, in counts of CALC_RISE"
 
 
-def thermal_coefficients(_period_s: float, values: Mapping[str, float]) -> tuple[float, float, float, float]:
-    """Return scale of the squared current, gain of the inputs and of the last rise, and the rise that trips (36.1).
+def thermal_coefficients(_period_s: float, values: Mapping[str, float]) -> tuple[float, float, float]:
+    """Return scale of the squared current, gain of the filter, and the rise that trips (36.1).
 
     The filter maps with C = 2/T, plain bilinear, so that TRIP_TIME holds (decision).
     """
     bar, threshold = values["LIM_BAR"], values["THRESHOLD"]
     kx = thermal_lag(values) * _period_s / 2.0
     scale = 1.0 / ((FULL_SCALE / bar) ** 2 * 10.0)
-    return scale, kx / (1.0 + kx), (1.0 - kx) / (1.0 + kx), threshold**2 / 10.0
+    return scale, kx / (1.0 + kx), threshold**2 / 10.0 + SLACK
 
 
 def thermal_overload_step(
@@ -132,18 +135,20 @@ def thermal_overload_step(
     reset: bool,
     scale: float,
     gain: float,
-    feedback: float,
     trip: float,
     x1: float,
     y1: float,
     tripped: bool,
 ) -> tuple[bool, int, float, float, bool]:
-    """Filter the square of the current; the rounded rise trips above the threshold and ends at 100 % (36.1)."""
+    """Filter the square of the current; the rise trips above the threshold, the rounded one ends at 100 % (36.1).
+
+    The low pass moves by its distance from the input: so no rounding carries a steady current's rise beyond it.
+    """
     squared = i_fdbk * i_fdbk * scale
-    y1 = 0.0 if reset else gain * (squared + x1) + feedback * y1
+    y1 = 0.0 if reset else y1 + gain * (squared - y1 + (x1 - y1))
     x1 = squared
     rise = floor(y1 + 0.5)
-    tripped = rise > (RATED_RISE if tripped else trip)
+    tripped = rise > RATED_RISE if tripped else y1 > trip
     overload = tripped
     calc_rise = rise if rise <= INT16_MAX else INT16_MAX
     return overload, calc_rise, x1, y1, tripped
@@ -151,6 +156,11 @@ def thermal_overload_step(
 
 def _defaults(_period_s: float) -> dict[str, float]:
     return {"LIM_BAR": LIM_BAR, "THRESHOLD": THRESHOLD, "TRIP_TIME": TRIP_TIME}
+
+
+def _highest_threshold(_period_s: float, values: Mapping[str, float]) -> float:
+    """Return the high limit of THRESHOLD, which has to lie below LIM_BAR (decision: by one)."""
+    return min(124.0, values["LIM_BAR"] - 1.0)
 
 
 THERMAL_OVERLOAD = Block(
@@ -190,24 +200,20 @@ THERMAL_OVERLOAD = Block(
     ),
     coefficients=Coefficients(
         parameters=("LIM_BAR", "THRESHOLD", "TRIP_TIME"),
-        names=("scale", "gain", "feedback", "trip"),
+        names=("scale", "gain", "trip"),
         limits=(
             Limit("LIM_BAR", constant(115.0), constant(400.0), "115", "400"),
-            Limit("THRESHOLD", constant(110.0), constant(124.0), "110", "124"),
+            Limit(
+                "THRESHOLD", constant(110.0), _highest_threshold, "110", "124, at most LIM_BAR - 1", uses=("LIM_BAR",)
+            ),
             Limit("TRIP_TIME", constant(10.0), constant(120.0), "10", "120"),
         ),
         defaults=_defaults,
         compute=thermal_coefficients,
-        relation=Relation(
-            parameters=("LIM_BAR", "THRESHOLD"),
-            holds=lambda values: values["LIM_BAR"] > values["THRESHOLD"],
-            first=lambda _period_s, _values: {"LIM_BAR": LIM_BAR, "THRESHOLD": THRESHOLD},
-            text="LIM_BAR must be above THRESHOLD",
-        ),
         dynamics=Dynamics(
             transfer=thermal_transfer,
             laplace=_laplace,
-            equation="y = gain (x + x1) + feedback y1,  x = scale I_FDBK**2; OVERLOAD above trip".format_map,
+            equation="y = y1 + gain (x + x1 - 2 y1),  x = scale I_FDBK**2; OVERLOAD above trip".format_map,
             corners=lambda values: [("wlg", thermal_lag(values))],
             exact_at="",
             signals=("I_FDBK",),
@@ -221,8 +227,8 @@ THERMAL_OVERLOAD = Block(
     notes=(
         "wlg = ln((LIM_BAR**2 - 100**2) / (LIM_BAR**2 - THRESHOLD**2)) / TRIP_TIME.",
         "Parameters beyond their limits are limited and logged, constants too.",
-        "LIM_BAR not above THRESHOLD is logged; the last pair that was in order stays in force, at first 150 and 114.",
-        "OVERLOAD ends when the rise is back at 1000, its value at 100 % of current.",
+        "A THRESHOLD that is not below LIM_BAR becomes LIM_BAR - 1 and is logged; LIM_BAR stays in force.",
+        "OVERLOAD trips on the rise before it is rounded; it ends when CALC_RISE is back at 1000, its value at 100 %.",
         "Every UDC task needs this block unless hardware protects the motor.",
     ),
     expected_on=UDC_ONLY,

@@ -129,27 +129,58 @@ def test_never_trips_below_the_threshold_and_always_above(lim_bar, threshold):
     pytest.fail("no overload at a percent above the threshold")
 
 
-def test_trips_above_the_threshold_and_resets_at_1000_not_above():
+def test_trips_above_the_threshold_and_ends_at_1000_not_above():
+    """It trips on the rise before it is rounded: 1299.6 shows as 1300."""
     block = run("THERMAL_OVERLOAD", 10 * MS, trip_time=10)
-    rows = [block.scan(i_fdbk=10_000) for _ in range(800)]
-    rise = next(row["calc_rise"] for row in rows if row["overload"])
-    assert rise >= 1300
-    assert all(row["overload"] == (row["calc_rise"] >= 1300) for row in rows)
+    rows = [(block.scan(i_fdbk=10_000), block.state["y1"]) for _ in range(800)]
+    assert all(row["overload"] == (rise > 1299.6) for row, rise in rows)
+    assert any(row["overload"] for row, _ in rows)
     while block.outputs["calc_rise"] > 900:
         result = block.scan(i_fdbk=2000)
         assert result["overload"] == (result["calc_rise"] > 1000)
-    rises = [block.scan(i_fdbk=4000) for _ in range(2000)]
-    assert all(row["overload"] == (row["calc_rise"] >= 1300) for row in rises)
-    assert any(row["calc_rise"] == 1299 for row in rises)
+    rows = [(block.scan(i_fdbk=3200), block.state["y1"]) for _ in range(8000)]
+    assert all(row["overload"] == (rise > 1299.6) for row, rise in rows)
+    assert any(row == {"overload": False, "calc_rise": 1300} for row, _ in rows)
 
 
-@pytest.mark.parametrize(("threshold", "trips_at"), [(110, 1211), (114, 1300), (123, 1513), (124, 1538)])
-def test_the_rise_that_trips(threshold, trips_at):
-    """More than the real THRESHOLD**2 / 10, which is 1210, 1299.6, 1512.9, 1537.6."""
+@pytest.mark.parametrize(("threshold", "limit"), [(110, 1210.0), (114, 1299.6), (123, 1512.9), (124, 1537.6)])
+def test_the_rise_that_trips(threshold, limit):
+    """More than the real THRESHOLD**2 / 10, before rounding."""
     block = run("THERMAL_OVERLOAD", 10 * MS, threshold=threshold, trip_time=120)
-    rises = [block.scan(i_fdbk=12_000) for _ in range(6000)]
-    assert next(row["calc_rise"] for row in rises if row["overload"]) == trips_at
-    assert any(row["calc_rise"] == trips_at - 1 and not row["overload"] for row in rises)
+    rows = [(block.scan(i_fdbk=12_000)["overload"], block.state["y1"]) for _ in range(6000)]
+    assert all(overload == (rise > limit) for overload, rise in rows)
+    assert {overload for overload, _ in rows} == {False, True}
+
+
+@pytest.mark.parametrize(
+    ("current", "lim_bar", "threshold"),
+    [(3591, 130, 114), (2457, 190, 114), (1155, 390, 110), (1287, 350, 110), (3003, 150, 110)],
+)
+@pytest.mark.parametrize("trip_time", [10, 120])
+def test_exactly_the_threshold_never_trips(current, lim_bar, threshold, trip_time):
+    """At THRESHOLD % itself there is no overload (36), however long it lasts; a count more is one."""
+    assert current * lim_bar == threshold * FULL
+    block = run("THERMAL_OVERLOAD", 2000 * trip_time * MS, lim_bar=lim_bar, threshold=threshold, trip_time=trip_time)
+    for _ in range(3000):
+        block.scan(i_fdbk=current)
+    assert block.state["y1"] == pytest.approx(threshold**2 / 10, abs=1e-6)
+    assert not block.outputs["overload"]
+    for _ in range(3000):
+        block.scan(i_fdbk=current + 1)
+    assert block.outputs["overload"]
+
+
+@pytest.mark.parametrize("period_ns", [MS // 2, 10 * MS])
+def test_a_rise_just_below_its_end_does_not_creep_over_it(period_ns):
+    """The rounding of each scan must not add up: the slowest filter there is, with its rise at the last bit below."""
+    block = run("THERMAL_OVERLOAD", period_ns, lim_bar=390, threshold=110, trip_time=120)
+    block.scan(i_fdbk=1155)
+    steady = block.state["x1"]
+    block.state["y1"] = steady
+    for _ in range(5000):
+        block.scan(i_fdbk=1155)
+        assert block.state["y1"] <= steady
+    assert not block.outputs["overload"]
 
 
 def test_reset_clears_rise_and_overload():
@@ -248,24 +279,23 @@ def same_heating(block, rows, **parameters):
     return all(block.scan(i_fdbk=9000, **rows) == right.scan(i_fdbk=9000) for _ in range(200))
 
 
-@pytest.mark.parametrize("pair", [(115, 115), (116, 120), (124, 124), (100, 115), (120, 200)])
-def test_a_first_pair_that_is_refused_leaves_150_and_114(pair):
+@pytest.mark.parametrize(
+    ("pair", "in_force"),
+    [((115, 115), (115, 114)), ((116, 120), (116, 115)), ((124, 124), (124, 123)), ((100, 115), (115, 114))],
+)
+def test_a_threshold_not_below_lim_bar_becomes_one_less(pair, in_force):
+    """LIM_BAR is the scale of the current and always stays in force, limited (decision)."""
     given = {"lim_bar": pair[0], "threshold": pair[1]}
-    assert same_heating(run("THERMAL_OVERLOAD", 10 * MS), given, lim_bar=150, threshold=114)
-    assert same_heating(run("THERMAL_OVERLOAD", 10 * MS, **given), {}, lim_bar=150, threshold=114)
+    right = {"lim_bar": in_force[0], "threshold": in_force[1]}
+    assert same_heating(run("THERMAL_OVERLOAD", 10 * MS), given, **right)
+    assert same_heating(run("THERMAL_OVERLOAD", 10 * MS, **given), {}, **right)
     assert logged_by(run("THERMAL_OVERLOAD", 10 * MS, **given), [{}, {}, {}]) == [LIMITED, 0, 0]
     assert logged_by(run("THERMAL_OVERLOAD", 10 * MS), [given] * 3) == [LIMITED, 0, 0]
 
 
-def test_a_refused_pair_leaves_the_last_good_one():
+def test_a_lim_bar_that_comes_down_to_the_threshold_moves_it():
     block = run("THERMAL_OVERLOAD", 10 * MS)
     good, bad = {"lim_bar": 130, "threshold": 124}, {"lim_bar": 120, "threshold": 124}
     assert logged_by(block, [good, bad, bad, good, bad]) == [0, LIMITED, 0, 0, LIMITED]
     block.scan(i_fdbk=0, reset=True, **bad)
-    assert same_heating(block, {**bad, "trip_time": 60}, **good)
-
-
-def test_a_refused_pair_does_not_keep_trip_time_from_changing():
-    block = run("THERMAL_OVERLOAD", 10 * MS, lim_bar=115, threshold=120)
-    block.scan(i_fdbk=0, reset=True, trip_time=60)
-    assert same_heating(block, {"trip_time": 20}, lim_bar=150, threshold=114, trip_time=20)
+    assert same_heating(block, {**bad, "trip_time": 60}, lim_bar=120, threshold=119)
