@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.blocks.declaration import Block, Form, Input, Output, State, Time, Times
-from automax_ros.core.numbers import INT16_MAX
+from automax_ros.core.numbers import INT16_MAX, INT32_MAX
 from automax_ros.core.types import DataType
 
 
@@ -21,9 +21,9 @@ def pulse_mult_step(
     """Multiply counts by MULTIPLIER / 32768 and carry what is left over (21).
 
     ``remainder`` counts in 1/32768, exactly, with its sign; counts above 32767 that the output cannot show stay in it
-    (below -32768 none can arise). In relative mode the error is the low WORD_SIZE bits of INPUT - INPUT(n-1), sign
-    extended; INPUT(n-1) is INITIAL_VALUE on the scan that RESET ends and INPUT on a first pass without RESET, which
-    gives 0 (decision).
+    (below -32768 none can arise); it clamps at 32 bits. In relative mode the error is the low WORD_SIZE bits of
+    INPUT - INPUT(n-1), sign extended; INPUT(n-1) is INITIAL_VALUE on the scan that RESET ends and INPUT on a first pass
+    without RESET, which gives 0 (decision).
     """
     if reset:
         total = 0
@@ -42,6 +42,8 @@ def pulse_mult_step(
         if output > INT16_MAX:
             output = INT16_MAX
             remainder = total - output * 32768
+            if remainder > INT32_MAX:
+                remainder = INT32_MAX
     else:
         output = -(-total >> 15)
         remainder = total - output * 32768

@@ -48,7 +48,8 @@ class PulseMultiplier:
     - The difference keeps its low WordSize bits with their sign, as in PULSE_MULT: a change of exactly half a word
       gives -2**(WordSize - 1) in either direction.
     - An invalid WordSize holds Out with its status bits, In(n-1) and the remainder: a later valid WordSize counts from
-      there. In absolute mode, which does not use it, no WordSize is invalid.
+      there. On a first scan it holds an Out of 0 (the page: Out(n-1) = 0). In absolute mode, which does not use it, no
+      WordSize is invalid.
     - Initialize is stronger than an invalid WordSize. Both parameters are judged while it is set.
     - Without EnableIn registers and Status stay as they are: the next execution sees the whole change since the last.
     - The first scan is the first execution of a new tag or after a prescan. With Initialize set it is like any other.
@@ -140,6 +141,8 @@ class PulseMultiplier:
 
     def _set_registers(self) -> None:
         """Give the registers what Initialize, its end, or a first scan demands."""
+        if self._first_scan:
+            self.Out, self.Status = 0.0, 0
         if self.Initialize:
             self.previous_in = 0
             self.remainder = 0

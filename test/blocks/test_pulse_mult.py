@@ -101,6 +101,16 @@ def test_word_size_lies_between_0_and_16(word_size):
         run("PULSE_MULT", word_size=word_size)
 
 
+def test_the_remainder_clamps_at_32_bits():
+    """-32768 * -32768 leaves a count more on each scan: past 2**31 - 1 there is no room for it (decision)."""
+    block = run("PULSE_MULT")
+    block.state["remainder"] = 2**31 - 1 - 32768
+    assert block.scan(input=-32768, multiplier=-32768) == {"output": 32767}
+    assert block.state["remainder"] == 2**31 - 1
+    assert block.scan(input=-32768, multiplier=-32768) == {"output": 32767}
+    assert block.state["remainder"] == 2**31 - 1
+
+
 @repeatable
 @given(st.lists(st.tuples(int16, int16), max_size=60))
 def test_absolute_mode_loses_no_counts(rows):

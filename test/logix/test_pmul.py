@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from automax_ros.logix.pmul import PulseMultiplier
+from automax_ros.logix.pmul import GAIN_ONE, PulseMultiplier
 from automax_ros.logix.updn import UpDownAccumulator
 
 from .support import set_bits
@@ -219,6 +219,18 @@ def test_scan_after_prescan_is_a_first_scan():
     tag.EnableIn = True
     assert outputs(tag, [200, 210]) == [0.0, 7.0]
     assert tag.remainder == 50_000
+
+
+@pytest.mark.parametrize("count", [600, 2**31 - 1])
+def test_after_a_prescan_an_invalid_word_size_holds_an_out_of_0(count):
+    """The page: on the first scan Out(n-1) = 0, and that is what is held."""
+    pmul = PulseMultiplier(Mode=False, In=count, Multiplier=GAIN_ONE * 10)
+    pmul.scan()
+    assert pmul.Out != 0
+    pmul.prescan()
+    pmul.EnableIn, pmul.Mode, pmul.WordSize = True, True, 1
+    pmul.scan()
+    assert (pmul.Out, pmul.WordSizeInv, pmul.OutOverflow, pmul.LostPrecision) == (0.0, True, False, False)
 
 
 def test_first_scan_forgets_an_initialize_before_the_prescan():
