@@ -56,7 +56,8 @@ def test_an_endless_scan_in_steps_is_stopped():
 
 
 def test_an_endless_start_is_stopped():
-    task, _ = task_of("10 LOCAL A%\n20 A% = 1\n30 GOTO 30\n40 CALL SCAN_LOOP(TICKS=4)\n50 END\n")
+    endless = "30 FOR N% = 1 TO 2\n31 N% = 1\n32 NEXT N%\n"
+    task, _ = task_of(f"10 LOCAL A%, N%\n20 A% = 1\n{endless}40 CALL SCAN_LOOP(TICKS=4)\n50 END\n")
     task.run()
     assert (task.status, task.value("A%"), logged(task)) == (Status.FAULTED, 1, [(30, 7040)])
 

@@ -84,7 +84,17 @@ def test_a_jump_to_scan_loop_tells_where_it_is() -> None:
 
 def test_jumps_over_scan_loop() -> None:
     assert codes(lines("LOCAL A%", "IF A% > 0 THEN 40", LOOP, "A% = 1", "END")) == ["AMX4049"]
-    assert codes(lines("LOCAL A%", "A% = A% + 1", "IF A% < 5 THEN 20", LOOP, "END")) == []
+
+
+@pytest.mark.parametrize("jump", ["GOTO {}", "IF A% < 5 THEN {}", "IF A% < 5 THEN GOTO {}", "ON A% GOTO {}"])
+@pytest.mark.parametrize("line", [20, 40, 50])
+def test_no_jump_within_the_part_before_scan_loop(jump: str, line: int) -> None:
+    """GOTO must not reference SCAN_LOOP or a line before it (4.0), from there neither; FOR may loop there."""
+    start = ("LOCAL A%", "A% = A% + 1", jump.format(line), "A% = A% * 2")
+    errors = [item for item in problems(lines(*start, LOOP, "END")) if item.severity is Severity.ERROR]
+    assert [item.code for item in errors] == ["AMX4048"]
+    assert "FOR" in (errors[0].hint or "")
+    assert codes(lines("LOCAL A%, I%", "FOR I% = 1 TO 5", "A% = A% + 1", "NEXT I%", LOOP, "END")) == []
 
 
 def test_jumps_inside_a_block_and_out_of_it() -> None:

@@ -123,15 +123,22 @@ def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:
     note = (Note(f"line {jump.line} is here", place.statement.span),)
     if isinstance(place.statement, Declaration):
         context.report("AMX4051", f"line {jump.line} declares variables: nothing is executed there", span, notes=note)
-    elif place.region is Region.LOOP or (place.region is Region.STARTUP and jump.place.region is Region.SCAN):
+    elif place.region is Region.LOOP or (place.region is Region.STARTUP and _ends_at_scan_loop(jump)):
         where = "is SCAN_LOOP" if place.region is Region.LOOP else "lies before SCAN_LOOP"
         hint = "END goes back to SCAN_LOOP by itself; what lies before it runs once"
+        if jump.place.region is Region.STARTUP:
+            hint = "what lies before SCAN_LOOP runs down to it; FOR repeats, IF ... END_IF leaves out"
         context.report("AMX4048", f"{jump.verb} {jump.line} cannot be: the line {where}", span, hint, note)
     elif place.region is not jump.place.region:
         message = f"{jump.verb} {jump.line} would jump over SCAN_LOOP"
         context.report("AMX4049", message, span, "what lies before SCAN_LOOP runs down to it", note)
     elif jump.place.blocks[: len(place.blocks)] != place.blocks and not context.broken.blocks:
         context.report("AMX4050", f"{jump.verb} {jump.line} would jump into an IF or FOR block", span, notes=note)
+
+
+def _ends_at_scan_loop(jump: Jump) -> bool:
+    """Return whether a line before SCAN_LOOP is out of reach: for GOTO from anywhere, for GOSUB from the scan."""
+    return not jump.verb.endswith("GOSUB") or jump.place.region is Region.SCAN
 
 
 def _near_line(line: int, places: dict[int, Place]) -> str | None:
