@@ -22,6 +22,8 @@ def whole(code: str, text: str) -> str:
     """The example, where it stands for a text too long to be printed."""
     if code == "AMX0001":
         return text.replace("...", "." * SOURCE_LIMIT, 1)
+    if code == "AMX0006":
+        return text.encode("utf-16").decode("latin-1")
     if code == "AMX0002":
         line = text.splitlines()[2]
         more = [f"{number} {line.partition(' ')[2]}" for number in range(1000, 1000 + DIAGNOSTIC_LIMIT)]

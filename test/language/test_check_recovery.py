@@ -94,6 +94,23 @@ def test_unconfirmed_forms_are_listed() -> None:
     assert check_text(task("A% = ABS(B%)")).unconfirmed == []
 
 
+def test_a_call_without_a_line_number_is_unconfirmed() -> None:
+    """3.1 wants one; what stands in an IF of several lines has its own."""
+    latch = "CALL LATCH(SET=X@, RESET=Y@, OUTPUT=X@)"
+    text = task(
+        f"A% = 1 \\ {latch}",
+        f"IF X@ THEN {latch} ELSE {latch}",
+        "IF X@ THEN",
+        latch,
+        "END_IF",
+        declare="LOCAL A%, X@, Y@",
+    )
+    result = check_text(text)
+    assert result.program is not None
+    assert [span.line for span, _ in result.unconfirmed] == [3, 4, 4]
+    assert all("line number" in what for _, what in result.unconfirmed)
+
+
 def test_program_knows_its_source() -> None:
     text = task("A% = 1")
     assert program(text).source_hash == program(text).source_hash

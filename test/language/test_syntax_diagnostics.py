@@ -11,8 +11,8 @@ from automax_ros.language.syntax.parser import SOURCE_LIMIT, parse
 from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT
 
 TEXTS = sorted((GOLDEN / "diagnostics").glob("syntax_*.BLK"))
-LARGE = {"AMX0001", "AMX0002", "AMX0005"}
-"""Codes of texts too large for a golden file; tested here."""
+LARGE = {"AMX0001", "AMX0002", "AMX0005", "AMX0006"}
+"""Codes of texts too large for a golden file, or not text; tested here."""
 
 
 def problems(text: str) -> list[Diagnostic]:
@@ -51,6 +51,27 @@ def test_text_above_the_limit_is_refused_unread() -> None:
     assert [item.code for item in found] == ["AMX0001"]
     assert module.statements == ()
     assert codes("10 END".ljust(SOURCE_LIMIT)) == []
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_a_utf_16_source_gives_one_error(encoding: str) -> None:
+    text = "10 LOCAL A%\n20 CALL SCAN_LOOP(TICKS=4)\n30 A% = A% + 1\n40 END\n"
+    module, found = parse(SourceText("TASK.BLK", text.encode(encoding).decode("latin-1")))
+    assert [item.code for item in found] == ["AMX0006"]
+    assert "UTF-8" in (found[0].hint or "")
+    assert module.statements == ()
+
+
+def test_a_zero_byte_in_a_plain_text_is_a_character_without_meaning() -> None:
+    assert codes("10 LOCAL A%\n20 A% = 1 \0\n30 END\n") == ["AMX0004"]
+
+
+@pytest.mark.parametrize("rest", ["", "\n", "garbage ,,,\n", "\0" * 100, "50 A% =\n60 END\n", "\x1a\x1a"])
+def test_text_after_ctrl_z_is_ignored_as_dos_does(rest: str) -> None:
+    text = "10 LOCAL A%\r\n20 A% = 1\r\n30 END\r\n"
+    module, found = parse(SourceText("TASK.BLK", f"{text}\x1a{rest}"))
+    assert found == []
+    assert module == parse(SourceText("TASK.BLK", text))[0]
 
 
 def test_problems_end_at_the_limit_with_one_that_says_so() -> None:

@@ -10,6 +10,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX0003", "lower case read as upper case", Severity.WARNING),
     Problem("AMX0004", "character without meaning"),
     Problem("AMX0005", "statement too long"),
+    Problem("AMX0006", "text in UTF-16"),
     Problem("AMX0010", "line without a line number"),
     Problem("AMX0011", "line number out of range"),
     Problem("AMX0012", "line number used twice"),

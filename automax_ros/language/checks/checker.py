@@ -25,8 +25,8 @@ from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProble
 from automax_ros.language.syntax.tree import Call, Declaration, Module, Read, Statement
 
 AUTOMAX = Processor.AUTOMAX
-_TOO_LARGE, _TOO_MANY = "AMX0001", "AMX0002"
-_NOT_READ = (_TOO_LARGE, _TOO_MANY)
+_TOO_LARGE, _TOO_MANY, _UTF_16 = "AMX0001", "AMX0002", "AMX0006"
+_NOT_READ = (_TOO_LARGE, _TOO_MANY, _UTF_16)
 """Findings of the parser after which the tree is not the whole task."""
 
 

@@ -59,7 +59,7 @@ def checked_structure(context: Context, block: Block, parameter: Input, argument
         context.report("AMX4088", f"no SHIFT block makes the data structure {value.name}", value.span, hint)
     if len(bare_name(value.name)) == NAME_LIMIT:
         message = f"the name {value.name} has {NAME_LIMIT} characters"
-        context.report("AMX4095", message, value.span, "sections 23, 30, 39 and 40 of the manual allow only 15")
+        context.report("AMX4095", message, value.span, "sections 23, 24, 30, 39 and 40 of the manual allow only 15")
     return value
 
 

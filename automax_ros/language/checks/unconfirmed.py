@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.language.syntax.tree import Declaration, Expression, FunctionCall, IoWrite, Module, Statement
+from automax_ros.language.syntax.tree import Call, Declaration, Expression, FunctionCall, IoWrite, Module, Statement
 from automax_ros.language.syntax.unconfirmed import UNCONFIRMED_FUNCTIONS, UNCONFIRMED_STATEMENTS
 from automax_ros.language.syntax.walk import arguments_of, expressions_of, parts, statements_in_order
 
@@ -20,6 +20,8 @@ def find_unconfirmed(module: Module) -> list[tuple[Span, str]]:
 
 
 def _of_statement(statement: Statement) -> list[tuple[Span, str]]:
+    if isinstance(statement, Call) and statement.number is None:
+        return [(statement.span, UNCONFIRMED_STATEMENTS["CALL"])]
     if isinstance(statement, IoWrite):
         return [(statement.span, UNCONFIRMED_STATEMENTS["IOWRITE"])]
     if isinstance(statement, Declaration):

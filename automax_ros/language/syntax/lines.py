@@ -22,7 +22,8 @@ _NUMBERED_STATEMENT = re.compile(
     rf"[ \t\f]*[0-9]{{1,5}}[ \t]*(?:(?:{_FIRST_WORDS})(?![A-Z0-9_%!@$])|[A-Z_][A-Z0-9_]*[%!@$]?[ \t]*=)",
     re.IGNORECASE,
 )
-_END_OF_FILE = "\x1a"
+END_OF_FILE = "\x1a"
+"""Ctrl-Z, at which DOS stops reading a text."""
 
 
 @dataclass
@@ -42,7 +43,7 @@ class LineReader:
     """Reads a text line by line and reports what is wrong with numbers and continuations."""
 
     def __init__(self, source: SourceText, reporter: Reporter) -> None:
-        text = source.text.rstrip("\r\n" + _END_OF_FILE)
+        text = source.text.partition(END_OF_FILE)[0].rstrip("\r\n")
         self._lines = SourceText(source.name, text).lines
         if self._lines[0].startswith("\N{ZERO WIDTH NO-BREAK SPACE}"):
             self._lines[0] = " " + self._lines[0][1:]

@@ -6,7 +6,7 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.language.syntax.conditional import StatementReader
 from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.frames import FrameStack
-from automax_ros.language.syntax.lines import LineReader, LogicalLine
+from automax_ros.language.syntax.lines import END_OF_FILE, LineReader, LogicalLine
 from automax_ros.language.syntax.reporter import Reporter, SyntaxFaultError, TooManyProblemsError
 from automax_ros.language.syntax.tokens import Fault, Kind, Token
 from automax_ros.language.syntax.tree import Label, Module, Remark, Statement
@@ -26,6 +26,9 @@ def parse(source: SourceText, basic_task: bool = False) -> tuple[Module, list[Di
     if len(source.text) > SOURCE_LIMIT:
         message = f"the text has {len(source.text)} characters, more than {SOURCE_LIMIT}"
         return Module(()), [Diagnostic("AMX0001", message, Span(1, 1, 2), hint="divide the task")]
+    if source.text.partition(END_OF_FILE)[0].count("\0") * 4 > len(source.text):
+        hint = "save it as ANSI, ASCII or UTF-8"
+        return Module(()), [Diagnostic("AMX0006", "the file is not plain text but UTF-16", Span(1, 1, 2), hint=hint)]
     return _TaskParser(source, reporter, basic_task).module(), reporter.diagnostics
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from automax_ros.language.syntax.functions import FUNCTIONS
 
 UNCONFIRMED_STATEMENTS: dict[str, str] = {
+    "CALL": "CALL after `\\` or THEN: section 3.1 wants a line number",
     "IOWRITE": "IOWRITE slot, register, value: the name and the order of the operands",
     "TUNABLE": "LOCAL NAME [CURRENT=..., HIGH=..., LOW=..., STEP=...]: the bracket and its keys",
 }
