@@ -29,15 +29,7 @@ def read_bits_step(
     data: list[int],
     head: int,
     loaded: int,
-    output1: bool,
-    output2: bool,
-    output3: bool,
-    output4: bool,
-    output5: bool,
-    output6: bool,
-    output7: bool,
-    output8: bool,
-) -> tuple[bool, bool, bool, bool, bool, bool, bool, bool, bool, int]:
+) -> tuple[bool, bool, bool, bool, bool, bool, bool, bool, bool, bool, int]:
     """Show a column while enabled; a column that does not exist gives FALSE and is logged (23)."""
     error = enable and (column < 0 or column >= max_columns)
     bits = 0
@@ -47,14 +39,15 @@ def read_bits_step(
     problem = 0
     if enable and (column < 0 or column >= max_columns):
         problem = NO_SUCH_COLUMN
-    output1 = bits & 1 != 0 if enable else output1
-    output2 = bits & 2 != 0 if enable else output2
-    output3 = bits & 4 != 0 if enable else output3
-    output4 = bits & 8 != 0 if enable else output4
-    output5 = bits & 16 != 0 if enable else output5
-    output6 = bits & 32 != 0 if enable else output6
-    output7 = bits & 64 != 0 if enable else output7
-    output8 = bits & 128 != 0 if enable else output8
+    output1 = bits & 1 != 0
+    output2 = bits & 2 != 0
+    output3 = bits & 4 != 0
+    output4 = bits & 8 != 0
+    output5 = bits & 16 != 0
+    output6 = bits & 32 != 0
+    output7 = bits & 64 != 0
+    output8 = bits & 128 != 0
+    writes = enable
     return (
         error,
         output1,
@@ -65,6 +58,7 @@ def read_bits_step(
         output6,
         output7,
         output8,
+        writes,
         problem,
     )
 
@@ -77,31 +71,24 @@ def read_words_step(
     data: list[int],
     head: int,
     loaded: int,
-    output1: int,
-    output2: int,
-    output3: int,
-    output4: int,
-    output5: int,
-    output6: int,
-    output7: int,
-    output8: int,
-) -> tuple[bool, int, int, int, int, int, int, int, int, int]:
+) -> tuple[bool, int, int, int, int, int, int, int, int, bool, int]:
     """Show a column while enabled; a column that does not exist gives 0 and is logged (24)."""
     error = enable and (column < 0 or column >= max_columns)
-    there = column >= 0 and column < loaded
+    there = enable and column >= 0 and column < loaded
     place = head + column if head + column < max_columns else head + column - max_columns
     cell = place * channels
     problem = 0
     if enable and (column < 0 or column >= max_columns):
         problem = NO_SUCH_COLUMN
-    output1 = (data[cell] if there else 0) if enable else output1
-    output2 = (data[cell + 1] if there and channels > 1 else 0) if enable else output2
-    output3 = (data[cell + 2] if there and channels > 2 else 0) if enable else output3
-    output4 = (data[cell + 3] if there and channels > 3 else 0) if enable else output4
-    output5 = (data[cell + 4] if there and channels > 4 else 0) if enable else output5
-    output6 = (data[cell + 5] if there and channels > 5 else 0) if enable else output6
-    output7 = (data[cell + 6] if there and channels > 6 else 0) if enable else output7
-    output8 = (data[cell + 7] if there and channels > 7 else 0) if enable else output8
+    output1 = data[cell] if there else 0
+    output2 = data[cell + 1] if there and channels > 1 else 0
+    output3 = data[cell + 2] if there and channels > 2 else 0
+    output4 = data[cell + 3] if there and channels > 3 else 0
+    output5 = data[cell + 4] if there and channels > 4 else 0
+    output6 = data[cell + 5] if there and channels > 5 else 0
+    output7 = data[cell + 6] if there and channels > 6 else 0
+    output8 = data[cell + 7] if there and channels > 7 else 0
+    writes = enable
     return (
         error,
         output1,
@@ -112,6 +99,7 @@ def read_words_step(
         output6,
         output7,
         output8,
+        writes,
         problem,
     )
 

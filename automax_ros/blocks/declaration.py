@@ -4,12 +4,12 @@ Checker, compiler, documentation, templates and the cost model all read the one 
 stands anywhere else.
 
 The step function is pure. Its parameters are named after the declaration, in lower case: inputs, coefficients and
-states, in any order, and only those it uses. An output named there too (one that ``holds``) brings the value the output
-variable has. It returns one tuple of plain names: the outputs, then the new states, both in the order of the
-declaration, and, where the block has ``logs``, last the number of the problem (0 for none). Its body is straight
-assignments, ``if``, ``while`` and one ``return`` at the end; it uses integers, floats, booleans, comparisons, numeric
-constants of its module and the helpers of ``HELPERS``. So it can be called as it stands, inlined by the compiler from
-its syntax tree, and compiled to machine code.
+states, in any order, and only those it uses. It returns one tuple of plain names: the outputs, then the new states,
+both in the order of the declaration; then, where outputs hold, ``writes``, which tells whether those are written; and
+last, where the block has ``logs``, the number of the problem (0 for none). Its body is straight assignments, ``if``,
+``while`` and one ``return`` at the end; it uses integers, floats, booleans, comparisons, numeric constants of its
+module and the helpers of ``HELPERS``. So it can be called as it stands, inlined by the compiler from its syntax tree,
+and compiled to machine code.
 
 Long data are buffers that a step reads by index: a table of the CALL, or a state with a ``size``, which it also writes
 in place. A step may take the ``CALL_FACTS`` besides, which are integers known when the task is compiled.
@@ -136,8 +136,7 @@ class Input:
 class Output:
     """An output parameter: always a variable, never inverted.
 
-    ``holds``: the step function is given the present value and may return it unchanged, which then counts as not
-    written.
+    ``holds``: it is written only where the step function says so; otherwise its variable is neither read nor written.
     """
 
     name: str
@@ -351,6 +350,11 @@ class Block:
     def parameters(self) -> tuple[Input | Output, ...]:
         """Inputs, then outputs."""
         return (*self.inputs, *self.outputs)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the block does not always write its outputs."""
+        return any(output.holds for output in self.outputs)
 
     @property
     def problems(self) -> tuple[str, ...]:

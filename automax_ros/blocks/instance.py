@@ -34,9 +34,10 @@ class Instance:
 
     ``outputs`` and ``state`` are the values of its output variables and hidden states after the last scan, ``error`` is
     the number of the last problem that the last scan logged, 0 for none; ``coefficients`` are those it was run with.
-    ``results`` names what the step function returns: outputs, then states. Writing into ``outputs`` stands for a write
-    of the variable by another: a block that holds an output sees it. A table is any sequence of numbers. The name of a
-    data structure is not given: READ and WRITE blocks get the instance of the SHIFT block that makes theirs.
+    ``results`` names what the step function returns: outputs, then states. ``wrote`` tells whether the last scan wrote
+    outputs that hold; those it does not write stay as they are, whoever wrote into ``outputs``. A table is any sequence
+    of numbers. The name of a data structure is not given: READ and WRITE blocks get the instance of the SHIFT block
+    that makes theirs.
     """
 
     def __init__(self, block: Block, period_ns: int, structure: Instance | None = None, /, **literals: Value) -> None:
@@ -67,6 +68,7 @@ class Instance:
         self.state: dict[str, Value | list[Value]] = {item.name: self._initial(item) for item in block.states}
         self._structure = {} if structure is None else structure.state
         self.error = 0
+        self.wrote = True
         self._given: dict[str, float] | None = None
         self.coefficients: dict[str, float] = {}
         self._kept: tuple[float, ...] = ()
@@ -96,11 +98,10 @@ class Instance:
         """
         arguments = self._arguments({**inputs, name: 0})
         place = self._wanted.index(name)
-        held = {*self.state, *(item.variable for item in self.block.outputs if item.holds)}
         returning = [
             (self._wanted.index(item), position)
             for position, item in enumerate(self.results)
-            if item in held and item in self._wanted
+            if item in self.state and item in self._wanted
         ]
         step, result = self._step, None
         try:
@@ -123,12 +124,15 @@ class Instance:
         values.update(self._facts_of(inputs))
         values.update(self._structure)
         values.update(self.state)
-        values.update((item.variable, self.outputs[item.variable]) for item in self.block.outputs if item.holds)
         return [values[name] for name in self._wanted]
 
     def _keep(self, result: tuple[Any, ...]) -> None:
-        self.outputs.update(zip(self.outputs, result, strict=False))
-        self.state.update(zip(self.state, result[len(self.outputs) :], strict=False))
+        after_states = len(self.outputs) + len(self.state)
+        self.wrote = bool(result[after_states]) if self.block.holds else True
+        for output, value in zip(self.block.outputs, result, strict=False):
+            if self.wrote or not output.holds:
+                self.outputs[output.variable] = value
+        self.state.update(zip(self.state, result[len(self.outputs) : after_states], strict=True))
         if self.block.logs and result[-1]:
             self.error = int(result[-1])
 

@@ -64,15 +64,11 @@ OR = Block(
 )
 
 
-def latch_step(reset: bool, set: bool, clock: bool, input: bool, output: bool) -> tuple[bool]:
+def latch_step(reset: bool, set: bool, clock: bool, input: bool) -> tuple[bool, bool]:
     """Reset before set before clock; otherwise the output variable keeps what it has, whoever wrote it (15)."""
-    if reset:
-        output = False
-    elif set:
-        output = True
-    elif clock:
-        output = input
-    return (output,)
+    output = False if reset else True if set else input
+    writes = reset or set or clock
+    return output, writes
 
 
 LATCH = Block(

@@ -137,25 +137,18 @@ def move_step(
     input6: int,
     input7: int,
     input8: int,
-    output1: int,
-    output2: int,
-    output3: int,
-    output4: int,
-    output5: int,
-    output6: int,
-    output7: int,
-    output8: int,
-) -> tuple[int, int, int, int, int, int, int, int]:
+) -> tuple[int, int, int, int, int, int, int, int, bool]:
     """Pass the inputs on while enabled; otherwise the output variables keep what they have, whoever wrote it (17)."""
-    output1 = input1 if enable else output1
-    output2 = input2 if enable else output2
-    output3 = input3 if enable else output3
-    output4 = input4 if enable else output4
-    output5 = input5 if enable else output5
-    output6 = input6 if enable else output6
-    output7 = input7 if enable else output7
-    output8 = input8 if enable else output8
-    return output1, output2, output3, output4, output5, output6, output7, output8
+    output1 = input1
+    output2 = input2
+    output3 = input3
+    output4 = input4
+    output5 = input5
+    output6 = input6
+    output7 = input7
+    output8 = input8
+    writes = enable
+    return output1, output2, output3, output4, output5, output6, output7, output8, writes
 
 
 MOVE = Block(

@@ -47,15 +47,7 @@ def shift_bits_step(
     data: list[int],
     head: int,
     loaded: int,
-    output1: bool,
-    output2: bool,
-    output3: bool,
-    output4: bool,
-    output5: bool,
-    output6: bool,
-    output7: bool,
-    output8: bool,
-) -> tuple[bool, bool, bool, bool, bool, bool, bool, bool, bool, list[int], int, int]:
+) -> tuple[bool, bool, bool, bool, bool, bool, bool, bool, bool, list[int], int, int, bool]:
     """Shift a column in and the last one out; RESET zeroes structure and outputs, without a shift outputs keep (30)."""
     column = 0
     if reset:
@@ -82,19 +74,19 @@ def shift_bits_step(
         data[head] = column
         if loaded < max_columns:
             loaded = loaded + 1
-    changes = reset or shift
+    writes = reset or shift
     data_valid = loaded == max_columns
     leaving = 0
-    if loaded == max_columns:
+    if writes and loaded == max_columns:
         leaving = data[head - 1 if head > 0 else max_columns - 1]
-    output1 = leaving & 1 != 0 if changes else output1
-    output2 = leaving & 2 != 0 if changes else output2
-    output3 = leaving & 4 != 0 if changes else output3
-    output4 = leaving & 8 != 0 if changes else output4
-    output5 = leaving & 16 != 0 if changes else output5
-    output6 = leaving & 32 != 0 if changes else output6
-    output7 = leaving & 64 != 0 if changes else output7
-    output8 = leaving & 128 != 0 if changes else output8
+    output1 = leaving & 1 != 0
+    output2 = leaving & 2 != 0
+    output3 = leaving & 4 != 0
+    output4 = leaving & 8 != 0
+    output5 = leaving & 16 != 0
+    output6 = leaving & 32 != 0
+    output7 = leaving & 64 != 0
+    output8 = leaving & 128 != 0
     return (
         data_valid,
         output1,
@@ -108,6 +100,7 @@ def shift_bits_step(
         data,
         head,
         loaded,
+        writes,
     )
 
 
@@ -165,7 +158,9 @@ SHIFT_BITS = Block(
     name="SHIFT_BITS",
     section="30",
     title="Shift bits",
-    function="If SHIFT: OUTPUTn = column MCOL - 1, columns move on by one, column 0 = INPUTn if ENABLE, else FALSE",
+    function=(
+        "If SHIFT: columns move on by one, column 0 = INPUTn if ENABLE, else FALSE, then OUTPUTn = column MCOL - 1"
+    ),
     inputs=_inputs(DataType.BOOLEAN, Special.BITS),
     outputs=_outputs(DataType.BOOLEAN),
     states=_states(_columns),
@@ -195,15 +190,7 @@ def shift_words_step(
     data: list[int],
     head: int,
     loaded: int,
-    output1: int,
-    output2: int,
-    output3: int,
-    output4: int,
-    output5: int,
-    output6: int,
-    output7: int,
-    output8: int,
-) -> tuple[bool, int, int, int, int, int, int, int, int, list[int], int, int]:
+) -> tuple[bool, int, int, int, int, int, int, int, int, list[int], int, int, bool]:
     """Shift a column in and the last one out; RESET zeroes structure and outputs, without a shift outputs keep (31)."""
     if reset:
         loaded = 0
@@ -227,18 +214,18 @@ def shift_words_step(
             data[place + 7] = input8 if enable else 0
         if loaded < max_columns:
             loaded = loaded + 1
-    changes = reset or shift
-    full = loaded == max_columns
+    writes = reset or shift
+    full = writes and loaded == max_columns
     last = (head - 1 if head > 0 else max_columns - 1) * channels
     data_valid = loaded == max_columns
-    output1 = (data[last] if full else 0) if changes else output1
-    output2 = (data[last + 1] if full and channels > 1 else 0) if changes else output2
-    output3 = (data[last + 2] if full and channels > 2 else 0) if changes else output3
-    output4 = (data[last + 3] if full and channels > 3 else 0) if changes else output4
-    output5 = (data[last + 4] if full and channels > 4 else 0) if changes else output5
-    output6 = (data[last + 5] if full and channels > 5 else 0) if changes else output6
-    output7 = (data[last + 6] if full and channels > 6 else 0) if changes else output7
-    output8 = (data[last + 7] if full and channels > 7 else 0) if changes else output8
+    output1 = data[last] if full else 0
+    output2 = data[last + 1] if full and channels > 1 else 0
+    output3 = data[last + 2] if full and channels > 2 else 0
+    output4 = data[last + 3] if full and channels > 3 else 0
+    output5 = data[last + 4] if full and channels > 4 else 0
+    output6 = data[last + 5] if full and channels > 5 else 0
+    output7 = data[last + 6] if full and channels > 6 else 0
+    output8 = data[last + 7] if full and channels > 7 else 0
     return (
         data_valid,
         output1,
@@ -252,6 +239,7 @@ def shift_words_step(
         data,
         head,
         loaded,
+        writes,
     )
 
 
@@ -259,7 +247,7 @@ SHIFT_WORDS = Block(
     name="SHIFT_WORDS",
     section="31",
     title="Shift words",
-    function="If SHIFT: OUTPUTn = column MCOL - 1, columns move on by one, column 0 = INPUTn if ENABLE, else 0",
+    function="If SHIFT: columns move on by one, column 0 = INPUTn if ENABLE, else 0, then OUTPUTn = column MCOL - 1",
     inputs=_inputs(DataType.INTEGER, Special.WORDS),
     outputs=_outputs(DataType.INTEGER),
     states=_states(_words),

@@ -7,9 +7,10 @@ filled at its start. REALs, strings and array elements are read and written in a
 from __future__ import annotations
 
 import ast
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from automax_ros.blocks.coefficients import evaluate, evaluate_noting
 from automax_ros.blocks.declaration import (
@@ -26,12 +27,13 @@ from automax_ros.blocks.declaration import (
 from automax_ros.blocks.shift import STRUCTURE_STATES
 from automax_ros.compile import build
 from automax_ros.compile.emitter import Emitter
-from automax_ros.compile.expressions import SUBSCRIPT, lower_element, lower_index
-from automax_ros.compile.folding import TableReader
-from automax_ros.compile.inline import Binding, inline
+from automax_ros.compile.expressions import lower_element, lower_index
+from automax_ros.compile.folding import TableReader, value_of
+from automax_ros.compile.inline import Binding, inline, names_in
 from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.pynames import forced_name, latched_name, structure_prefix, variable_name
 from automax_ros.compile.simplify import log_in_place
+from automax_ros.compile.stores import write_at
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
 from automax_ros.language.program import BoundCall
@@ -42,6 +44,7 @@ from automax_ros.language.syntax.tree import (
     IntegerLiteral,
     RealLiteral,
     Scope,
+    Target,
     Unary,
     Variable,
 )
@@ -149,30 +152,24 @@ def lower_block(emitter: Emitter, instance: BlockInstance) -> None:
 def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     bound, block = instance.bound, instance.bound.block
     values = {item.variable: _input(emitter, bound, item) for item in block.inputs if _is_value(block, item)}
+    outputs = _places(emitter, bound)
     facts = bound.facts
     for name in CALL_FACTS:
         if name in facts:
             values.setdefault(name, build.constant(facts[name]))
     _bind_coefficients(emitter, instance, values)
-    held: dict[str, ast.expr] = {}
-    for output in block.outputs:
-        if output.holds and output.name in bound.arguments:
-            held[output.name] = values[output.variable] = _block_value(emitter, bound.arguments[output.name])
-        elif output.holds:
-            values[output.variable] = build.constant(output.type.zero)
-    wanted = {
-        output.name: _direct_name(emitter, bound.arguments[output.name])
-        for output in block.outputs
-        if output.name in bound.arguments
-    }
+    wanted = {place.output.name: place.local for place in outputs}
     binding = Binding(instance.prefix, values, instance.states, _tables(emitter, bound))
-    inlined = inline(block, binding, wanted, _free(values, wanted, held))
+    inlined = inline(block, binding, wanted, _free(values, outputs))
     body = inlined.body
     emitter.emit(*(log_in_place(body, inlined.error, emitter.log_call) if inlined.error is not None else body))
-    for output in block.outputs:
-        if output.name in wanted:
-            _store_output(emitter, output, bound.arguments[output.name], inlined.outputs[output.name], held)
-    _drop_forced(emitter, [bound.arguments[name] for name in wanted])
+    for holds, places in itertools.groupby(outputs, key=lambda place: place.output.holds):
+        stores = [(place, inlined.outputs[place.output.name]) for place in places]
+        if holds:
+            _store_when(emitter, inlined.writes, stores)
+        else:
+            _store_all(emitter, stores)
+    _drop_forced(emitter, [place.target for place in outputs])
 
 
 def _drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
@@ -181,6 +178,36 @@ def _drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
     for name in dict.fromkeys(names):
         restore = build.assign(variable_name(name), build.name(latched_name(name)))
         emitter.emit(build.when(build.name(forced_name(name)), [restore]))
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where an output goes: ``local`` is its Python name, "" where it lies in actual memory or in an array.
+
+    Of an array element ``index`` and ``in_range`` are what the subscripts tell before the block.
+    """
+
+    output: Output
+    target: Target
+    local: str
+    index: ast.expr | None = None
+    in_range: ast.expr | None = None
+
+
+def _places(emitter: Emitter, bound: BoundCall) -> list[_Place]:
+    """Return where the outputs go, in the order of the CALL; their subscripts are evaluated here, before the block."""
+    declared = {output.name: output for output in bound.block.outputs}
+    given = [(declared[name], target) for name, target in bound.arguments.items() if name in declared]
+    changing = frozenset(_local(emitter, target) for _, target in given)
+    places: list[_Place] = []
+    for output, target in given:
+        assert isinstance(target, (Variable, Element))
+        place = _Place(output, target, _local(emitter, target))
+        if isinstance(target, Element):
+            index, in_range = lower_index(emitter, target, changing)
+            place = replace(place, index=index, in_range=in_range)
+        places.append(place)
+    return places
 
 
 def _is_value(block: Block, item: Input) -> bool:
@@ -237,8 +264,8 @@ def _block_value(emitter: Emitter, given: Expression) -> ast.expr:
     return emitter.read(given.name)
 
 
-def _direct_name(emitter: Emitter, target: Expression) -> str:
-    """Return the Python local that an output may be computed in, "" where it has none."""
+def _local(emitter: Emitter, target: Expression) -> str:
+    """Return the Python local that an output is stored in, "" where it has none."""
     if isinstance(target, Variable):
         symbol = emitter.symbol(target.name)
         if symbol.latched or target.name not in emitter.views:
@@ -246,57 +273,34 @@ def _direct_name(emitter: Emitter, target: Expression) -> str:
     return ""
 
 
-def _free(bindings: dict[str, ast.expr], wanted: dict[str, str], held: dict[str, ast.expr]) -> frozenset[str]:
-    """Return the targets that no input reads and no other output is computed in."""
-    own = {id(node) for node in held.values()}
-    read = {
-        node.id
-        for binding in bindings.values()
-        if id(binding) not in own
-        for node in ast.walk(binding)
-        if isinstance(node, ast.Name)
-    }
-    targets = list(wanted.values())
-    return frozenset(target for target in targets if target and target not in read and targets.count(target) == 1)
+def _free(bindings: dict[str, ast.expr], outputs: list[_Place]) -> frozenset[str]:
+    """Return the targets that a block may compute in: always written, no input reads them, no other output's target."""
+    read = {name for binding in bindings.values() for name in names_in(binding)}
+    targets = [place.local for place in outputs]
+    always = {place.local for place in outputs if place.local and not place.output.holds}
+    return frozenset(target for target in always - read if targets.count(target) == 1)
 
 
-def _store_output(
-    emitter: Emitter, output: Output, target: Expression, value: ast.expr, held: dict[str, ast.expr]
-) -> None:
-    """Emit the store of an output; one that holds is not written where it did not change."""
-    direct = _direct_name(emitter, target)
-    if direct:
-        if not (isinstance(value, ast.Name) and value.id == direct):
-            emitter.emit(build.assign(direct, value))
-        return
-    value = emitter.keep(value)
-    emitter.book_cost()
-    with emitter.suite() as store:
-        _write_actual(emitter, target, value)
-    if output.name in held:
-        emitter.emit(build.when(build.compare(value, "<>", held[output.name]), store))
-    else:
-        emitter.emit(*store)
-
-
-def _write_actual(emitter: Emitter, target: Expression, value: ast.expr) -> None:
-    if isinstance(target, Variable):
-        emitter.write(target.name, value)
-        return
-    assert isinstance(target, Element)
-    write_element(emitter, target, value)
-
-
-def write_element(emitter: Emitter, target: Element, value: ast.expr) -> None:
-    """Emit the store of a value into an array element; out of range it is logged and nothing is written."""
-    index, in_range = lower_index(emitter, target)
-    if in_range is None:
-        emitter.write(target.name, value, index)
+def _store_when(emitter: Emitter, test: ast.expr, stores: list[tuple[_Place, ast.expr]]) -> None:
+    """Emit the stores of outputs that hold: where they are not written, nothing looks at them either."""
+    fixed = value_of(test)
+    if fixed is not None:
+        _store_all(emitter, stores if fixed else [])
         return
     emitter.book_cost()
-    with emitter.suite() as inside:
-        emitter.write(target.name, value, index)
-    emitter.emit(build.when(in_range, inside, [emitter.log_call(build.constant(SUBSCRIPT))]))
+    with emitter.suite() as suite:
+        _store_all(emitter, stores)
+    emitter.emit(build.when(test, suite))
+
+
+def _store_all(emitter: Emitter, stores: list[tuple[_Place, ast.expr]]) -> None:
+    for place, value in stores:
+        if place.index is not None:
+            write_at(emitter, place.target.name, place.index, place.in_range, emitter.keep(value))
+        elif not place.local:
+            emitter.write(place.target.name, value)
+        elif not (isinstance(value, ast.Name) and value.id == place.local):
+            emitter.emit(build.assign(place.local, value))
 
 
 def _bind_coefficients(emitter: Emitter, instance: BlockInstance, values: dict[str, ast.expr]) -> None:

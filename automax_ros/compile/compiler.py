@@ -137,7 +137,7 @@ class CompiledTask:
     def source(self) -> str:
         """The three functions as text."""
         definitions = self._compilation.definitions("startup", "scans", "scan_steps")
-        return "\n\n\n".join(ast.unparse(ast.fix_missing_locations(item)) for item in definitions) + "\n"
+        return "\n\n\n".join(ast.unparse(item) for item in definitions) + "\n"
 
 
 def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:
@@ -177,8 +177,7 @@ class _Compilation:
     def functions(self, *names: str) -> dict[str, object]:
         """Compile some of the functions."""
         with _collections_paused():
-            definitions: list[ast.stmt] = [*self.definitions(*names)]
-            code = compile(ast.fix_missing_locations(ast.Module(definitions, [])), f"<{self._program.name}>", "exec")
+            code = compile(build.placed(self.definitions(*names)), f"<{self._program.name}>", "exec")
         made: dict[str, object] = {"__builtins__": {}, **self._globals}
         exec(code, made)
         return made
@@ -240,10 +239,10 @@ class _Compilation:
         written = self._written()
         emitter.checkpoint()
         if written:
-            emitter.emit(build.assign("changes", ast.List([], ast.Load())))
+            emitter.emit(build.assign("changes", ast.List([], build.LOAD)))
         for name in self._latched:
             if name in written:
-                pair = ast.Tuple([build.constant(self._views[name]), build.name(variable_name(name))], ast.Load())
+                pair = ast.Tuple([build.constant(self._views[name]), build.name(variable_name(name))], build.LOAD)
                 append = build.do(build.call(build.attribute("changes", "append"), pair))
                 changed = build.compare(build.name(variable_name(name)), "<>", build.name(latched_name(name)))
                 emitter.emit(build.when(changed, [append]))
@@ -273,7 +272,7 @@ class _Compilation:
             opening.append(build.assign_all(list(self._fields), build.name("state")))
         if lowering.block_lines:
             lines: list[ast.expr] = [build.constant(line) for line in lowering.block_lines]
-            opening.append(build.assign("block_lines", ast.Tuple(lines, ast.Load())))
+            opening.append(build.assign("block_lines", ast.Tuple(lines, build.LOAD)))
         stores = self._stores(body)
         body = [*self._start_values(emitter, lowering), *body]
         stopped = build.name(STOPPED) if lowering.can_stop else build.constant(False)
@@ -313,10 +312,7 @@ def _collections_paused() -> Iterator[None]:
 def _assigned(body: list[ast.stmt]) -> frozenset[str]:
     """Return the names that statements set."""
     return frozenset(
-        node.id
-        for part in body
-        for node in ast.walk(part)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        node.id for node in build.nodes(*body) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     )
 
 

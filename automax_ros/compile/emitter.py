@@ -75,9 +75,12 @@ class Emitter:
         self._temporaries += 1
         return f"t{self._temporaries}"
 
-    def keep(self, value: ast.expr) -> ast.expr:
-        """Return an expression that may be written twice: the value itself, or a temporary that holds it."""
-        if build.is_simple(value):
+    def keep(self, value: ast.expr, changing: frozenset[str] = frozenset()) -> ast.expr:
+        """Return an expression that may be written twice: the value itself, or a temporary that holds it.
+
+        ``changing`` are Python names that get another value before the expression is used.
+        """
+        if build.is_simple(value) and not (isinstance(value, ast.Name) and value.id in changing):
             return value
         name = self.temporary()
         self.emit(build.assign(name, value))

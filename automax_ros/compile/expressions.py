@@ -92,14 +92,19 @@ def lower_element(emitter: Emitter, element: Element) -> Lowered:
     return of_type(build.name(result), element.type)
 
 
-def lower_index(emitter: Emitter, element: Element) -> tuple[ast.expr, ast.expr | None]:
-    """Return an element's flat index, last subscript fastest, and the test that it is in range, if there is need."""
+def lower_index(
+    emitter: Emitter, element: Element, changing: frozenset[str] = frozenset()
+) -> tuple[ast.expr, ast.expr | None]:
+    """Return an element's flat index, last subscript fastest, and the test that it is in range, if there is need.
+
+    ``changing`` are Python names that get another value before the index is used.
+    """
     dimensions = emitter.symbol(element.name).dimensions
     flat: ast.expr | None = None
     tests: list[ast.expr] = []
     for subscript, size in zip(element.subscripts, dimensions, strict=True):
         lowered = lower(emitter, subscript)
-        index = emitter.keep(lowered.node)
+        index = emitter.keep(lowered.node, changing)
         if lowered.low < 0 or lowered.high >= size:
             tests.append(ast.Compare(build.constant(0), [ast.LtE(), ast.Lt()], [index, build.constant(size)]))
         flat = index if flat is None else build.binary(build.binary(flat, "*", build.constant(size)), "+", index)

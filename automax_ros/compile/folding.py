@@ -76,7 +76,7 @@ class Fold(ast.NodeTransformer):
             return node
         if isinstance(node.ctx, ast.Store):
             assert isinstance(bound, ast.Name)
-            return ast.Name(bound.id, ast.Store())
+            return ast.Name(bound.id, build.STORE)
         return bound
 
     def visit_Tuple(self, node: ast.Tuple) -> ast.expr:
@@ -199,12 +199,12 @@ def without_dead_stores(body: list[ast.stmt], needed: set[str]) -> list[ast.stmt
     A name that is read anywhere in the body, but for its own new value, counts as read: safe, and enough for step
     functions.
     """
+    count = _count(body)
     while True:
-        read = needed | _read(body)
-        pruned = _prune(body, read)
-        if _count(pruned) == _count(body):
-            return pruned
-        body = pruned
+        body = _prune(body, needed | _read(body))
+        before, count = count, _count(body)
+        if count == before:
+            return body
 
 
 def _read(body: Iterable[ast.stmt]) -> set[str]:
@@ -222,11 +222,13 @@ def _read(body: Iterable[ast.stmt]) -> set[str]:
 
 
 def _names_read(node: ast.AST) -> set[str]:
-    return {item.id for item in ast.walk(node) if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Load)}
+    return {item.id for item in build.nodes(node) if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Load)}
 
 
 def _count(body: list[ast.stmt]) -> int:
-    return sum(1 for part in body for _ in ast.walk(part))
+    """Return the number of statements, those inside others included."""
+    inner = [statement for statement in body if isinstance(statement, (ast.If, ast.While))]
+    return len(body) + sum(_count(statement.body) + _count(statement.orelse) for statement in inner)
 
 
 def _prune(body: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
@@ -242,7 +244,7 @@ def _prune(body: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
                 kept.append(build.loop(statement.test, turn))
         elif isinstance(statement, (ast.Assign, ast.AugAssign)):
             targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
-            if any(node.id in read for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)):
+            if any(node.id in read for target in targets for node in build.nodes(target) if isinstance(node, ast.Name)):
                 kept.append(statement)
         else:
             kept.append(statement)

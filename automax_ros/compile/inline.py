@@ -10,13 +10,17 @@ import ast
 import functools
 import inspect
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar, cast
 
 from automax_ros.blocks.declaration import HELPERS, Block
 from automax_ros.compile import build
 from automax_ros.compile.folding import Fold, TableReader, fold_body, value_of, without_dead_stores
 from automax_ros.compile.simplify import carry_on
+
+_WRITES, _ERROR = "writes", "error"
+"""Keys among results by keyword, which are in upper case."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +50,15 @@ class Binding:
 
 @dataclass(frozen=True)
 class Inlined:
-    """Statements that carry a block out. ``outputs`` and ``error`` are expressions valid after them.
+    """Statements that carry a block out; the other fields are expressions valid after them.
 
-    ``error`` is None where the block cannot log anything as it is programmed.
+    ``outputs`` stay valid while outputs are stored in the order of ``wanted``. ``writes`` tells whether outputs that
+    hold are written. ``error`` is None where the block cannot log anything as it is programmed.
     """
 
     body: list[ast.stmt]
     outputs: dict[str, ast.expr]
+    writes: ast.expr
     error: ast.expr | None
 
 
@@ -75,17 +81,14 @@ def step_tree(block: Block) -> StepTree:
     if not isinstance(last, ast.Return) or last.value is None:
         raise TypeError(f"the step of {block.name} does not end with its return")
     results = tuple(last.value.elts) if isinstance(last.value, ast.Tuple) else (last.value,)
-    expected = len(block.outputs) + len(block.states) + bool(_can_log_in_step(block))
+    expected = len(block.outputs) + len(block.states) + block.holds + _can_log_in_step(block)
     if len(results) != expected:
         raise TypeError(f"the step of {block.name} returns {len(results)} values, {expected} are declared")
     constants = _global_constants(block, body, last)
     body = [_Constants(constants).visit(statement) for statement in body]
     results = tuple(_Constants(constants).visit(result) for result in results)
     assigned = {
-        node.id
-        for part in body
-        for node in ast.walk(part)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        node.id for node in build.nodes(*body) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     }
     return StepTree(tuple(argument.arg for argument in parsed.args.args), tuple(body), results, frozenset(assigned))
 
@@ -99,7 +102,7 @@ def _global_constants(block: Block, body: Sequence[ast.stmt], last: ast.Return) 
     """Return the module constants that a step function reads, as literals."""
     assert block.step is not None
     scope = block.step.__globals__
-    names = {node.id for part in (*body, last) for node in ast.walk(part) if isinstance(node, ast.Name)}
+    names = {node.id for node in build.nodes(*body, last) if isinstance(node, ast.Name)}
     found = {name: scope[name] for name in sorted(names) if name in scope and name not in HELPERS}
     parameters = set(inspect.signature(block.step).parameters)
     return {
@@ -123,10 +126,89 @@ def inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: froz
     Args:
         block: the declaration.
         binding: what the step's names stand for.
-        wanted: for each programmed output its target: the Python name it may be computed in directly, or "" where the
-            result has to stand in a local of its own.
-        free: targets of ``wanted`` that no binding reads, so that they may be assigned before the block is through.
+        wanted: for each programmed output, in the order in which they are stored, the Python name it is stored in, ""
+            where it is stored otherwise.
+        free: targets of ``wanted`` that the block may compute in directly: nothing reads them meanwhile.
     """
+    if binding.tables:
+        return _inlined(block, binding, wanted, free)
+    stand_ins = _StandIns()
+    shape = (
+        block,
+        tuple((name, stand_ins.text(value)) for name, value in binding.values.items()),
+        tuple((name, stand_ins.of(place)) for name, place in binding.states.items()),
+        tuple((keyword, target and stand_ins.of(target)) for keyword, target in wanted.items()),
+        frozenset(map(stand_ins.of, free)),
+    )
+    return stand_ins.replaced(_inlined_shape(*shape), binding.prefix)
+
+
+_Pairs = tuple[tuple[str, str], ...]
+_PREFIX = "_p_"
+
+
+class _StandIns:
+    """Names that stand for those of one CALL, numbered as they come: calls of one shape are inlined once."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, str] = {}
+
+    def of(self, name: str) -> str:
+        """Return what stands for a name."""
+        return self._numbers.setdefault(name, f"_{len(self._numbers)}")
+
+    def text(self, value: ast.expr) -> str:
+        """Return an expression as text, with the names replaced."""
+        if isinstance(value, ast.Name):
+            return self.of(value.id)
+        return ast.unparse(_renamed(value, self.of))
+
+    def replaced(self, inlined: Inlined, prefix: str) -> Inlined:
+        """Return what was inlined with the names of the CALL in the place of those that stand for them."""
+        names = {number: name for name, number in self._numbers.items()}
+
+        def name_of(name: str) -> str:
+            return prefix + name.removeprefix(_PREFIX) if name.startswith(_PREFIX) else names.get(name, name)
+
+        return Inlined(
+            [_renamed(statement, name_of) for statement in inlined.body],
+            {keyword: _renamed(value, name_of) for keyword, value in inlined.outputs.items()},
+            _renamed(inlined.writes, name_of),
+            None if inlined.error is None else _renamed(inlined.error, name_of),
+        )
+
+
+_Node = TypeVar("_Node", bound=ast.AST)
+
+
+def _renamed(node: _Node, name_of: Callable[[str], str]) -> _Node:
+    """Return a copy of a tree with its names replaced; what holds no names is shared."""
+    if isinstance(node, ast.Name):
+        return cast(_Node, _shared_name(name_of(node.id), isinstance(node.ctx, ast.Store)))
+    if not isinstance(node, (ast.expr, ast.stmt)) or isinstance(node, ast.Constant):
+        return node
+    return type(node)(*(_renamed_part(getattr(node, field, None), name_of) for field in node._fields))
+
+
+@functools.lru_cache(maxsize=256)
+def _shared_name(identifier: str, stored: bool) -> ast.Name:
+    """Return one node for all places of a name: half of a task's tree are names, and a node takes its room."""
+    return ast.Name(identifier, build.STORE if stored else build.LOAD)
+
+
+def _renamed_part(part: object, name_of: Callable[[str], str]) -> object:
+    if isinstance(part, list):
+        return [_renamed_part(item, name_of) for item in part]
+    return _renamed(part, name_of) if isinstance(part, ast.AST) else part
+
+
+@functools.lru_cache(maxsize=512)
+def _inlined_shape(block: Block, values: _Pairs, states: _Pairs, wanted: _Pairs, free: frozenset[str]) -> Inlined:
+    expressions = {name: ast.parse(text, mode="eval").body for name, text in values}
+    return _inlined(block, Binding(_PREFIX, expressions, dict(states), {}), dict(wanted), free)
+
+
+def _inlined(block: Block, binding: Binding, wanted: Mapping[str, str], free: frozenset[str]) -> Inlined:
     tree = step_tree(block)
     prefix = binding.prefix
     results = dict(zip([output.variable for output in block.outputs], tree.results, strict=False))
@@ -135,7 +217,7 @@ def inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: froz
     body = opening + fold_body(tree.body, fold)
     outputs = {output.name: fold.visit(results[output.variable]) for output in block.outputs if output.name in wanted}
     state_results = tree.results[len(block.outputs) : len(block.outputs) + len(block.states)]
-    fleeting = _fleeting(block, tree, several_outputs=len(wanted) > 1)
+    fleeting = _fleeting(block, tree)
     for output in block.outputs:
         result = results[output.variable]
         if output.name in wanted and isinstance(result, ast.Name) and result.id in fleeting:
@@ -146,19 +228,39 @@ def inline(block: Block, binding: Binding, wanted: Mapping[str, str], free: froz
     error = fold.visit(tree.results[-1]) if _can_log_in_step(block) else None
     if error is not None and value_of(error) == 0:
         error = None
+    writes = fold.visit(tree.results[len(block.outputs) + len(block.states)]) if block.holds else build.constant(True)
     states = {binding.states[state.name] for state in block.states}
     own = frozenset(prefix + local for local in tree.assigned - set(tree.parameters))
-    results_now = {**outputs, **({"": error} if error is not None else {})}
+    results_now = {**outputs, _WRITES: writes, **({_ERROR: error} if error is not None else {})}
     body, results_now = carry_on(body, results_now, own - states)
-    error = results_now.pop("", None)
-    outputs = results_now
+    error = results_now.pop(_ERROR, None)
+    copies = _kept_apart(results_now, wanted, prefix)
     needed = states | {
-        node.id
-        for part in [*outputs.values(), *([error] if error else [])]
-        for node in ast.walk(part)
-        if isinstance(node, ast.Name)
+        name
+        for part in [*results_now.values(), *(copy.value for copy in copies), *([error] if error else [])]
+        for name in names_in(part)
     }
-    return Inlined(without_dead_stores(body, needed), outputs, error)
+    body = [*without_dead_stores(body, needed), *copies]
+    return Inlined(body, results_now, results_now.pop(_WRITES), error)
+
+
+def names_in(expression: ast.expr) -> set[str]:
+    """Return the variables that an expression reads."""
+    return {node.id for node in build.nodes(expression) if isinstance(node, ast.Name)}
+
+
+def _kept_apart(results: dict[str, ast.expr], wanted: Mapping[str, str], prefix: str) -> list[ast.Assign]:
+    """Return copies of results that the stores of other outputs would change, and put them in the results' place."""
+    copies: list[ast.Assign] = []
+    stored: set[str] = set()
+    for keyword in (*wanted, _WRITES):
+        value = results[keyword]
+        if not stored.isdisjoint(names_in(value)):
+            copy = f"{prefix}out_{keyword.lower()}"
+            copies.append(build.assign(copy, value))
+            results[keyword] = build.name(copy)
+        stored.add(wanted.get(keyword, ""))
+    return copies
 
 
 def _names(
@@ -199,20 +301,15 @@ def _direct_target(
     return None
 
 
-def _fleeting(block: Block, tree: StepTree, *, several_outputs: bool) -> set[str]:
-    """Return the names that may have changed when the outputs are stored.
-
-    Those are states that get a new value, and inputs, whose variable another output may be stored in.
-    """
+def _fleeting(block: Block, tree: StepTree) -> set[str]:
+    """Return the states that may have changed when the outputs are stored: those that get a new value."""
     states = [state.name for state in block.states]
     new = tree.results[len(block.outputs) : len(block.outputs) + len(states)]
-    changing = {
+    return {
         name
         for name, result in zip(states, new, strict=True)
         if not (isinstance(result, ast.Name) and result.id == name)
     }
-    inputs = set(tree.parameters) - set(states) - tree.assigned if several_outputs else set()
-    return changing | inputs
 
 
 def _store_states(block: Block, places: Mapping[str, str], results: Sequence[ast.expr]) -> list[ast.stmt]:
@@ -226,4 +323,4 @@ def _store_states(block: Block, places: Mapping[str, str], results: Sequence[ast
         return []
     if len(pairs) == 1:
         return [build.assign(pairs[0][0], pairs[0][1])]
-    return [build.assign_all([name for name, _ in pairs], ast.Tuple([value for _, value in pairs], ast.Load()))]
+    return [build.assign_all([name for name, _ in pairs], ast.Tuple([value for _, value in pairs], build.LOAD))]

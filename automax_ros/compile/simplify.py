@@ -33,7 +33,7 @@ def _carried(body: list[ast.stmt], own: frozenset[str]) -> dict[str, ast.expr]:
     stores = _stores(body)
     bindings: dict[str, ast.expr] = {}
     for part in body:
-        for node in ast.walk(part):
+        for node in build.nodes(part):
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
                 name, value = node.targets[0].id, node.value
                 if name not in own or stores[name] != 1:
@@ -47,10 +47,7 @@ def _carried(body: list[ast.stmt], own: frozenset[str]) -> dict[str, ast.expr]:
 
 def _stores(body: list[ast.stmt]) -> Counter[str]:
     return Counter(
-        node.id
-        for part in body
-        for node in ast.walk(part)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        node.id for node in build.nodes(*body) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     )
 
 
@@ -80,7 +77,7 @@ def log_in_place(body: list[ast.stmt], error: ast.expr, log: Callable[[ast.expr]
 
 def _only_literals(body: list[ast.stmt], name: str) -> bool:
     """Return whether a local is set to literals only and read nowhere."""
-    nodes = [node for part in body for node in ast.walk(part)]
+    nodes = list(build.nodes(*body))
     if any(isinstance(node, ast.Name) and node.id == name and isinstance(node.ctx, ast.Load) for node in nodes):
         return False
     assignments = [node for node in nodes if isinstance(node, ast.Assign) and _sets(node, name)]

@@ -243,8 +243,8 @@ class StatementLowering:
     def _flow_on(self, flow: Flow, statement: OnJump) -> None:
         with self.emitter.statement(self.emitter.line):
             selector = self.emitter.keep(lower(self.emitter, statement.selector).node)
-        blocks = ast.Tuple([flow.block_of(line) for line in statement.lines], ast.Load())
-        jump = build.assign(PC, ast.Subscript(blocks, build.binary(selector, "-", build.constant(1)), ast.Load()))
+        blocks = ast.Tuple([flow.block_of(line) for line in statement.lines], build.LOAD)
+        jump = build.assign(PC, ast.Subscript(blocks, build.binary(selector, "-", build.constant(1)), build.LOAD))
         taken: list[ast.stmt] = self._gosub(flow, jump) if statement.gosub else [jump]
         count = build.constant(len(statement.lines))
         in_list = ast.Compare(build.constant(1), [ast.LtE(), ast.LtE()], [selector, count])
@@ -310,7 +310,7 @@ class StatementLowering:
     def _print(self, statement: Print) -> None:
         values = [_printable(self.emitter, item) for item in statement.items]
         separators = build.constant("".join(separator or " " for separator in statement.separators))
-        call = build.call(self.emitter.member("print_line"), ast.Tuple(values, ast.Load()), separators)
+        call = build.call(self.emitter.member("print_line"), ast.Tuple(values, build.LOAD), separators)
         self.emitter.emit(build.do(call))
 
     def _read(self, statement: Read) -> None:

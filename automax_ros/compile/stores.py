@@ -5,9 +5,8 @@ from __future__ import annotations
 import ast
 
 from automax_ros.compile import build
-from automax_ros.compile.calls import write_element
 from automax_ros.compile.emitter import Emitter
-from automax_ros.compile.expressions import Lowered, clamped
+from automax_ros.compile.expressions import SUBSCRIPT, Lowered, clamped, lower_index
 from automax_ros.compile.folding import value_of
 from automax_ros.compile.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
 from automax_ros.core.numbers import stored_real
@@ -21,9 +20,24 @@ def store(emitter: Emitter, target: Target, value: Lowered) -> None:
     """Emit ``target = value`` with the conversion of the types; a clamp is the statement's overflow."""
     node = converted(emitter, target.name, target.type, value)
     if isinstance(target, Element):
-        write_element(emitter, target, emitter.keep(node))
+        node = emitter.keep(node)
+        write_at(emitter, target.name, *lower_index(emitter, target), node)
     else:
         emitter.write(target.name, node)
+
+
+def write_at(emitter: Emitter, name: str, index: ast.expr, in_range: ast.expr | None, value: ast.expr) -> None:
+    """Emit the store of a value, which may be written twice, into an array's element of a flat index.
+
+    Where the test ``in_range`` fails it is logged and nothing is written.
+    """
+    if in_range is None:
+        emitter.write(name, value, index)
+        return
+    emitter.book_cost()
+    with emitter.suite() as inside:
+        emitter.write(name, value, index)
+    emitter.emit(build.when(in_range, inside, [emitter.log_call(build.constant(SUBSCRIPT))]))
 
 
 def converted(emitter: Emitter, name: str, kind: DataType, value: Lowered) -> ast.expr:
@@ -33,7 +47,7 @@ def converted(emitter: Emitter, name: str, kind: DataType, value: Lowered) -> as
         literal = value_of(value.node)
         if isinstance(literal, str):
             return build.constant(literal[:length])
-        return ast.Subscript(value.node, ast.Slice(None, build.constant(length), None), ast.Load())
+        return ast.Subscript(value.node, ast.Slice(None, build.constant(length), None), build.LOAD)
     if kind is DataType.BOOLEAN:
         return value.node
     if kind is DataType.REAL:

@@ -125,10 +125,9 @@ def names_of(block):
 @each_step
 def test_step_takes_only_what_is_declared(block):
     inputs, coefficients, states = names_of(block)
-    held = {item.variable for item in block.outputs if item.holds}
     parameters = set(inspect.signature(block.step).parameters)
-    assert len(inputs) + len(coefficients) + len(states) + len(held) == len(inputs | coefficients | states | held)
-    assert parameters - set(CALL_FACTS) == (inputs | coefficients | states | held) - set(CALL_FACTS)
+    assert len(inputs) + len(coefficients) + len(states) == len(inputs | coefficients | states)
+    assert parameters - set(CALL_FACTS) == (inputs | coefficients | states) - set(CALL_FACTS)
 
 
 def test_the_blocks_that_make_a_data_structure_have_its_states():
@@ -143,7 +142,7 @@ def test_step_returns_outputs_states_and_error(block):
     assert isinstance(returned, ast.Return)
     names = [node.id for node in returned.value.elts]
     expected = [item.variable for item in block.outputs] + [state.name for state in block.states]
-    assert names == expected + ["problem"] * bool(block.logs)
+    assert names == expected + ["writes"] * block.holds + ["problem"] * bool(block.logs)
 
 
 ALLOWED = (
@@ -160,7 +159,6 @@ def test_step_is_pure_and_straight(block):
     body = tree.body[1:]
     assert ast.get_docstring(tree)
     inputs, coefficients, states = names_of(block)
-    held = {item.variable for item in block.outputs if item.holds}
     facts = set(CALL_FACTS) & set(inspect.signature(block.step).parameters)
     buffers = {state.name for state in block.states if state.size} | ({"data"} if block.structure else set())
     tables = {item.variable for item in block.inputs if item.type is Special.TABLE}
@@ -191,20 +189,19 @@ def test_step_is_pure_and_straight(block):
         for node in ast.walk(statement)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
     }
-    assert loaded <= inputs | coefficients | states | held | facts | assigned | numbers | set(HELPERS)
+    assert loaded <= inputs | coefficients | states | facts | assigned | numbers | set(HELPERS)
     builtin = {node.func.id for statement in body for node in ast.walk(statement) if isinstance(node, ast.Call)}
     assert not builtin & (inputs | coefficients | states | assigned), "a parameter hides a helper that is called"
 
 
 @each_step
 def test_optional_outputs_are_never_read(block):
-    """So that they vanish where they are not programmed; one that holds may read itself."""
+    """So that they vanish where they are not programmed."""
     optional = {item.variable for item in block.outputs if not item.required}
     for node in (part for statement in source_of(block.step).body[:-1] for part in ast.walk(statement)):
         if isinstance(node, ast.Assign):
             loaded = {item.id for item in ast.walk(node.value) if isinstance(item, ast.Name)}
-            own = {node.targets[0].id} if isinstance(node.targets[0], ast.Name) else set()
-            assert not loaded & (optional - own)
+            assert not loaded & optional
         elif isinstance(node, (ast.If, ast.While)):
             assert not {item.id for item in ast.walk(node.test) if isinstance(item, ast.Name)} & optional
 

@@ -128,14 +128,14 @@ NAMES = [f"V{n}%" for n in range(8)]
 @settings(parent=repeatable, max_examples=40)
 @given(st.lists(st.tuples(st.sampled_from(NAMES), st.sampled_from(NAMES)), min_size=1, max_size=8), st.randoms())
 def test_any_pairs_move_as_a_tuple_assignment_does(pairs, random):
-    """All inputs are read before the first output is written; of two writes to one variable the later pair's stays."""
+    """All inputs are read before an output is written; of two writes to one variable the last of the CALL stays."""
     values = {name: number * 11 + 1 for number, name in enumerate(NAMES)}
-    expected = dict(values)
-    expected.update({target: values[source] for source, target in pairs})
-    parameters = [
-        text for n, (source, target) in enumerate(pairs, 1) for text in (f"INPUT{n}={source}", f"OUTPUT{n}={target}")
-    ]
-    random.shuffle(parameters)
+    places = list(range(len(pairs)))
+    random.shuffle(places)
+    expected = values | {pairs[n][1]: values[pairs[n][0]] for n in places}
+    parameters = [f"OUTPUT{n + 1}={pairs[n][1]}" for n in places]
+    for n, (source, _) in enumerate(pairs, 1):
+        parameters.insert(random.randint(0, len(parameters)), f"INPUT{n}={source}")
     start = " \\ ".join(f"{name} = {value}" for name, value in values.items())
     text = lines(start, f"CALL MOVE({', '.join(parameters)})", declare=f"LOCAL {', '.join(NAMES)}")
     task, _ = task_of(text)

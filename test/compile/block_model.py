@@ -57,8 +57,8 @@ class Model:
             return type_of_name(name).zero
         return self.values[name] if index is None else self.values[name][index]
 
-    def write(self, text: str, value) -> None:
-        name, index = self.place(text)
+    def write(self, place: tuple[str, int | None], value) -> None:
+        name, index = place
         if index == -1:
             self.codes.append(SUBSCRIPT)
         elif index is None:
@@ -76,9 +76,10 @@ class ModelBlock:
         self.inputs = {item.variable: call.parameters[item.name] for item in given if isinstance(item.type, DataType)}
         self.tables = {item.variable: call.parameters[item.name] for item in given if item.type is Special.TABLE}
         self.outputs = {
-            item.variable: (call.parameters[item.name], item.holds)
+            item.variable: (text, item.holds)
+            for keyword, text in call.parameters.items()
             for item in call.block.outputs
-            if item.name in call.parameters
+            if item.name == keyword
         }
         fixed = {name: text for name, text in self.inputs.items() if text.lstrip("-")[0] not in "LK"}
         self.fixed = {name: Model({}).read(text) for name, text in fixed.items()}
@@ -98,17 +99,14 @@ class ModelBlock:
     def scan(self, model: Model) -> None:
         given_now = {name: model.read(text) for name, text in self.inputs.items() if name not in self.fixed}
         given_now.update({name: list(model.values[text]) for name, text in self.tables.items()})
-        before = {}
-        for name, (text, holds) in self.outputs.items():
-            if holds:
-                before[name] = self.instance.outputs[name] = model.read(text)
+        places = {name: model.place(text) for name, (text, _) in self.outputs.items()}
         results = self.instance.scan(**given_now)
         self._note_limits(model, given_now)
         if self.call.block.logs and self.instance.error:
             model.codes.append(self.instance.error)
-        for name, (text, holds) in self.outputs.items():
-            if not holds or results[name] != before[name]:
-                model.write(text, results[name])
+        for name, (_, holds) in self.outputs.items():
+            if self.instance.wrote or not holds:
+                model.write(places[name], results[name])
 
     def _note_limits(self, model: Model, given_now) -> None:
         declared = self.call.block.coefficients

@@ -252,16 +252,15 @@ class Interpreter(Functions):
             self.blocks[statement.span] = Instance(bound.block, self.program.period_ns, **fixed)
         block = self.blocks[statement.span]
         now = {name.lower(): self._seen(value) for name, value in given.items() if name.lower() not in fixed}
-        for output in bound.block.outputs:
-            if output.holds:
-                block.outputs[output.variable] = self._seen(bound.arguments[output.name])
-        held = {output.name: block.outputs[output.variable] for output in bound.block.outputs if output.holds}
+        outputs = {output.name: output for output in bound.block.outputs}
+        targets = [(outputs[name], target) for name, target in bound.arguments.items() if name in outputs]
+        elements = {output.name: self.index(target) for output, target in targets if isinstance(target, tree.Element)}
         results = block.scan(**now)
         if block.error:
             self._error(block.error)
-        for output in bound.block.outputs:
-            if output.name in bound.arguments and held.get(output.name) != results[output.variable]:
-                self._put(bound.arguments[output.name], results[output.variable], in_block=True)
+        for output, target in targets:
+            if block.wrote or not output.holds:
+                self._put_at(target, elements.get(output.name), results[output.variable], in_block=True)
 
     def _seen(self, given):
         if isinstance(given, tree.Unary):
@@ -286,13 +285,14 @@ class Interpreter(Functions):
                 self._note(code)
         self._put(target, value)
 
-    def _put(self, target, value, in_block=False):
-        name, element = target.name, None
-        if isinstance(target, tree.Element):
-            element = self.index(target)
-            if element is None:
-                self._error(7026)
-                return
+    def _put(self, target, value):
+        self._put_at(target, self.index(target) if isinstance(target, tree.Element) else None, value)
+
+    def _put_at(self, target, element, value, in_block=False):
+        name = target.name
+        if isinstance(target, tree.Element) and element is None:
+            self._error(7026)
+            return
         if name in self.locals:
             if element is None:
                 self.locals[name] = value

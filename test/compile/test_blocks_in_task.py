@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Block, Form, Given, Output, Processor, Special
+from automax_ros.blocks.declaration import Access, Block, Form, Given, Processor, Special
 from automax_ros.blocks.instance import Instance
 from automax_ros.blocks.rules import AtLeast, Contiguous, Needs, NumberTrue
 from automax_ros.core.numbers import stored_real
@@ -110,21 +110,6 @@ def inputs(draw, block: Block, everything: bool) -> dict[str, str]:
     return parameters
 
 
-def targets(block: Block, output: Output) -> st.SearchStrategy[str]:
-    """Variables for an output.
-
-    Where outputs hold, each output has one of its own: what a block leaves as it is must not be another's target.
-    """
-    if not any(item.holds and item.name[-1].isdigit() for item in block.outputs):
-        return variables(output.type)
-    if not output.holds:
-        return st.sampled_from(["L3@", "K3@"])
-    own, mark = int(output.name[-1]) - 1, output.type.value
-    return st.sampled_from(
-        [f"LT{mark}({own})", f"KT{mark}({own})"] if own < SIZE else [SIMPLE[output.type][own - SIZE]]
-    )
-
-
 @st.composite
 def calls(draw, block: Block) -> Programmed:
     """A CALL that breaks no rule of the block."""
@@ -132,12 +117,12 @@ def calls(draw, block: Block) -> Programmed:
     parameters = draw(inputs(block, everything))
     for output in block.outputs:
         if output.required or everything or draw(st.booleans()):
-            parameters[output.name] = draw(targets(block, output))
+            parameters[output.name] = draw(variables(output.type))
     for rule in block.rules:
         if any(rule.faults(seen_by_rules(parameters))):
             _mend(draw, block, rule, parameters)
     assume(not any(rule.faults(seen_by_rules(parameters)) for rule in block.rules))
-    return Programmed(block, parameters)
+    return Programmed(block, dict(draw(st.permutations(list(parameters.items())))))
 
 
 def _mend(draw, block: Block, rule, parameters: dict[str, str]) -> None:
@@ -156,8 +141,7 @@ def _mend(draw, block: Block, rule, parameters: dict[str, str]) -> None:
     for name in wanted:
         item = block.parameter(name)
         if name not in parameters:
-            choice = st.sampled_from(TABLES) if item.type is Special.TABLE else variables(item.type)
-            parameters[name] = draw(targets(block, item) if isinstance(item, Output) else choice)
+            parameters[name] = draw(st.sampled_from(TABLES) if item.type is Special.TABLE else variables(item.type))
 
 
 def seen_by_rules(parameters: dict[str, str]) -> dict[str, Given]:
@@ -181,7 +165,7 @@ def with_its_structure(draw, block: Block) -> list[Programmed]:
     parameters["SHIFT"] = draw(variables(DataType.BOOLEAN))
     for channel in range(1, 9):
         parameters[f"INPUT{channel}"] = draw(variables(kind))
-        parameters[f"OUTPUT{channel}"] = draw(targets(shift, shift.parameter(f"OUTPUT{channel}")))
+        parameters[f"OUTPUT{channel}"] = draw(variables(kind))
     return [Programmed(shift, parameters), call]
 
 
@@ -298,9 +282,75 @@ def test_blocks_one_after_the_other(data):
     compare(programmed, data.draw(scans(used(programmed), 5)), data.draw(st.booleans()))
 
 
-def test_two_outputs_onto_one_variable_leave_the_last_of_the_declaration():
-    task = ran("A% = 50", "CALL LIMIT(INPUT=A%, LIMIT_PLUS=40, SATURATED_PLUS=X@, SATURATED_MINUS=X@, OUTPUT=B%)")
-    assert (task.value("X@"), task.value("B%")) == (False, 40)
+def test_two_outputs_onto_one_variable_leave_the_last_of_the_call():
+    task = ran(
+        "A% = 50",
+        "CALL LIMIT(INPUT=A%, LIMIT_PLUS=40, SATURATED_PLUS=X@, SATURATED_MINUS=X@, OUTPUT=B%)",
+        "CALL LIMIT(INPUT=A%, LIMIT_PLUS=40, SATURATED_MINUS=Y@, SATURATED_PLUS=Y@, OUTPUT=B%)",
+    )
+    assert (task.value("X@"), task.value("Y@"), task.value("B%")) == (False, True, 40)
+
+
+LIMITING = "CALL LIMIT({}LIMIT_PLUS=5, SATURATED_PLUS=T10@(D3%), OUTPUT=D3%)"
+
+
+@pytest.mark.parametrize("source", ["B1%", "D3%"])
+@pytest.mark.parametrize("scope", ["LOCAL", "COMMON"])
+def test_the_subscripts_of_a_call_are_those_before_the_block(scope, source):
+    """Also where an output of the same CALL is the subscript of another, whatever the input is (decision)."""
+    text = f"""10 {scope} B1%, D3%
+11 LOCAL T10@(9)
+20 B1% = 8 \\ D3% = 8
+30 CALL SCAN_LOOP(TICKS=4)
+40 CALL LIMIT(INPUT={source}, LIMIT_PLUS=5, OUTPUT=D3%, SATURATED_PLUS=T10@(D3%))
+50 END
+"""
+    task, _ = task_of(text)
+    run_scans(task, 1)
+    assert [place for place, value in enumerate(task.value("T10@")) if value] == [8]
+
+
+def test_outputs_are_stored_in_the_order_of_the_call_elements_too():
+    task = ran(
+        "A% = 1 \\ B% = 2",
+        "CALL MOVE(INPUT1=A%, INPUT2=B%, OUTPUT2=T%(C%), OUTPUT1=T%(0))",
+        "CALL MOVE(INPUT1=A%, INPUT2=B%, OUTPUT1=T%(C% + 1), OUTPUT2=T%(1))",
+    )
+    assert task.value("T%")[:2] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "LATCH(SET=X@, RESET=FALSE, OUTPUT=F@(C%))",
+        "MOVE(ENABLE=X@, INPUT1=1, OUTPUT1=T%(C%))",
+        "SHIFT_BITS(STRUCTURE_NAME=Q@, MAX_COLUMNS=1, SHIFT=X@, INPUT1=TRUE, OUTPUT1=F@(C%))",
+        "SHIFT_WORDS(STRUCTURE_NAME=Q%, MAX_COLUMNS=1, SHIFT=X@, INPUT1=A%, OUTPUT1=T%(C%))",
+    ],
+)
+def test_a_block_that_holds_looks_at_a_bad_subscript_only_when_it_writes_and_once(call):
+    task = ran("C% = -1", f"CALL {call}", "X@ = NOT X@", declare="LOCAL A%, C%, X@, T%(5), F@(5)", scans=4)
+    assert logged(task) == [(40, 7026), (40, 7026)]
+
+
+def test_a_block_that_holds_neither_reads_nor_writes_what_it_holds(monkeypatch):
+    """Equal values are written all the same when it updates."""
+    text = """10 COMMON EN@, T%(3)
+20 CALL SCAN_LOOP(TICKS=4)
+30 CALL MOVE(ENABLE=EN@, INPUT1=5, OUTPUT1=T%(1))
+40 END
+"""
+    task, memory = task_of(text)
+    touched = []
+    read_now = memory.read_now
+    monkeypatch.setattr(memory, "read_now", lambda *given: touched.append(given) or read_now(*given))
+    task.run()
+    memory.keep_log()
+    for number, enable in enumerate([False, True, True, False]):
+        memory.write_from_outside(memory.view("EN@"), enable, OTHER)
+        task.scan(number)
+    assert touched == []
+    assert [entry.value for entry in memory.drain() if entry.writer != OTHER] == [5, 5]
 
 
 def test_same_variable_as_input_and_output():
@@ -325,7 +375,7 @@ def test_a_block_that_a_goto_skips_keeps_output_and_state():
 
 def test_two_calls_of_one_line_have_two_states():
     task = ran(
-        "CALL RAMP(INPUT=100, ACCEL_RATE=10, OUTPUT=A%) \\ CALL RAMP(INPUT=100, ACCEL_RATE=7, OUTPUT=B%)", scans=2
+        r"CALL RAMP(INPUT=100, ACCEL_RATE=10, OUTPUT=A%) \ CALL RAMP(INPUT=100, ACCEL_RATE=7, OUTPUT=B%)", scans=2
     )
     assert (task.value("30 RAMP.register"), task.value("30.2 RAMP.register")) == (20, 14)
 
@@ -337,7 +387,7 @@ def test_a_block_in_a_loop_runs_once_a_turn_on_one_state():
 
 def test_a_coefficient_out_of_its_limits_is_logged_when_it_goes_out():
     """Semantics, Coefficients: on the scan in which it goes out of range, not on every scan."""
-    text = lines("CALL LAG(INPUT=A%, WLG=GAIN, OUTPUT=B%)", declare="LOCAL A%, B% \\ COMMON GAIN")
+    text = lines("CALL LAG(INPUT=A%, WLG=GAIN, OUTPUT=B%)", declare=r"LOCAL A%, B% \ COMMON GAIN")
     task, memory = task_of(text, GAIN=5.0)
     task.run()
     counts = []
