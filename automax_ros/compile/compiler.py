@@ -137,7 +137,7 @@ class CompiledTask:
     def source(self) -> str:
         """The three functions as text."""
         definitions = self._compilation.definitions("startup", "scans", "scan_steps")
-        return "\n\n\n".join(ast.unparse(item) for item in definitions) + "\n"
+        return "\n\n\n".join(ast.unparse(item) for item in build.placed(definitions).body) + "\n"
 
 
 def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:

@@ -243,7 +243,8 @@ def test_fault_stops_all_tasks_and_zeroes_volatile_commons(build):
 
 
 def test_fault_before_scan_loop_starts_no_further_task(build):
-    endless = "10 COMMON ORDER!\n15 LOCAL N%\n20 FOR N% = 1 TO 2\n30 N% = 1\n40 NEXT N%\n100 CALL SCAN_LOOP(TICKS=2)\n110 END\n"
+    loop = "20 FOR N% = 1 TO 2\n30 N% = 1\n40 NEXT N%\n"
+    endless = f"10 COMMON ORDER! \\ LOCAL N%\n{loop}100 CALL SCAN_LOOP(TICKS=2)\n110 END\n"
     rack = build(FIRST=endless)
     rack.start()
     assert rack.stop_reason is not None

@@ -143,7 +143,7 @@ class StatementReader:
                 if cursor.following.kind is Kind.END:
                     return tuple(statements)
                 cursor.advance()
-                if cursor.at_end() or cursor.at("ELSE"):
+                if cursor.current.kind is Kind.REMARK or cursor.at("ELSE"):
                     return tuple(statements)
             elif cursor.at("ELSE"):
                 return tuple(statements)

@@ -9,7 +9,7 @@ from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.lexer import TYPE_CHARACTERS
 from automax_ros.language.syntax.tokens import BASIC_TASK_WORDS, RESERVED_WORDS, STATEMENT_WORDS, Kind
 
-_FOREIGN = {
+FOREIGN_WORDS = {
     "DIM": "arrays are declared by LOCAL or COMMON: LOCAL TABLE%(16)",
     "DEF": "functions cannot be defined; use GOSUB",
     "WHILE": "use IF and GOTO, or FOR",
@@ -53,8 +53,8 @@ def refuse_word(cursor: Cursor, basic_task: bool) -> None:
             cursor.fail("AMX0031", f"{word}: statements that suspend a task are not available in BASIC tasks yet")
         message = f"{word} belongs to BASIC tasks: a control-block task must not be suspended"
         cursor.fail("AMX0031", message, BASIC_TASK_WORDS[word])
-    if word in _FOREIGN:
-        cursor.fail("AMX0032", f"{word} is not a statement of this language", _FOREIGN[word])
+    if word in FOREIGN_WORDS:
+        cursor.fail("AMX0032", f"{word} is not a statement of this language", FOREIGN_WORDS[word])
 
 
 def refuse_statement(cursor: Cursor) -> NoReturn:
