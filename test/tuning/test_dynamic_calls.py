@@ -67,7 +67,7 @@ def test_standing_inputs_are_all_but_the_signal(program):
 @pytest.mark.parametrize(
     ("values", "label", "fault", "message"),
     [
-        ({}, "50", NoDynamicBlock, "50: that is no dynamic block"),
+        ({}, "50", NoDynamicBlock, "50: that is not a dynamic block"),
         ({}, "45", NoDynamicBlock, "45: there is no block on this line"),
         ({}, "LAG", NoDynamicBlock, "'LAG' is not a BASIC line"),
         ({"A%": 1}, "40", ValueFault, "A%: it carries the signal, INPUT of 40 LAG"),
