@@ -24,7 +24,7 @@ def written_whole(path: Path) -> Iterator[Path]:
     Raises:
         OSError: the folder or the file there cannot be written.
     """
-    if _is_direct(path):
+    if is_direct(path):
         yield path
         return
     target = Path(os.path.realpath(path))  # a link stays a link
@@ -41,7 +41,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         raise
 
 
-def _is_direct(path: Path) -> bool:
+def is_direct(path: Path) -> bool:
     """Whether a path has to be written itself; /dev/stdout has to be even where it is redirected to a file."""
     folder = os.path.realpath(path.parent)
     return folder == "/dev" or folder.startswith("/proc/") or (path.exists() and not path.is_file())

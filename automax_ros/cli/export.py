@@ -14,6 +14,7 @@ from automax_ros.bags.columns import Table, require_another_file
 from automax_ros.bags.export import CommonTable, write_csv
 from automax_ros.bags.scan_table import ScanTable
 from automax_ros.bags.series import Progress
+from automax_ros.bags.whole_file import is_direct
 from automax_ros.cli.progress import share_shown
 from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.usage import UsageError
@@ -43,8 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Export the recording."""
     as_numpy = arguments.output.suffix.lower() == ".npz"
     require_another_file(arguments.bag, arguments.output)
-    if not as_numpy and arguments.output.suffix.lower() in _OTHER_FORMATS:
-        raise UsageError(f"{arguments.output}: this format cannot be written", "name it OUT.csv or OUT.npz")
+    if not as_numpy and arguments.output.suffix.lower() != ".csv" and not is_direct(arguments.output):
+        raise UsageError(f"{arguments.output}: a table is written as .csv or .npz", "name it OUT.csv or OUT.npz")
     with ended_by_signals(), share_shown("export") as progress:
         rows = _written(arguments, as_numpy, progress)
     if sys.stderr.isatty():
@@ -71,7 +72,3 @@ def _table(arguments: argparse.Namespace, progress: Progress) -> Table:
     if watch is not None or window.step_ns:
         raise UsageError("--scans gives every scan and all it used: without --watch and --every")
     return ScanTable(arguments.bag, arguments.scans, window, progress)
-
-
-_OTHER_FORMATS = {".parquet", ".xlsx", ".xls", ".json", ".mat", ".npy", ".feather", ".h5", ".mcap", ".db3", ".yaml"}
-"""Suffixes that promise what a CSV table is not."""

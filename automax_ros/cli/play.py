@@ -22,8 +22,9 @@ from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
 from automax_ros.cli.usage import UsageError
+from automax_ros.cli.window import add_window_arguments, window_of
 from automax_ros.core.text import count_of, did_you_mean, printable, quoted
-from automax_ros.core.ticks import NS_PER_MS, NS_PER_S, seconds_ns
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 
 if TYPE_CHECKING:
     from automax_ros.nodes.player import Player
@@ -39,8 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax play``."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
     parser.add_argument("--rate", "-r", default="1", metavar="R", help=f"pace, up to {MAX_RATE} times the recorded one")
-    parser.add_argument("--from", dest="begin", metavar="S", help="begin S seconds after the start of the run")
-    parser.add_argument("--to", dest="end", metavar="S", help="end S seconds after the start of the run")
+    add_window_arguments(parser)
     parser.add_argument("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
     parser.add_argument(
         "--clock", action=argparse.BooleanOptionalAction, default=True, help="send /clock (default: yes)"
@@ -59,13 +59,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Play the recording; 0 at its end or after Ctrl-C."""
     rate = _rate(arguments.rate)
-    begin, end = _seconds("--from", arguments.begin), _seconds("--to", arguments.end)
-    if end is not None and end < (begin or 0):
-        raise UsageError("--to lies before --from")
+    window_of(arguments)
     target = _namespace(arguments.namespace)
     with stop_signals() as stop:
         domain = prepare_ros()
-        found = _survey(arguments.bag, begin, end, stop)
+        found = _survey(arguments.bag, arguments.start, arguments.end, stop)
         if found is None:
             return 0
         _choose(found, arguments.topics)
@@ -204,15 +202,6 @@ def _rate(text: str) -> float:
     if rate == 0:
         raise UsageError("--rate: 0 would never end")
     return rate
-
-
-def _seconds(option: str, text: str | None) -> int | None:
-    if text is None:
-        return None
-    try:
-        return seconds_ns(text)
-    except ValueError as error:
-        raise UsageError(f"{option}: {error}") from error
 
 
 def _namespace(text: str | None) -> str | None:

@@ -22,7 +22,7 @@ _ANALOG_IN, _ROW_IN, _HEAD_IN = 2.2, 0.32, 1.1
 _HIGHEST_IN = 40.0
 _ROW_FILL = 0.7
 _THICKEST = 1.9
-"""Lines get thinner one after the other, so that one under another is still seen."""
+"""Lines get thinner one after the other, and the later ones have gaps, so that one that lies under another is seen."""
 _MOST_LONG_MARKS = 40
 """Up to this many errors are marked by a line through all lanes too."""
 _LABEL_PX = 90
@@ -113,7 +113,7 @@ def _points(line: Line, traces: Traces, width_px: int) -> tuple[list[float], lis
 def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int) -> None:
     drawn = []
     for number, line in enumerate(lines):
-        style = _LINE_STYLES[number // 10 % len(_LINE_STYLES)]
+        style = _LINE_STYLES[(number + number // 20) % len(_LINE_STYLES)]  # 40 lines look different
         drawn += axis.plot(
             *_points(line, traces, width_px),
             drawstyle="steps-post",

@@ -25,10 +25,11 @@ from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
 from automax_ros.cli.usage import UsageError
+from automax_ros.cli.window import seconds_above_0
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.text import count_of, did_you_mean, quoted
-from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.ros_names import namespace
 from automax_ros.wire.cdr import CdrError
 from automax_ros.wire.messages import VariableTable
@@ -50,7 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", "-o", type=Path, metavar="DIR", help="the new rosbag2 folder (default: rack and time)"
     )
-    parser.add_argument("--duration", metavar="S", help="seconds after which the recording ends by itself")
+    parser.add_argument(
+        "--duration", type=seconds_above_0, metavar="S", help="seconds after which the recording ends by itself"
+    )
     parser.add_argument("--tasks", metavar="A,B", help="record scans and states of these tasks only (default: all)")
     parser.add_argument(
         "--split-mb", metavar="MB", help="begin a new file when one reaches MB megabytes (1 MB is 10^6 bytes)"
@@ -58,14 +61,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split-s", metavar="S", help="begin a new file each S seconds of rack time")
     parser.add_argument("--compression", metavar="zstd|lz4|none", help="how the files are compressed (default: zstd)")
     parser.add_argument(
-        "--wait", metavar="S", default=DEFAULT_WAIT_S, help=f"seconds to look for the rack (default: {DEFAULT_WAIT_S})"
+        "--wait",
+        type=seconds_above_0,
+        metavar="S",
+        default=DEFAULT_WAIT_S,
+        help=f"seconds to look for the rack (default: {DEFAULT_WAIT_S})",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Record until Ctrl-C, the duration has passed or the rack starts again; 1 where recording broke off."""
-    duration_ns = _seconds("--duration", arguments.duration) if arguments.duration is not None else None
-    wait_ns = _seconds("--wait", arguments.wait)
     storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
     how = _Storing(storage, split_period(arguments.split_s, "--"), arguments.tasks)
     with stop_signals() as stop:
@@ -80,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         recorder = LiveRecorder(own)
         session = _Session(recorder, own, domain, stop)
         try:
-            return session.record(folder, wait_ns, duration_ns, how, own_files)
+            return session.record(folder, arguments.wait, arguments.duration, how, own_files)
         finally:
             recorder.close()
 
@@ -300,13 +305,3 @@ def _chosen(table: VariableTable, text: str | None) -> set[str] | None:
     if not chosen:
         raise UsageError("--tasks: no task is named", f"there are {' '.join(known)}")
     return chosen
-
-
-def _seconds(option: str, text: str) -> int:
-    try:
-        found = seconds_ns(text)
-    except ValueError as error:
-        raise UsageError(f"{option}: {error}") from error
-    if found == 0:
-        raise UsageError(f"{option}: 0 s is too short: give more")
-    return found

@@ -19,8 +19,8 @@ from automax_ros.cli.progress import share_shown
 from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
+from automax_ros.cli.window import add_window_arguments, window_of
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.ticks import seconds_ns
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.task_source import read_task_source
 from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
@@ -55,10 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COUNTS",
         help="numbers that differ by at most this count as equal (default: 0, bit for bit)",
     )
-    parser.add_argument(
-        "--from", metavar="S", dest="from_s", help="compare from this time on, in s since the run's start"
-    )
-    parser.add_argument("--to", metavar="S", dest="to_s", help="compare up to this time")
+    add_window_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print the report for programs to read")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the first difference (needs matplotlib)")
     parser.add_argument(
@@ -115,10 +112,7 @@ def _replayed(replay: Replay, arguments: argparse.Namespace) -> ReplayReport:
 
 
 def _options(arguments: argparse.Namespace) -> ReplayOptions:
-    from_ns = _time("--from", arguments.from_s) or 0
-    to_ns = _time("--to", arguments.to_s)
-    if to_ns is not None and to_ns < from_ns:
-        raise UsageError("--to lies before --from")
+    window = window_of(arguments)
     if arguments.max_differences < 1:
         raise UsageError("--max-differences: at least 1")
     only = None
@@ -130,19 +124,10 @@ def _options(arguments: argparse.Namespace) -> ReplayOptions:
     return ReplayOptions(
         only,
         option_number("--tolerance", arguments.tolerance, 0.0, _MOST_COUNTS),
-        from_ns,
-        to_ns,
+        window.start_ns,
+        window.end_ns,
         arguments.max_differences,
     )
-
-
-def _time(option: str, text: str | None) -> int | None:
-    if text is None:
-        return None
-    try:
-        return seconds_ns(text)
-    except ValueError as error:
-        raise UsageError(f"{option}: {error}") from error
 
 
 def _task_files(texts: list[str]) -> dict[str, Path]:

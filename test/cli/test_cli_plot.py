@@ -48,6 +48,14 @@ def test_lines_are_the_write_log_and_hold_to_the_end():
     assert list(drawn) == ["LINE_REF%", "CUR_REF%", "SPEED_FPM%"]
 
 
+def test_a_line_that_lies_under_another_is_seen_through_its_gaps():
+    drawn = lines_of(figure_of(traces(GOLDEN, ["SECT_REF%", "SPEED_FDBK%"]), Layout("t")))
+    under, over = drawn["SECT_REF%"], drawn["SPEED_FDBK%"]
+    assert (under.get_linestyle(), over.get_linestyle()) == ("-", "--")
+    assert under.get_linewidth() > over.get_linewidth()
+    assert under.get_color() != over.get_color()
+
+
 def test_variables_of_one_unit_share_a_lane():
     shown = traces(GOLDEN, ["LINE_REF%", "SPEED_FPM%", "RUN@", "CUR_REF%", "READY@"])
     figure = figure_of(shown, Layout("t"))
@@ -153,8 +161,8 @@ def test_size_is_that_of_the_picture(automax, bag):
         (["bag", "NOTE$", "-o", "OUT.png"], "AMX6828"),
         (["bag", "REF%", "-o", "OUT.png", "--from", "5"], "AMX6825"),
         (["bag", "REF%", "-o", "OUT.png", "--from", "0.1", "--to", "0.05"], "--to lies before --from"),
-        (["bag", "REF%", "-o", "OUT.png", "--from", "soon"], "'soon' is not a number of seconds"),
-        (["bag", "REF%", "-o", "OUT.png", "--to", "nan"], "'nan' is not a number of seconds"),
+        (["bag", "REF%", "-o", "OUT.png", "--from", "soon"], "--from: time in seconds 'soon' is not a number"),
+        (["bag", "REF%", "-o", "OUT.png", "--to", "nan"], "--to: time in seconds 'nan' is not a number"),
         (["bag", "REF%", "-o", "OUT.png", "--size", "1600"], "'1600' is not a size"),
         (["bag", "REF%", "-o", "OUT.png", "--size", "99999x2"], "is not a size"),
         (["bag", "REF%", "-o", "OUT.jpeg"], "names no format of pictures"),
