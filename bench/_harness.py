@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.language.checks.checker import check
@@ -20,7 +20,7 @@ REPEATS = 60
 """Short runs of which the fastest counts, so that other work on the machine disturbs little."""
 
 
-def task_of(text: str, target: Processor = Processor.AUTOMAX) -> tuple[Task, CommonMemory]:
+def task_of(text: str, target: Platform = Platform.AUTOMAX) -> tuple[Task, CommonMemory]:
     """Return a task in RUN with a common memory of just the variables that it declares."""
     source = SourceText("BENCH.BLK", text)
     result = check(source, name="BENCH", catalogue=CATALOGUE, target=target)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from _harness import scan_ns, task_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Block, Form, Input, Processor, Special, Time
+from automax_ros.blocks.declaration import Access, Block, Form, Input, Platform, Special, Time
 from automax_ros.blocks.scan_loop import END_TIMES
 from automax_ros.core.types import DataType
 
@@ -108,7 +108,7 @@ def block_ns(block: Block, table: int = TABLE, changing: str = "") -> float:
     lines += [f"20000 CALL SCAN_LOOP(TICKS={20 if block.times.model_7010 is None else 2})"]
     if block.structure is Access.USES:
         lines.append(f"20001 {shift_text(block)}")
-    target = Processor.UDC if block.times.model_7010 is None else Processor.AUTOMAX
+    target = Platform.UDC if block.times.model_7010 is None else Platform.AUTOMAX
     coefficient = float(COEFFICIENTS[changing]) if changing else None
     empty = _varied_ns("\n".join([*lines, "30000 END"]), target, coefficient)
     full = _varied_ns(
@@ -125,7 +125,7 @@ def shift_text(block: Block) -> str:
     return f"CALL {shift}(STRUCTURE_NAME=QUEUE{mark}, MAX_COLUMNS=20, SHIFT=-OFF_B@, {pairs})"
 
 
-def _varied_ns(text: str, target: Processor, coefficient: float | None = None) -> float:
+def _varied_ns(text: str, target: Platform, coefficient: float | None = None) -> float:
     """Return the time of one scan of a task whose inputs change from scan to scan, and COEF where there is one."""
     task, memory = task_of(text, target)
     word, low, high, flag = (memory.view(name) for name in ("IN_W%", "LOW_W%", "HIGH_W%", "IN_B@"))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from automax_ros.blocks.declaration import Block, Input, Output, Processor
+from automax_ros.blocks.declaration import Block, Input, Output, Platform
 from automax_ros.blocks.describe import (
     input_rows,
     limit_rows,
@@ -100,7 +100,7 @@ def text_of(value: object) -> str:
 
 def runs_on(block: Block) -> str:
     """Return the Processors that run a block."""
-    names = {Processor.AUTOMAX: "AutoMax", Processor.PC3000: "PC3000", Processor.UDC: "UDC"}
+    names = {Platform.AUTOMAX: "AutoMax", Platform.PC3000: "PC3000", Platform.UDC: "UDC"}
     return ", ".join(name for processor, name in names.items() if processor in block.runs_on)
 
 

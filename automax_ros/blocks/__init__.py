@@ -8,7 +8,7 @@ from automax_ros.core.face import face
 
 if TYPE_CHECKING:
     from automax_ros.blocks.catalogue import CATALOGUE
-    from automax_ros.blocks.declaration import Block, Coefficients, Input, Output, Processor, Special
+    from automax_ros.blocks.declaration import Block, Coefficients, Input, Output, Platform, Special
     from automax_ros.blocks.describe import description, template
     from automax_ros.blocks.instance import Instance, InstanceError
     from automax_ros.blocks.transfer import Transfer
@@ -21,7 +21,7 @@ __all__ = [
     "Instance",
     "InstanceError",
     "Output",
-    "Processor",
+    "Platform",
     "Special",
     "Transfer",
     "description",

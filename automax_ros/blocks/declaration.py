@@ -60,17 +60,17 @@ NO_SUCH_COLUMN = 7005
 """Number for AMX7005."""
 
 
-class Processor(enum.Enum):
-    """What can run a block; the value is the word of ``automax check --target``."""
+class Platform(enum.Enum):
+    """What kind of controller can run a block; the value is the word of ``automax check --target``."""
 
     AUTOMAX = "automax"
     PC3000 = "pc3000"
     UDC = "udc"
 
 
-EVERYWHERE = frozenset(Processor)
-NOT_ON_UDC = frozenset({Processor.AUTOMAX, Processor.PC3000})
-UDC_ONLY = frozenset({Processor.UDC})
+EVERYWHERE = frozenset(Platform)
+NOT_ON_UDC = frozenset({Platform.AUTOMAX, Platform.PC3000})
+UDC_ONLY = frozenset({Platform.UDC})
 
 
 class Form(enum.Enum):
@@ -122,7 +122,7 @@ class Input:
     high: int | float | None = None
     one_of: tuple[int, ...] = ()
     also: DataType | None = None
-    runs_on: frozenset[Processor] = EVERYWHERE
+    runs_on: frozenset[Platform] = EVERYWHERE
     wants_common: bool = False
     sample: Value | None = None
 
@@ -340,10 +340,10 @@ class Block:
     rules: tuple[Rule, ...] = ()
     logs: tuple[str, ...] = ()
     structure: Access | None = None
-    runs_on: frozenset[Processor] = EVERYWHERE
+    runs_on: frozenset[Platform] = EVERYWHERE
     notes: tuple[str, ...] = ()
     begins_scan: bool = False
-    expected_on: frozenset[Processor] = frozenset()
+    expected_on: frozenset[Platform] = frozenset()
     expected_since: str = ""
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
-from automax_ros.blocks.declaration import Block, Form, Input, Output, Processor, Special, Time
+from automax_ros.blocks.declaration import Block, Form, Input, Output, Platform, Special, Time
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType, Value
 
@@ -34,7 +34,7 @@ def description(block: Block) -> str:
     parts.append(_list("Rules", [rule.text for rule in block.rules]))
     parts.append(_list("Notes", list(block.notes)))
     parts.append(_list("Logs", [f"{code} {PROBLEMS[code].title}" for code in block.problems]))
-    parts.append("Runs on: " + ", ".join(item.value for item in Processor if item in block.runs_on) + "\n")
+    parts.append("Runs on: " + ", ".join(item.value for item in Platform if item in block.runs_on) + "\n")
     parts.append(_section("Execution time, microseconds (section 53)", time_rows(block)))
     parts.append("Template\n\n" + template(block))
     return "\n".join(part for part in parts if part)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declaration import Block, Form, Input, Processor, Special, Time, Times
+from automax_ros.blocks.declaration import Block, Form, Input, Platform, Special, Time, Times
 from automax_ros.core.ticks import MAX_TICKS
 from automax_ros.core.types import DataType
 
@@ -27,7 +27,7 @@ SCAN_LOOP = Block(
             Special.EVENT,
             "EVENT",
             "name of the event, defined by an EVENT statement, that starts a scan",
-            runs_on=frozenset({Processor.AUTOMAX}),
+            runs_on=frozenset({Platform.AUTOMAX}),
         ),
     ),
     outputs=(),

@@ -14,7 +14,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.cli.task_files import (
     Target,
     add_target_arguments,
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _refuse_idle_options(arguments: argparse.Namespace) -> None:
     """Refuse ``--target`` and ``--tick-ms`` where no file heeds them: a rack file says itself what runs its tasks."""
-    given = arguments.tick_ms is not None or arguments.target != Processor.AUTOMAX.value
+    given = arguments.tick_ms is not None or arguments.target != Platform.AUTOMAX.value
     if given and all(map(is_rack_file, arguments.files)):
         raise UsageError("--target and --tick-ms are for tasks given by themselves", "a rack file has `tick_ms:`")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.text import quoted
@@ -29,7 +29,7 @@ _OTHER_TASKS = {".BAS": "BASIC tasks", ".PC": "ladder tasks", ".CNF": "configura
 class Target:
     """Where a task given by itself runs: the kind of Processor and its tick in ns."""
 
-    processor: Processor
+    processor: Platform
     tick_ns: int
 
 
@@ -37,8 +37,8 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--target`` and ``--tick-ms``."""
     parser.add_argument(
         "--target",
-        choices=[item.value for item in Processor],
-        default=Processor.AUTOMAX.value,
+        choices=[item.value for item in Platform],
+        default=Platform.AUTOMAX.value,
         help="the Processor that runs the task (default: automax)",
     )
     parser.add_argument(
@@ -52,8 +52,8 @@ def target_of(arguments: argparse.Namespace) -> Target:
     Raises:
         UsageError: not a tick that this Processor can have.
     """
-    processor = Processor(arguments.target)
-    is_udc = processor is Processor.UDC
+    processor = Platform(arguments.target)
+    is_udc = processor is Platform.UDC
     if arguments.tick_ms is None:
         return Target(processor, UDC_TICK_NS if is_udc else DEFAULT_TICK_NS)
     tick = tick_option(arguments.tick_ms)

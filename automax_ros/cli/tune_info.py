@@ -16,7 +16,7 @@ import re
 import sys
 from pathlib import Path
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.cli.call_options import add_call_arguments, chosen_calls
 from automax_ros.cli.numbers import number, whole_number
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
@@ -93,7 +93,7 @@ def _print_rate(arguments: argparse.Namespace, program: Program | None) -> None:
         period_ns = program.period_ns
     elif arguments.ticks is not None:
         target = target_of(arguments)
-        most = UDC_MAX_TICKS if target.processor is Processor.UDC else MAX_TICKS
+        most = UDC_MAX_TICKS if target.processor is Platform.UDC else MAX_TICKS
         if not 1 <= arguments.ticks <= most:
             raise UsageError(f"--ticks {arguments.ticks}: it must be 1 to {most}")
         period_ns = arguments.ticks * target.tick_ns

@@ -8,7 +8,7 @@ from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.running.scheduler import Event, EventClass, EventKey, Scheduler
+from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
 
 After = Callable[[Task, ScanRecord | None], None]
@@ -37,7 +37,7 @@ class ScheduledTask:
         self.source = source
         self.statistics = TaskStatistics()
         self._scheduler, self._after, self._stopwatch = scheduler, after, stopwatch
-        self._event: Event | None = None
+        self._event: ScheduledEvent | None = None
 
     def start_up(self) -> None:
         """Execute what stands before SCAN_LOOP, at the present; no scan is scheduled yet."""

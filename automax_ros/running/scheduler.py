@@ -38,7 +38,7 @@ class EventKey:
 
 
 @dataclass(eq=False)
-class Event:
+class ScheduledEvent:
     """An event that was posted; ``cancel`` takes it out of the queue."""
 
     key: EventKey
@@ -51,7 +51,7 @@ class Event:
         self.cancelled = True
 
 
-_Queued = tuple[int, int, int, str, int, Event]
+_Queued = tuple[int, int, int, str, int, ScheduledEvent]
 """Instant, class, priority, name, serial number: a tuple, since tuples compare fast."""
 
 
@@ -64,15 +64,15 @@ class Scheduler:
         self._queue: list[_Queued] = []
         self._serial = 0
 
-    def at(self, time_ns: int, key: EventKey, action: Action) -> Event:
+    def at(self, time_ns: int, key: EventKey, action: Action) -> ScheduledEvent:
         """Post an event that happens once.
 
         Raises:
             ValueError: the instant lies in the past.
         """
-        return self._post(time_ns, Event(key, lambda now, _: action(now)))
+        return self._post(time_ns, ScheduledEvent(key, lambda now, _: action(now)))
 
-    def every(self, period_ns: int, first_ns: int, key: EventKey, action: PeriodicAction) -> Event:
+    def every(self, period_ns: int, first_ns: int, key: EventKey, action: PeriodicAction) -> ScheduledEvent:
         """Post an event at ``first_ns`` and each ``period_ns`` after it.
 
         Raises:
@@ -80,7 +80,7 @@ class Scheduler:
         """
         if period_ns <= 0:
             raise ValueError(f"a period of {period_ns} ns is not positive")
-        return self._post(first_ns, Event(key, action, period_ns))
+        return self._post(first_ns, ScheduledEvent(key, action, period_ns))
 
     @property
     def next_ns(self) -> int | None:
@@ -89,7 +89,7 @@ class Scheduler:
             heapq.heappop(self._queue)
         return self._queue[0][0] if self._queue else None
 
-    def due_ns(self, event: Event) -> int | None:
+    def due_ns(self, event: ScheduledEvent) -> int | None:
         """Return when an event happens next, None if it does not any more."""
         found = (entry[0] for entry in self._queue if entry[5] is event)
         return None if event.cancelled else next(found, None)
@@ -140,11 +140,11 @@ class Scheduler:
         due = self.next_ns
         self.now_ns = max(self.now_ns, now_ns if due is None else min(now_ns, due))
 
-    def _queued(self, time_ns: int, event: Event) -> _Queued:
+    def _queued(self, time_ns: int, event: ScheduledEvent) -> _Queued:
         self._serial += 1
         return time_ns, event.key.event_class, event.key.priority, event.key.name, self._serial, event
 
-    def _post(self, time_ns: int, event: Event) -> Event:
+    def _post(self, time_ns: int, event: ScheduledEvent) -> ScheduledEvent:
         if time_ns < self.now_ns:
             raise ValueError(f"an event at {time_ns} ns lies before the present, {self.now_ns} ns")
         heapq.heappush(self._queue, self._queued(time_ns, event))

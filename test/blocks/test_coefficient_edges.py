@@ -8,7 +8,7 @@ import pytest
 from compile.support import task_of
 from language.check_support import problems
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Severity
 from automax_ros.core.numbers import stored_real
 
@@ -40,7 +40,7 @@ class Edge:
     @property
     def target(self):
         on_udc = self.block in ("HIGH_PASS_FILTER", "LOW_PASS_FILTER", "NOTCHN")
-        return Processor.UDC if on_udc else Processor.AUTOMAX
+        return Platform.UDC if on_udc else Platform.AUTOMAX
 
     def bounds(self, period_s):
         """The limits that the manual states: (side, value, factor that leads outside)."""

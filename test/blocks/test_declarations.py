@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import CALL_FACTS, HELPERS, Access, Form, Processor, Special, Time
+from automax_ros.blocks.declaration import CALL_FACTS, HELPERS, Access, Form, Platform, Special, Time
 from automax_ros.blocks.families import FAMILIES
 from automax_ros.blocks.instance import Instance
 from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES
@@ -359,7 +359,7 @@ def test_pc3000_times_are_0_7_of_the_7010s(name):
 @each_block
 def test_times_are_there_for_every_processor_that_runs_the_block(block):
     assert block.name in ROWS
-    assert (block.times.udc is not None) == (Processor.UDC in block.runs_on)
-    assert (block.times.pc3000 is not None) == (Processor.PC3000 in block.runs_on)
-    assert (block.times.model_7010 is not None) == (Processor.AUTOMAX in block.runs_on)
-    assert (block.times.model_6010 is not None) == (Processor.AUTOMAX in block.runs_on)
+    assert (block.times.udc is not None) == (Platform.UDC in block.runs_on)
+    assert (block.times.pc3000 is not None) == (Platform.PC3000 in block.runs_on)
+    assert (block.times.model_7010 is not None) == (Platform.AUTOMAX in block.runs_on)
+    assert (block.times.model_6010 is not None) == (Platform.AUTOMAX in block.runs_on)

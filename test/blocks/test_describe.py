@@ -3,7 +3,7 @@ import re
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Form, Processor, Special
+from automax_ros.blocks.declaration import Access, Form, Platform, Special
 from automax_ros.blocks.describe import WIDTH, description, summary, template, templates
 from automax_ros.core.diagnostics import SourceText, render
 from automax_ros.core.types import DataType
@@ -123,7 +123,7 @@ def test_a_template_with_its_place_holders_filled_in_is_a_task_without_errors(bl
     task = "".join(f"{line} LOCAL {name}\n" for line, name in enumerate(variables, 10))
     for array in re.findall(r"TABLE\d%", call):
         task = task.replace(f"LOCAL {array}", f"LOCAL {array}(16)")
-    if Processor.AUTOMAX not in block.runs_on:
+    if Platform.AUTOMAX not in block.runs_on:
         task = task.replace("LOCAL I_FDBK", "COMMON I_FDBK").replace("LOCAL OVERLOAD", "COMMON OVERLOAD")
     if block.structure is Access.USES:
         kind = DataType.BOOLEAN if block.name.endswith("BITS") else DataType.INTEGER
@@ -136,9 +136,9 @@ def test_a_template_with_its_place_holders_filled_in_is_a_task_without_errors(bl
     else:
         task += "100 CALL SCAN_LOOP(TICKS=4)\n"
     source = SourceText("TASK.BLK", f"{task}{call}300 END\n")
-    target = Processor.AUTOMAX if Processor.AUTOMAX in block.runs_on else Processor.UDC
+    target = Platform.AUTOMAX if Platform.AUTOMAX in block.runs_on else Platform.UDC
     result = check(source, name="TASK", catalogue=CATALOGUE, target=target)
-    unprotected = target is Processor.UDC and block.name != "THERMAL_OVERLOAD"
+    unprotected = target is Platform.UDC and block.name != "THERMAL_OVERLOAD"
     warnings = [item.code for item in result.diagnostics if unprotected and item.code == "AMX4097"]
     assert [render(item, source) for item in result.diagnostics][len(warnings) :] == []
     assert result.program is not None

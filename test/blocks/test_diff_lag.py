@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.blocks.instance import InstanceError
 from automax_ros.core.diagnostics import Severity
 
@@ -160,7 +160,7 @@ def test_a_smaller_coefficient_limits_the_integrator_on_the_next_scan():
     assert block.scan(input=20000, wlg=0.1 * C) == {"output": 20000 - 8191}
 
 
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_runs_everywhere(target):
     assert errors_of(task("CALL DIFF_LAG(INPUT=A%, WLG=1.0, OUTPUT=B%)"), target=target, tick_ns=500_000) == []
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from language.check_support import problems, task
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Severity
 
 from .support import TICK, filtered, mapping_constant, outputs_of, run, signals
@@ -198,7 +198,7 @@ def test_a_constant_input_integrates_like_a_variable():
     assert [block.scan()["output"] for _ in range(50)] == outputs_of(run("INTEGRATE", ki=0.59507), [2000] * 50)
 
 
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_runs_everywhere(target):
     assert errors_of(task("CALL INTEGRATE(INPUT=A%, KI=1.0, OUTPUT=B%)"), target=target, tick_ns=500_000) == []
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Severity
 
 from .support import TICK, filtered, int16, mapping_constant, outputs_of, repeatable, run, signals
@@ -135,7 +135,7 @@ def test_first_scan_in_reset_shows_initial_value():
     assert run("LAG", wlg=10.0).scan(input=500, reset=True) == {"output": 0}
 
 
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_runs_everywhere(target):
     assert errors_of(task("CALL LAG(INPUT=A%, WLG=1.0, OUTPUT=B%)"), target=target, tick_ns=500_000) == []
 

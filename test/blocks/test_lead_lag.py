@@ -7,7 +7,7 @@ import pytest
 from language.check_support import one, problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.blocks.instance import InstanceError
 from automax_ros.core.diagnostics import Severity
 
@@ -222,7 +222,7 @@ def test_a_variable_frequency_is_limited_before_the_ratio_is_taken():
     assert in_force(block, (0.001, 0.01), wld=0.0, wlg=0.01)
 
 
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_runs_everywhere(target):
     text = task("CALL LEAD_LAG(INPUT=A%, WLD=1.0, WLG=5.0, OUTPUT=B%)")
     assert errors_of(text, target=target, tick_ns=500_000) == []

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.blocks.instance import InstanceError
 from automax_ros.core.diagnostics import Severity
 
@@ -158,7 +158,7 @@ def test_any_signal_against_scipy(inputs, q, wn):
 CALL = "CALL NOTCH(INPUT=A%, Q_FACTOR=1.0, WN=10.0, OUTPUT=B%)"
 
 
-@pytest.mark.parametrize(("target", "found"), [(p, ["AMX4071"] if p is Processor.UDC else []) for p in Processor])
+@pytest.mark.parametrize(("target", "found"), [(p, ["AMX4071"] if p is Platform.UDC else []) for p in Platform])
 def test_does_not_run_on_a_udc(target, found):
     assert errors_of(task(CALL), target=target, tick_ns=500_000) == found
 

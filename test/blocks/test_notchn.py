@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.blocks.instance import InstanceError
 from automax_ros.core.diagnostics import Severity
 
@@ -19,7 +19,7 @@ MS = 1_000_000
 ROUNDED = 0.5 + 1e-4
 LOWEST = {2: 0.02, 4: 0.3}
 """Low limit of WN T by the order (48.1)."""
-UDC = {"target": Processor.UDC, "tick_ns": 500_000}
+UDC = {"target": Platform.UDC, "tick_ns": 500_000}
 
 
 def errors_of(text, **options):
@@ -164,10 +164,10 @@ def test_any_signal_against_scipy(order, inputs, q, turn):
     assert np.max(np.abs(outputs - reference(order, q, turn / 0.001, 0.001, inputs))) < ROUNDED
 
 
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_runs_on_a_udc_alone(target):
     text = task("CALL NOTCHN(INPUT=A%, Q_FACTOR=1.0, WN=200.0, OUTPUT=B%)")
-    assert errors_of(text, target=target, tick_ns=500_000) == ([] if target is Processor.UDC else ["AMX4071"])
+    assert errors_of(text, target=target, tick_ns=500_000) == ([] if target is Platform.UDC else ["AMX4071"])
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.blocks.instance import InstanceError
 from automax_ros.core.diagnostics import Severity
 
@@ -21,7 +21,7 @@ HIGH, LOW = "HIGH_PASS_FILTER", "LOW_PASS_FILTER"
 FREQUENCY = {HIGH: "wld", LOW: "wlg"}
 LOWEST = {1: 0.000004, 2: 0.02, 3: 0.1}
 """Low limit of the frequency times T (46.1, 47.1)."""
-UDC = {"target": Processor.UDC, "tick_ns": 500_000}
+UDC = {"target": Platform.UDC, "tick_ns": 500_000}
 
 
 def errors_of(text, **options):
@@ -185,10 +185,10 @@ def test_any_signal_against_scipy(name, order, inputs, turn):
 
 
 @pytest.mark.parametrize("name", [HIGH, LOW])
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_runs_on_a_udc_alone(target, name):
     text = task(f"CALL {name}(INPUT=A%, {FREQUENCY[name].upper()}=100.0, OUTPUT=B%)")
-    assert errors_of(text, target=target, tick_ns=500_000) == ([] if target is Processor.UDC else ["AMX4071"])
+    assert errors_of(text, target=target, tick_ns=500_000) == ([] if target is Platform.UDC else ["AMX4071"])
 
 
 @pytest.mark.parametrize("name", [HIGH, LOW])

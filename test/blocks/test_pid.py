@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.blocks.instance import InstanceError
 from automax_ros.core.diagnostics import Severity
 
@@ -413,9 +413,9 @@ def test_cancelling_the_plants_pole_makes_the_loop_first_order():
 CALL = "LOOP_TIME=0.05, INPUT=A%, FEEDBACK=B%, OUTPUT=C%"
 
 
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_does_not_run_on_a_udc(target):
-    expected = ["AMX4071"] if target is Processor.UDC else []
+    expected = ["AMX4071"] if target is Platform.UDC else []
     assert errors_of(task(f"CALL PID(KP=1.0, KI=1.0, {CALL})"), target=target, tick_ns=500_000) == expected
 
 

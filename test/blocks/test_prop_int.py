@@ -5,7 +5,7 @@ import pytest
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Severity
 
 from .support import TICK, filtered, mapping_constant, outputs_of, run, signals
@@ -219,7 +219,7 @@ def test_a_lead_on_the_plants_pole_makes_the_loop_first_order():
     assert np.max(shown) < 1500 + 3
 
 
-@pytest.mark.parametrize("target", list(Processor))
+@pytest.mark.parametrize("target", list(Platform))
 def test_runs_everywhere(target):
     text = task("CALL PROP_INT(INPUT=A%, KP=1.0, WLD=1.0, OUTPUT=B%)")
     assert errors_of(text, target=target, tick_ns=500_000) == []

@@ -1,7 +1,7 @@
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Form, Processor, Special
+from automax_ros.blocks.declaration import Form, Platform, Special
 from automax_ros.blocks.instance import Instance, InstanceError
 from automax_ros.core.types import DataType
 
@@ -26,7 +26,7 @@ def test_event_belongs_to_automax_tasks_only():
     assert event.type is Special.EVENT
     assert not event.required
     assert event.default is None
-    assert event.runs_on == {Processor.AUTOMAX}
+    assert event.runs_on == {Platform.AUTOMAX}
 
 
 def test_it_is_carried_out_by_the_task():

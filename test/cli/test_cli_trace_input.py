@@ -10,7 +10,7 @@ from core.problem_pages import read_page
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.cli.csv_table import MAX_LINE, CsvFault
 from automax_ros.cli.main import main
 from automax_ros.cli.task_files import Target, check_task_file
@@ -142,7 +142,7 @@ def lone(tmp_path_factory):
     """A task to be set, and the path of its table."""
     folder = tmp_path_factory.mktemp("table")
     (folder / "TASK.BLK").write_text(TASK)
-    _, result = check_task_file(folder / "TASK.BLK", Target(Processor.AUTOMAX, 5_500_000))
+    _, result = check_task_file(folder / "TASK.BLK", Target(Platform.AUTOMAX, 5_500_000))
     assert result.program is not None
     task = LoneTask(result.program)
     task.task.run()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import settings
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.compile.cost import CostModel
 from automax_ros.core.diagnostics import SourceText, render_all
@@ -26,7 +26,7 @@ def repeatable(examples: int) -> settings:
     return settings(deadline=None, derandomize=True, max_examples=examples, database=None)
 
 
-def program_of(text: str, name: str = "TASK", target: Processor = Processor.AUTOMAX) -> Program:
+def program_of(text: str, name: str = "TASK", target: Platform = Platform.AUTOMAX) -> Program:
     """The checked program of a task; fails on an error, not on a warning. Every Processor has the same tick here."""
     source = SourceText("task.blk", text)
     result = check(source, name=name, catalogue=CATALOGUE, tick_ns=TICK, target=target)
@@ -42,13 +42,13 @@ def views_of(program: Program) -> list[ViewSpec]:
     ]
 
 
-def compiled_of(text: str, cost_model: CostModel | None = None, target: Processor = Processor.AUTOMAX) -> CompiledTask:
+def compiled_of(text: str, cost_model: CostModel | None = None, target: Platform = Platform.AUTOMAX) -> CompiledTask:
     program = program_of(text, target=target)
     return compile_program(program, {spec.name: view for view, spec in enumerate(views_of(program))}, cost_model)
 
 
 def task_of(
-    text: str, memory_class=CommonMemory, cost_model=None, target=Processor.AUTOMAX, **commons: Value
+    text: str, memory_class=CommonMemory, cost_model=None, target=Platform.AUTOMAX, **commons: Value
 ) -> tuple[Task, CommonMemory]:
     """A task and a memory made of its own COMMON statements; ``commons`` by name, such as ``**{"REF%": 5}``."""
     compiled = compiled_of(text, cost_model, target)

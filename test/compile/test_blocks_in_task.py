@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Block, Form, Given, Processor, Special
+from automax_ros.blocks.declaration import Access, Block, Form, Given, Platform, Special
 from automax_ros.blocks.instance import Instance
 from automax_ros.blocks.rules import AtLeast, Contiguous, Needs, NumberTrue
 from automax_ros.core.numbers import stored_real
@@ -20,7 +20,7 @@ from .block_model import SIZE, TICKS, Model, ModelBlock, Programmed
 from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_in_steps, task_of
 
 BLOCKS = [block for block in CATALOGUE.values() if block.step is not None]
-ON_A_RACK = [block for block in BLOCKS if Processor.AUTOMAX in block.runs_on]
+ON_A_RACK = [block for block in BLOCKS if Platform.AUTOMAX in block.runs_on]
 EDGES = st.sampled_from([-32768, -32767, -1, 0, 1, 32766, 32767])
 VALUES = {
     DataType.INTEGER: EDGES | st.integers(-32768, 32767) | st.integers(-50, 50),
@@ -193,7 +193,7 @@ def used(programmed: list[Programmed]) -> list[str]:
 
 def compare(programmed: list[Programmed], changes, in_steps: bool) -> None:
     body = "\n".join(call.text(100 + number) for number, call in enumerate(programmed))
-    target = Processor.AUTOMAX if all(call.block in ON_A_RACK for call in programmed) else Processor.UDC
+    target = Platform.AUTOMAX if all(call.block in ON_A_RACK for call in programmed) else Platform.UDC
     task, memory = task_of(f"{declarations()}20 CALL SCAN_LOOP(TICKS={TICKS})\n{body}\n999 END\n", target=target)
     task.record_scans()
     task.run()

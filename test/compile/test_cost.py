@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Block, Form, Input, Output, Processor, Special
+from automax_ros.blocks.declaration import Access, Block, Form, Input, Output, Platform, Special
 from automax_ros.blocks.rules import AtLeast, Contiguous, NumberTrue
 from automax_ros.compile.cost import STATEMENT_ESTIMATES_US, CostModel, Model
 from automax_ros.core.types import DataType
@@ -24,7 +24,7 @@ BLOCKS = """10 COMMON A%, B%, C%, D!, X@, Y@
 """
 
 
-def times(model: Model, text: str, target: Processor = Processor.AUTOMAX) -> list[int]:
+def times(model: Model, text: str, target: Platform = Platform.AUTOMAX) -> list[int]:
     task, _ = task_of(text, cost_model=CostModel(model), target=target)
     task.run()
     return scan_in_steps(task, 0)
@@ -96,8 +96,8 @@ def call_of(block: Block) -> tuple[str, list[str]]:
 @pytest.mark.parametrize("block", [block for block in CATALOGUE.values() if block.step], ids=lambda block: block.name)
 def test_every_block_takes_its_printed_time(block):
     """The same task with and without the block differs by its time."""
-    on_udc = Processor.AUTOMAX not in block.runs_on
-    model, target = (Model.UDC, Processor.UDC) if on_udc else (Model.MODEL_7010, Processor.AUTOMAX)
+    on_udc = Platform.AUTOMAX not in block.runs_on
+    model, target = (Model.UDC, Platform.UDC) if on_udc else (Model.MODEL_7010, Platform.AUTOMAX)
     printed = block.times.udc if on_udc else block.times.model_7010
     head = "10 LOCAL A%, D!, X@, R, T%(16)\n20 CALL SCAN_LOOP(TICKS=4)\n"
     if block.structure is Access.USES:
@@ -118,7 +118,7 @@ def test_a_filter_takes_longer_the_higher_its_order():
     """Table 5: NOTCHN takes 64.25 + o(20.00)."""
     call = "CALL NOTCHN(INPUT=A%, Q_FACTOR=1.0, WN=50.0, ORDER={}, OUTPUT=A%)"
     text = f"10 LOCAL A%\n20 CALL SCAN_LOOP(TICKS=4)\n30 {call}\n40 END\n"
-    second, fourth = (sum(times(Model.UDC, text.format(order), Processor.UDC)) for order in (2, 4))
+    second, fourth = (sum(times(Model.UDC, text.format(order), Platform.UDC)) for order in (2, 4))
     assert fourth - second == pytest.approx(40_000, abs=1)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import automax_ros.core
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.language.program import CommonSpec
 
@@ -25,8 +25,8 @@ class Fence:
     text: str
 
     @property
-    def target(self) -> Processor:
-        return Processor(self._word("target") or "automax")
+    def target(self) -> Platform:
+        return Platform(self._word("target") or "automax")
 
     @property
     def commons(self) -> dict[str, CommonSpec] | None:

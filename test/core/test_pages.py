@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.language.checks.checker import CheckResult, check
@@ -32,7 +32,7 @@ def whole(code: str, text: str) -> str:
 
 
 def checked(fence: Fence) -> CheckResult:
-    tick_ns = 500_000 if fence.target is Processor.UDC else 5_500_000
+    tick_ns = 500_000 if fence.target is Platform.UDC else 5_500_000
     return check(
         SourceText("task.blk", fence.text),
         name="TASK",
@@ -45,7 +45,7 @@ def checked(fence: Fence) -> CheckResult:
 
 def unprotected(fence: Fence, code: str) -> bool:
     """Whether a finding is the warning that a short example for a UDC leaves out THERMAL_OVERLOAD."""
-    short = fence.target is Processor.UDC and "COMMON FB%" not in fence.text
+    short = fence.target is Platform.UDC and "COMMON FB%" not in fence.text
     return short and code == "AMX4097"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec, Program
@@ -14,7 +14,7 @@ from automax_ros.language.program import CommonSpec, Program
 def check_text(
     text: str,
     *,
-    target: Processor = Processor.AUTOMAX,
+    target: Platform = Platform.AUTOMAX,
     tick_ns: int = 5_500_000,
     commons: Mapping[str, CommonSpec] | None = None,
 ) -> CheckResult:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE, NOT_YET
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import stored_real
 from automax_ros.language.program import BoundCall
@@ -197,16 +197,16 @@ def test_ticks(arguments: str, code: str) -> None:
 
 
 def test_ticks_of_a_udc() -> None:
-    assert codes(loop("TICKS=20"), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED]
-    assert codes(loop("TICKS=21"), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX4085"]
-    assert codes(loop("TICKS=32768"), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX2007"]
+    assert codes(loop("TICKS=20"), target=Platform.UDC, tick_ns=500_000) == [UNPROTECTED]
+    assert codes(loop("TICKS=21"), target=Platform.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX4085"]
+    assert codes(loop("TICKS=32768"), target=Platform.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX2007"]
     assert codes(loop("TICKS=32767")) == []
 
 
 @pytest.mark.parametrize("statement", ["A% = IOREAD%(5, 0)", "IOWRITE 5, 0, A%"])
 def test_io_of_a_udc(statement: str) -> None:
-    assert codes(task(statement), target=Processor.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX4027"]
-    assert codes(task(statement), target=Processor.PC3000) == []
+    assert codes(task(statement), target=Platform.UDC, tick_ns=500_000) == [UNPROTECTED, "AMX4027"]
+    assert codes(task(statement), target=Platform.PC3000) == []
 
 
 def test_a_common_shared_by_blocks_and_basic() -> None:

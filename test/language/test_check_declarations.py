@@ -2,7 +2,7 @@
 
 import pytest
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, REAL_MAX, stored_real
 from automax_ros.core.types import DataType
@@ -214,9 +214,9 @@ def test_wrong_events(text: str, code: str) -> None:
     assert codes(text) == [code]
 
 
-@pytest.mark.parametrize("target", [Processor.PC3000, Processor.UDC])
-def test_events_belong_to_automax_processors(target: Processor) -> None:
+@pytest.mark.parametrize("target", [Platform.PC3000, Platform.UDC])
+def test_events_belong_to_automax_processors(target: Platform) -> None:
     found = [item for item in problems(event_task(), target=target, tick_ns=500_000) if item.code != "AMX4097"]
     assert {item.code for item in found} == {"AMX4027"}
     assert [item.span.line for item in found] == [2, 3]
-    assert codes(event_task(event="EVENT NAME=GO", argument=""), target=Processor.PC3000) == []
+    assert codes(event_task(event="EVENT NAME=GO", argument=""), target=Platform.PC3000) == []

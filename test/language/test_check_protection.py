@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Diagnostic, Severity
 
 from .check_support import check_text, problems, task
@@ -14,10 +14,10 @@ THERMAL = "CALL THERMAL_OVERLOAD(I_FDBK=FB%, OVERLOAD=OVR@)"
 TACH = "CALL TACHLOSS_OVERSPEED(SPEED_FDBK=SPEED%, ARM_VOLTAGE_FDBK=VOLTS%, SPEED_FAULT=FAULT@)"
 
 
-def found_in(*lines: str, target: Processor = Processor.UDC) -> list[tuple[str, int | None, str]]:
+def found_in(*lines: str, target: Platform = Platform.UDC) -> list[tuple[str, int | None, str]]:
     """Code, BASIC line and marked text of each problem."""
     text = task(*lines, declare=DECLARE)
-    tick_ns = 500_000 if target is Processor.UDC else 5_500_000
+    tick_ns = 500_000 if target is Platform.UDC else 5_500_000
     return [(item.code, item.statement, marked(text, item)) for item in problems(text, target=target, tick_ns=tick_ns)]
 
 
@@ -53,22 +53,22 @@ def test_right_udc_tasks(lines: tuple[str, ...]) -> None:
     assert found_in(*lines) == []
 
 
-@pytest.mark.parametrize("target", [Processor.AUTOMAX, Processor.PC3000])
+@pytest.mark.parametrize("target", [Platform.AUTOMAX, Platform.PC3000])
 @pytest.mark.parametrize(("text", "name"), [(THERMAL, "THERMAL_OVERLOAD"), (TACH, "TACHLOSS_OVERSPEED")])
-def test_both_run_on_a_udc_only(text: str, name: str, target: Processor) -> None:
+def test_both_run_on_a_udc_only(text: str, name: str, target: Platform) -> None:
     assert found_in("A% = 1", text, target=target) == [("AMX4071", 40, name)]
 
 
 def test_a_udc_task_without_thermal_overload_gets_a_warning() -> None:
     assert found_in(TACH) == [("AMX4097", 20, "CALL SCAN_LOOP(TICKS=4)")]
     text = task(TACH, declare=DECLARE)
-    result = check_text(text, target=Processor.UDC, tick_ns=500_000)
+    result = check_text(text, target=Platform.UDC, tick_ns=500_000)
     assert [item.severity for item in result.diagnostics] == [Severity.WARNING]
     assert result.program is not None
 
 
-@pytest.mark.parametrize("target", [Processor.AUTOMAX, Processor.PC3000])
-def test_other_tasks_need_none(target: Processor) -> None:
+@pytest.mark.parametrize("target", [Platform.AUTOMAX, Platform.PC3000])
+def test_other_tasks_need_none(target: Platform) -> None:
     assert found_in("A% = 1", target=target) == []
 
 
@@ -82,7 +82,7 @@ def test_other_tasks_need_none(target: Processor) -> None:
 )
 def test_a_current_or_overload_that_is_not_common_gives_a_warning(text: str, marked_text: str) -> None:
     assert found_in(text) == [("AMX4096", 30, marked_text)]
-    result = check_text(task(text, declare=DECLARE), target=Processor.UDC, tick_ns=500_000)
+    result = check_text(task(text, declare=DECLARE), target=Platform.UDC, tick_ns=500_000)
     assert result.diagnostics[0].severity is Severity.WARNING
     assert result.program is not None
 
@@ -108,7 +108,7 @@ def test_both_not_common_are_two_warnings() -> None:
 )
 def test_a_constant_out_of_range_is_a_warning_since_it_is_limited_at_run_time(more: str, value: str) -> None:
     assert found_in(thermal(more)) == [("AMX4098", 30, value)]
-    result = check_text(task(thermal(more), declare=DECLARE), target=Processor.UDC, tick_ns=500_000)
+    result = check_text(task(thermal(more), declare=DECLARE), target=Platform.UDC, tick_ns=500_000)
     assert result.diagnostics[0].severity is Severity.WARNING
     assert result.program is not None
 

@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Form, Input, Processor
+from automax_ros.blocks.declaration import Form, Input, Platform
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType
@@ -119,7 +119,7 @@ def tasks(draw: st.DrawFn) -> str:
 def assert_checked(text: str) -> None:
     """A check gives a program or errors; all codes are known, all places lie in the text."""
     rows = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    for target in Processor:
+    for target in Platform:
         result = check_text(text, target=target)
         assert (result.program is None) == has_errors(result.diagnostics)
         for item in result.diagnostics:

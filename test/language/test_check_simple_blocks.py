@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Severity, Span
 
 from .check_support import codes, one, problems, task
@@ -13,7 +13,7 @@ DECLARE = (
     "LOCAL A%, B%, C%, D!, R, X@, Y@, S$, T%(16), U%(16), V%(8), W%(2,2), L!(16), M@(16), Q(16), TEN%(9), TWO%(1), "
     "ONE%(0) \\ COMMON F%(16), G%(8)"
 )
-UDC = {"target": Processor.UDC, "tick_ns": 500_000}
+UDC = {"target": Platform.UDC, "tick_ns": 500_000}
 
 
 def call(statement: str) -> str:
@@ -408,8 +408,8 @@ def test_a_gap_on_a_continued_line() -> None:
         "UNPACK_BITS(INPUT=5, OUTPUT3=X@, OUTPUT0=Y@)",
     ],
 )
-@pytest.mark.parametrize("target", [Processor.AUTOMAX, Processor.PC3000])
-def test_correct_statements(statement: str, target: Processor) -> None:
+@pytest.mark.parametrize("target", [Platform.AUTOMAX, Platform.PC3000])
+def test_correct_statements(statement: str, target: Platform) -> None:
     assert codes(call(statement), target=target) == []
 
 
@@ -593,7 +593,7 @@ def test_bit_select_does_not_run_on_a_udc() -> None:
     (found,) = (item for item in problems(text, **UDC) if item.severity is Severity.ERROR)
     assert (found.code, found.span) == ("AMX4071", span)
     assert "BIT_SELECT" in found.message
-    assert codes(text) == codes(text, target=Processor.PC3000) == []
+    assert codes(text) == codes(text, target=Platform.PC3000) == []
 
 
 @pytest.mark.parametrize(

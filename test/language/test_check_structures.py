@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Diagnostic, Severity
 
 from .check_support import codes, one, problems, program, task
@@ -260,7 +260,7 @@ def test_none_of_these_blocks_runs_on_a_udc(text: str) -> None:
     protection = "CALL THERMAL_OVERLOAD(I_FDBK=PMI_FB%, OVERLOAD=OVRLOAD@)"
     made = {READ_WORDS: [WORDS], WRITE_WORDS: [WORDS], READ_BITS: [BITS], WRITE_BITS: [BITS]}.get(text, [])
     written = task(protection, text, *made, declare=f"{DECLARE}\n11 COMMON PMI_FB%, OVRLOAD@")
-    found = problems(written, target=Processor.UDC, tick_ns=500_000)
+    found = problems(written, target=Platform.UDC, tick_ns=500_000)
     name = text.removeprefix("CALL ").partition("(")[0]
     assert [item.code for item in found] == ["AMX4071"] * (1 + len(made))
     assert (found[0].statement, text_at(written, found[0])) == (40, name)
@@ -268,5 +268,5 @@ def test_none_of_these_blocks_runs_on_a_udc(text: str) -> None:
 
 @pytest.mark.parametrize("text", ALL)
 def test_they_run_on_automax_and_pc3000(text: str) -> None:
-    for target in (Processor.AUTOMAX, Processor.PC3000):
+    for target in (Platform.AUTOMAX, Platform.PC3000):
         assert codes(task(*ALL, declare=DECLARE), target=target) == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from automax_ros.blocks.catalogue import NOT_YET
-from automax_ros.blocks.declaration import Block, Given, Input, Output, Processor, Special
+from automax_ros.blocks.declaration import Block, Given, Input, Output, Platform, Special
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.ticks import MAX_TICKS, UDC_MAX_TICKS
 from automax_ros.language.checks.coefficients import check_coefficients
@@ -70,7 +70,7 @@ def check_scan_loop(context: Context, call: Call) -> None:
     ticks = next((item.value for item in call.arguments if item.keyword == "TICKS"), None)
     if not isinstance(ticks, IntegerLiteral):
         return
-    if context.target is Processor.UDC and UDC_MAX_TICKS < ticks.value <= MAX_TICKS:
+    if context.target is Platform.UDC and UDC_MAX_TICKS < ticks.value <= MAX_TICKS:
         message = f"TICKS = {ticks.value} is above {UDC_MAX_TICKS}, the maximum of a UDC task"
         context.report("AMX4085", message, ticks.span, "a UDC's tick is 0.5 ms, its longest scan 10 ms")
     elif 1 <= ticks.value <= MAX_TICKS:

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from automax_ros.blocks.declaration import Block, Processor
+from automax_ros.blocks.declaration import Block, Platform
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
 from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.language.checks.broken_lines import broken_lines
@@ -24,7 +24,7 @@ from automax_ros.language.syntax.parser import parse
 from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
 from automax_ros.language.syntax.tree import Call, Declaration, Module, Read, Statement
 
-AUTOMAX = Processor.AUTOMAX
+AUTOMAX = Platform.AUTOMAX
 _TOO_LARGE, _TOO_MANY, _UTF_16 = "AMX0001", "AMX0002", "AMX0006"
 _NOT_READ = (_TOO_LARGE, _TOO_MANY, _UTF_16)
 """Findings of the parser after which the tree is not the whole task."""
@@ -47,7 +47,7 @@ def check(
     *,
     name: str,
     catalogue: Mapping[str, Block],
-    target: Processor = AUTOMAX,
+    target: Platform = AUTOMAX,
     tick_ns: int = DEFAULT_TICK_NS,
     commons: Mapping[str, CommonSpec] | None = None,
 ) -> CheckResult:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from automax_ros.blocks.declaration import Block, Processor
+from automax_ros.blocks.declaration import Block, Platform
 from automax_ros.core.diagnostics import Diagnostic, Note, Span
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.problems.problem import Severity
@@ -25,7 +25,7 @@ class Context:
     ``structures`` are the data structures by name, with the span of the name where its SHIFT block makes it.
     """
 
-    target: Processor
+    target: Platform
     tick_ns: int
     catalogue: Mapping[str, Block]
     commons: Mapping[str, CommonSpec] | None = None
@@ -56,7 +56,7 @@ class Context:
     @property
     def task_words(self) -> str:
         """The kind of task, for messages: ``an AUTOMAX task``."""
-        article = "an" if self.target is Processor.AUTOMAX else "a"
+        article = "an" if self.target is Platform.AUTOMAX else "a"
         return f"{article} {self.target.value.upper()} task"
 
     @property

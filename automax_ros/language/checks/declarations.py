@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Note
 from automax_ros.core.types import (
     DEFAULT_STRING_LENGTH,
@@ -183,12 +183,12 @@ def _declare_event(context: Context, event: Event, after: bool) -> None:
 
 
 def _check_event(context: Context, event: Event) -> None:
-    if context.target is Processor.UDC:
+    if context.target is Platform.UDC:
         context.report("AMX4027", "EVENT cannot be used in a UDC task", event.span)
         return
     if event.interrupt_status is None:
         return
-    if context.target is Processor.PC3000:
+    if context.target is Platform.PC3000:
         context.report("AMX4027", "a PC3000 task has no hardware events", event.span)
         return
     variable = event.interrupt_status

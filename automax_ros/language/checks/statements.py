@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declaration import Processor
+from automax_ros.blocks.declaration import Platform
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import range_text
@@ -169,7 +169,7 @@ def _check_data(context: Context, statement: Data) -> None:
 
 
 def _check_io_write(context: Context, statement: IoWrite) -> None:
-    if context.target is Processor.UDC:
+    if context.target is Platform.UDC:
         context.report("AMX4027", "IOWRITE cannot be used in a UDC task", statement.span)
     for what, operand in (("slot", statement.slot), ("register", statement.register), ("value", statement.value)):
         check_integer(context, operand, "AMX2009", f"the {what} of IOWRITE")
