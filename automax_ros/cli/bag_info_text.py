@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from automax_ros.core.text import count_of, printable
+from automax_ros.core.text import count_of, printable, table
 
 _MOST_ROWS = 100
 """Longest table that is printed whole; ``--json`` has it all."""
@@ -124,16 +124,7 @@ def _section(title: str, rows: Sequence[Sequence[str]]) -> list[str]:
     if not rows:
         return []
     shown = [[_cut(cell, _MOST_CELL + 40) for cell in row] for row in rows[: _MOST_ROWS + 1]]
-    widths: list[int] = []
-    for row in shown:
-        for index, cell in enumerate(row):
-            if index == len(widths):
-                widths.append(0)
-            widths[index] = max(widths[index], len(cell))
-    lines = ["", title]
-    lines += [
-        "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip() for row in shown
-    ]
+    lines = ["", title, *(f"  {line}" for line in table(shown))]
     if len(rows) > len(shown):
         lines.append(f"  and {len(rows) - len(shown)} more, see --json")
     return lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
-from automax_ros.core.text import count_of, printable
+from automax_ros.core.text import count_of, printable, table
 from automax_ros.logix.pmul import GAIN_ONE
 from automax_ros.logix.pulse_comparison import Pair, PulseComparison
 from automax_ros.logix.pulse_conversion import DEFAULT_MULTIPLIER, PulseParameters
@@ -124,10 +124,4 @@ def _table(rows: list[tuple[str, Pair]]) -> list[str]:
         )
         for words, pair in rows
     ]
-    widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
-    return [
-        "  ".join(
-            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        )
-        for row in cells
-    ]
+    return table(cells, right=range(1, 5))

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from automax_ros.cli.tune_info_text import frequency_text
+from automax_ros.core.text import table
 from automax_ros.tuning.driven import STANDING
 from automax_ros.tuning.frequency import Measured, decibels
 from automax_ros.tuning.response import BlockResponse, Point
@@ -145,15 +146,8 @@ def _angle(gain: complex, degrees: float) -> str:
 
 
 def _aligned(rows: Sequence[tuple[str, ...]], left: Sequence[int] = ()) -> str:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [
-            cell.ljust(width) if column in left else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append(("  " + "  ".join(cells)).rstrip() + "\n")
-    return "".join(lines)
+    right = set(range(len(rows[0]))).difference(left)
+    return "".join(f"  {line}\n" for line in table(rows, right))
 
 
 def write_table(response: BlockResponse, stream: TextIO) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterable
-from itertools import islice
+from collections.abc import Collection, Container, Iterable, Sequence
+from itertools import islice, zip_longest
 
 from automax_ros.core.types import bare_name
 
@@ -31,6 +31,21 @@ def quoted(text: str, *, marks: str = "'", limit: int = 40) -> str:
 def count_of(number: int, thing: str) -> str:
     """Return a number of things: ``1 scan``, ``2 scans``."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def table(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> list[str]:
+    """Return rows as lines with aligned columns, those numbered in ``right`` (from 0) at their ends.
+
+    A row may have fewer cells than others.
+    """
+    widths = [max(map(len, cells)) for cells in zip_longest(*rows, fillvalue="")]
+    return [
+        "  ".join(
+            cell.rjust(width) if column in right else cell.ljust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=False))
+        ).rstrip()
+        for row in rows
+    ]
 
 
 def did_you_mean(word: str, known: Iterable[str], *, most: int = 1) -> str | None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.core.text import printable
+from automax_ros.core.text import printable, table
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 
@@ -178,7 +178,7 @@ def _lines(report: ReplayReport) -> Iterator[str]:
     if report.tolerance:
         yield f"Numbers that differ by at most {report.tolerance:g} count as equal; states are not compared."
     yield ""
-    yield from _table([("task", "source", "scans", "result"), *(_task_row(task) for task in report.tasks)])
+    yield from table([("task", "source", "scans", "result"), *(_task_row(task) for task in report.tasks)])
     for task in report.tasks:
         for note in task.notes:
             yield f"{task.name}: {printable(note)}"
@@ -190,7 +190,7 @@ def _lines(report: ReplayReport) -> Iterator[str]:
         return
     yield from _first_lines(report.first)
     yield ""
-    yield from _table([_HEAD, *(_difference_row(item) for item in report.differences)])
+    yield from table([_HEAD, *(_difference_row(item) for item in report.differences)])
     if report.more:
         yield f"and {report.more} more (--max-differences shows them)"
 
@@ -272,12 +272,6 @@ def _error_text(line: int, code: int) -> str:
     problem = PROBLEMS.get(f"AMX{code:04d}")
     title = f" {problem.title}" if problem else ""
     return f"line {line} AMX{code:04d}{title}" if line else f"AMX{code:04d}{title}"
-
-
-def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
 
 
 def _wrapped(title: str, parts: Sequence[str], width: int = 110) -> Iterator[str]:
