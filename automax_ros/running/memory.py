@@ -136,16 +136,22 @@ class CommonMemory(Image):
     def _store(self, view: int, element: int, value: Value, writer: int, kind: WriteKind) -> None:
         if self._forced and (view, element) in self._forced:
             return
-        entries = self._spread(view, element, value) if view in self._shared else ()
-        self._put(view, element, value)
+        entries = self._spread(view, element, value) if view in self._shared else None
+        # Written out rather than by ``_put``: every write of every scan comes through here.
+        array = self._arrays[view]
+        if array is None:
+            self._cells[view] = value
+        else:
+            array[element] = value
         self.sequence += 1
         if self._log is not None:
             self._log.append(Write(self.sequence, self.now_ns, writer, kind, view, element, value))
-        for other, place, shown in entries:
-            self._put(other, place, shown)
-            self.sequence += 1
-            if self._log is not None:
-                self._log.append(Write(self.sequence, self.now_ns, writer, kind, other, place, shown))
+        if entries:
+            for other, place, shown in entries:
+                self._put(other, place, shown)
+                self.sequence += 1
+                if self._log is not None:
+                    self._log.append(Write(self.sequence, self.now_ns, writer, kind, other, place, shown))
 
     def _spread(self, view: int, element: int, value: Value) -> list[tuple[int, int, Value]]:
         """Return what else a write of a register changes; what is forced stays."""
