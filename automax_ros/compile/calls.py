@@ -43,10 +43,10 @@ from automax_ros.language.syntax.tree import (
     Expression,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     Scope,
     Target,
     Unary,
-    Variable,
 )
 
 
@@ -174,7 +174,7 @@ def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
 
 def _drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
     """Emit that forced commons among a block's targets have the forced value, whatever the block gave them."""
-    names = [target.name for target in targets if isinstance(target, Variable) and target.name in emitter.forces]
+    names = [target.name for target in targets if isinstance(target, Reference) and target.name in emitter.forces]
     for name in dict.fromkeys(names):
         restore = build.assign(variable_name(name), build.name(latched_name(name)))
         emitter.emit(build.when(build.name(forced_name(name)), [restore]))
@@ -201,7 +201,7 @@ def _places(emitter: Emitter, bound: BoundCall) -> list[_Place]:
     changing = frozenset(_local(emitter, target) for _, target in given)
     places: list[_Place] = []
     for output, target in given:
-        assert isinstance(target, (Variable, Element))
+        assert isinstance(target, (Reference, Element))
         place = _Place(output, target, _local(emitter, target))
         if isinstance(target, Element):
             index, in_range = lower_index(emitter, target, changing)
@@ -240,7 +240,7 @@ def _tables(emitter: Emitter, bound: BoundCall) -> dict[str, TableReader]:
         if given is None:
             readers[item.variable] = _no_table
             continue
-        assert isinstance(given, Variable)
+        assert isinstance(given, Reference)
         if emitter.symbol(given.name).scope is Scope.COMMON:
             emitter.checkpoint()
         readers[item.variable] = emitter.element_reader(given.name)
@@ -260,13 +260,13 @@ def _block_value(emitter: Emitter, given: Expression) -> ast.expr:
         return build.inverse(_block_value(emitter, given.operand))
     if isinstance(given, Element):
         return lower_element(emitter, given).node
-    assert isinstance(given, Variable)
+    assert isinstance(given, Reference)
     return emitter.read(given.name)
 
 
 def _local(emitter: Emitter, target: Expression) -> str:
     """Return the Python local that an output is stored in, "" where it has none."""
-    if isinstance(target, Variable):
+    if isinstance(target, Reference):
         symbol = emitter.symbol(target.name)
         if symbol.latched or target.name not in emitter.views:
             return variable_name(target.name)

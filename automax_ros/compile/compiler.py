@@ -39,7 +39,7 @@ from automax_ros.compile.pynames import block_prefix, forced_name, latched_name,
 from automax_ros.compile.statements import STOPPED, StatementLowering
 from automax_ros.core.types import Latched, Value
 from automax_ros.language.program import Program, Symbol
-from automax_ros.language.syntax.tree import Call, For, If, Scope, Statement, Variable
+from automax_ros.language.syntax.tree import Call, For, If, Reference, Scope, Statement
 
 StateValues = list[StateValue]
 
@@ -228,7 +228,7 @@ class _Compilation:
             target.name
             for instance in self._instances.values()
             for output in instance.bound.block.outputs
-            if isinstance(target := instance.bound.arguments.get(output.name), Variable)
+            if isinstance(target := instance.bound.arguments.get(output.name), Reference)
         }
         return tuple(name for name in self._latched if name in outputs)
 

@@ -25,9 +25,9 @@ from automax_ros.language.syntax.tree import (
     FunctionCall,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     StringLiteral,
     Unary,
-    Variable,
 )
 
 DEPTH_LIMIT = 40
@@ -60,7 +60,7 @@ def lower(emitter: Emitter, expression: Expression) -> Lowered:
     """Return the Python form of a checked expression; what it needs before it is emitted."""
     if isinstance(expression, Binary):
         return _lower_chain(emitter, expression)
-    if isinstance(expression, Variable):
+    if isinstance(expression, Reference):
         return of_type(emitter.read(expression.name), expression.type)
     if isinstance(expression, Element):
         return lower_element(emitter, expression)

@@ -24,9 +24,9 @@ from automax_ros.language.syntax.tree import (
     If,
     OnJump,
     Read,
+    Reference,
     Scope,
     Statement,
-    Variable,
 )
 
 STEP_IS_ZERO = 7027
@@ -151,7 +151,7 @@ def _sets(statements: tuple[Statement, ...], name: str) -> bool:
             return True
         if isinstance(statement, Read) and any(target.name == name for target in statement.targets):
             return True
-        if isinstance(statement, Call) and Variable(name) in [argument.value for argument in statement.arguments]:
+        if isinstance(statement, Call) and Reference(name) in [argument.value for argument in statement.arguments]:
             return True
         if isinstance(statement, If) and (_sets(statement.then, name) or _sets(statement.otherwise, name)):
             return True

@@ -20,7 +20,7 @@ from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.text import did_you_mean
 from automax_ros.language.program import Program
-from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Scope, Variable
+from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Reference, Scope
 from automax_ros.language.syntax.walk import statements_in_order
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import MAX_BYTES
@@ -186,7 +186,7 @@ def lines_that_write(program: Program) -> dict[str, tuple[int, ...]]:
     found: dict[str, list[int]] = {}
 
     def note(target: Expression | None, line: int | None) -> None:
-        if not isinstance(target, (Variable, Element)) or line is None:
+        if not isinstance(target, (Reference, Element)) or line is None:
             return
         symbol = program.symbols.get(target.name)
         if symbol is not None and symbol.scope is Scope.COMMON and line not in found.setdefault(symbol.name, []):

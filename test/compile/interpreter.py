@@ -332,7 +332,7 @@ class Interpreter(Functions):
 
     _realliteral = _stringliteral = _booleanliteral = _integerliteral
 
-    def _variable(self, node):
+    def _reference(self, node):
         return self.locals[node.name] if node.name in self.locals else self.commons[node.name]
 
     def _element(self, node):

@@ -13,9 +13,9 @@ from automax_ros.language.syntax.tree import (
     FunctionCall,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     StringLiteral,
     Unary,
-    Variable,
 )
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
@@ -24,9 +24,9 @@ from .support import lines, program_of, ran
 
 
 def deep_sum(operands: int) -> Binary:
-    expression: object = Variable("R")
+    expression: object = Reference("R")
     for number in range(operands - 1):
-        expression = Binary("+-"[number % 2], expression, Variable("Q"))
+        expression = Binary("+-"[number % 2], expression, Reference("Q"))
     return expression
 
 
@@ -38,9 +38,9 @@ def test_chains_of_thousands_of_operands_compile(target):
         "R": deep_sum(5000),
         "D!": deep_integers(5000),
         "S$": deep_strings(3000),
-        "X@": Binary("=", deep_sum(2001), Variable("R")),
+        "X@": Binary("=", deep_sum(2001), Reference("R")),
     }
-    scan = (Assignment(Variable(target), chains[target], number=100),)
+    scan = (Assignment(Reference(target), chains[target], number=100),)
     compiled = compile_program(dataclasses.replace(program, scan=scan), {})
     task = Task(compiled, CommonMemory([]))
     task.state[compiled.layout.index("R")] = 2.0
@@ -52,9 +52,9 @@ def test_chains_of_thousands_of_operands_compile(target):
 
 
 def deep_integers(operands: int) -> Binary:
-    expression: object = Variable("A%")
+    expression: object = Reference("A%")
     for _ in range(operands - 1):
-        expression = Binary("+", expression, Variable("A%"))
+        expression = Binary("+", expression, Reference("A%"))
     return expression
 
 
@@ -67,7 +67,7 @@ def deep_strings(operands: int):
 
 def test_64_nested_operations_each_with_a_long_chain_compile():
     """Signs, functions and parentheses do not hide how deep a tree is."""
-    inner: object = Variable("R")
+    inner: object = Reference("R")
     for level in range(64):
         for _ in range(39):
             inner = Binary("+", inner, RealLiteral(0.0))
@@ -75,7 +75,7 @@ def test_64_nested_operations_each_with_a_long_chain_compile():
     for _ in range(39):
         inner = Binary("+", inner, IntegerLiteral(0))
     program = program_of(lines("R = Q"))
-    compiled = compile_program(dataclasses.replace(program, scan=(Assignment(Variable("R"), inner, number=100),)), {})
+    compiled = compile_program(dataclasses.replace(program, scan=(Assignment(Reference("R"), inner, number=100),)), {})
     task = Task(compiled, CommonMemory([]))
     task.state[compiled.layout.index("R")] = 3.0
     task.run()

@@ -33,6 +33,7 @@ from automax_ros.language.syntax.tree import (
     Print,
     Read,
     RealLiteral,
+    Reference,
     Remark,
     Restore,
     Return,
@@ -42,7 +43,6 @@ from automax_ros.language.syntax.tree import (
     StringLiteral,
     Tuning,
     Unary,
-    Variable,
 )
 
 WORDS = st.sampled_from(["SPEED", "_X", "A1", "STEP_2", "GAIN", "LONGEST_NAME_OK_"])
@@ -89,7 +89,7 @@ def expressions(draw: st.DrawFn, depth: int = 3) -> Expression:
     if kind == 0:
         return draw(CONSTANTS)
     if kind == 1:
-        return Variable(draw(NAMES))
+        return Reference(draw(NAMES))
     if kind == 2:
         return FunctionCall("TST_ERRLOG@")
     if kind == 3:
@@ -109,7 +109,7 @@ def expressions(draw: st.DrawFn, depth: int = 3) -> Expression:
 EXPRESSIONS = expressions(1)
 DEEP_EXPRESSIONS = expressions(4)
 TARGETS = st.one_of(
-    st.builds(Variable, NAMES), st.builds(Element, NAMES, st.lists(EXPRESSIONS, min_size=1, max_size=2).map(tuple))
+    st.builds(Reference, NAMES), st.builds(Element, NAMES, st.lists(EXPRESSIONS, min_size=1, max_size=2).map(tuple))
 )
 COUNTS = st.integers(0, 100_000)
 DECLARED = st.one_of(
@@ -146,7 +146,7 @@ SIMPLE = st.one_of(
         _print, st.lists(st.tuples(EXPRESSIONS, st.sampled_from(",;")), max_size=3), st.sampled_from(["", ",", ";"])
     ),
     st.builds(Stop),
-    st.builds(Event, WORDS, st.none() | st.builds(Variable, NAMES), st.none() | COUNTS),
+    st.builds(Event, WORDS, st.none() | st.builds(Reference, NAMES), st.none() | COUNTS),
     st.builds(Call, BLOCKS, ARGUMENTS),
     st.builds(IoWrite, EXPRESSIONS, EXPRESSIONS, EXPRESSIONS),
     st.builds(ClearErrorLog),
@@ -188,7 +188,7 @@ def statements(draw: st.DrawFn, depth: int = 2) -> Statement:
     if kind == 7:
         return If(draw(EXPRESSIONS), draw(bodies), draw(bodies))
     step = draw(st.none() | EXPRESSIONS)
-    return For(Variable(draw(NAMES)), draw(EXPRESSIONS), draw(EXPRESSIONS), step, draw(bodies))
+    return For(Reference(draw(NAMES)), draw(EXPRESSIONS), draw(EXPRESSIONS), step, draw(bodies))
 
 
 @st.composite

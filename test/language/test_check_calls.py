@@ -9,7 +9,7 @@ from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import stored_real
 from automax_ros.language.program import BoundCall
-from automax_ros.language.syntax.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Unary, Variable
+from automax_ros.language.syntax.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Reference, Unary
 
 from .check_support import codes, one, problems, program, task
 
@@ -125,10 +125,10 @@ def test_bound_arguments_are_ready_for_use() -> None:
     assert found.block is CATALOGUE["LAG"]
     assert found.line == 30
     assert found.arguments == {
-        "INPUT": Variable("A%"),
+        "INPUT": Reference("A%"),
         "WLG": RealLiteral(stored_real(0.1)[0]),
-        "RESET": Unary("-", Variable("X@")),
-        "OUTPUT": Variable("B%"),
+        "RESET": Unary("-", Reference("X@")),
+        "OUTPUT": Reference("B%"),
     }
     assert found.defaults == {"INITIAL_VALUE": 0}
     negative = bound("LAG(INPUT=A%, WLG=R, INITIAL_VALUE=-5, RESET=ON, OUTPUT=B%)")

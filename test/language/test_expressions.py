@@ -12,14 +12,14 @@ from automax_ros.language.syntax.tree import (
     FunctionCall,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     StringLiteral,
     Unary,
-    Variable,
 )
 from automax_ros.language.syntax.unconfirmed import UNCONFIRMED_FUNCTIONS, UNCONFIRMED_STATEMENTS
 from language.parser_support import codes_of, expression_of
 
-A, B, C = Variable("A%"), Variable("B%"), Variable("C%")
+A, B, C = Reference("A%"), Reference("B%"), Reference("C%")
 
 CONSTANTS: dict[str, Expression] = {
     "32767": IntegerLiteral(32767),
@@ -117,7 +117,7 @@ TREES: dict[str, Expression] = {
     "MAX%(1)": Element("MAX%", (IntegerLiteral(1),)),
     "TST_ERRLOG@": FunctionCall("TST_ERRLOG@"),
     "TST_ERRLOG@()": FunctionCall("TST_ERRLOG@"),
-    "FFH": Variable("FFH"),
+    "FFH": Reference("FFH"),
 }
 
 

@@ -29,6 +29,7 @@ from automax_ros.language.syntax.tree import (
     Print,
     Read,
     RealLiteral,
+    Reference,
     Remark,
     Restore,
     Return,
@@ -37,11 +38,10 @@ from automax_ros.language.syntax.tree import (
     StringLiteral,
     Tuning,
     Unary,
-    Variable,
 )
 from language.parser_support import codes_of, module_of, statements_of
 
-A, B, C, FLAG = Variable("A%"), Variable("B%"), Variable("C%"), Variable("FLAG@")
+A, B, C, FLAG = Reference("A%"), Reference("B%"), Reference("C%"), Reference("FLAG@")
 ONE, TWO = IntegerLiteral(1), IntegerLiteral(2)
 MANUAL = {
     "AND": """10 CALL AND (INPUT1=input1@,           &
@@ -147,10 +147,10 @@ def test_scan_loop_on_an_event_of_section_4() -> None:
 """
     assert statements_of(text) == (
         Declaration(Scope.COMMON, (Declared("ISCR%"),), number=100),
-        Event("START_TASK", Variable("ISCR%"), 6, number=500),
+        Event("START_TASK", Reference("ISCR%"), 6, number=500),
         Call(
             "SCAN_LOOP",
-            (Argument("TICKS", IntegerLiteral(4)), Argument("EVENT", Variable("START_TASK"))),
+            (Argument("TICKS", IntegerLiteral(4)), Argument("EVENT", Reference("START_TASK"))),
             number=1000,
         ),
     )
@@ -167,13 +167,13 @@ def test_block_equations_of_section_35_1() -> None:
 """
 
     def lost(name: str) -> Binary:
-        return Binary("=", Variable(name), BooleanLiteral(True))
+        return Binary("=", Reference(name), BooleanLiteral(True))
 
     assert statements_of(text) == (
         If(
             Binary("OR", Binary("OR", lost("XXX_OVERSPD@"), lost("XXX_TACH_LOSS@")), lost("XXX_AVFB_LOSS@")),
-            (Assignment(Variable("XXX_SPD_ESTOP@"), BooleanLiteral(True), number=20), Label(number=30)),
-            (Assignment(Variable("XXX_SPD_ESTOP@"), BooleanLiteral(False), number=40),),
+            (Assignment(Reference("XXX_SPD_ESTOP@"), BooleanLiteral(True), number=20), Label(number=30)),
+            (Assignment(Reference("XXX_SPD_ESTOP@"), BooleanLiteral(False), number=40),),
             number=10,
         ),
         Label(number=50),
@@ -214,17 +214,17 @@ SIMPLE = {
     "LET A% = 1": Assignment(A, ONE),
     "LET ARRAY1@(0) = TRUE": Assignment(Element("ARRAY1@", (IntegerLiteral(0),)), BooleanLiteral(True)),
     "A%[B%, 2] = 1": Assignment(Element("A%", (B, TWO)), ONE),
-    "SPEED = 1": Assignment(Variable("SPEED"), ONE),
+    "SPEED = 1": Assignment(Reference("SPEED"), ONE),
     "SPEED(1) = 1": Assignment(Element("SPEED", (ONE,)), ONE),
-    "SPEED(A = 1) = 1": Assignment(Element("SPEED", (Binary("=", Variable("A"), ONE),)), ONE),
-    "X! = 1": Assignment(Variable("X!"), ONE),
+    "SPEED(A = 1) = 1": Assignment(Element("SPEED", (Binary("=", Reference("A"), ONE),)), ONE),
+    "X! = 1": Assignment(Reference("X!"), ONE),
     "GOTO 200": Goto(200),
     "GOSUB 200": Gosub(200),
     "RETURN": Return(),
     "ON A% + 1 GOTO 100, 200": OnJump(Binary("+", A, ONE), (100, 200)),
     "ON A% GOSUB 100": OnJump(A, (100,), True),
-    "A@ = ON": Assignment(Variable("A@"), BooleanLiteral(True)),
-    "A@ = OFF": Assignment(Variable("A@"), BooleanLiteral(False)),
+    "A@ = ON": Assignment(Reference("A@"), BooleanLiteral(True)),
+    "A@ = OFF": Assignment(Reference("A@"), BooleanLiteral(False)),
     "READ A%, T%(1)": Read((A, Element("T%", (ONE,)))),
     'DATA 1, -2, "X", ON, 0FFH': Data(
         (ONE, Unary("-", TWO), StringLiteral("X"), BooleanLiteral(True), IntegerLiteral(255, True))
@@ -243,7 +243,7 @@ SIMPLE = {
     "CALL SUMMER()": Call("SUMMER"),
     "CALL AND(INPUT1 = -FLAG@)": Call("AND", (Argument("INPUT1", Unary("-", FLAG)),)),
     "CALL LIMIT(INPUT = T%(2))": Call("LIMIT", (Argument("INPUT", Element("T%", (TWO,))),)),
-    "A@ = TST_ERRLOG@": Assignment(Variable("A@"), FunctionCall("TST_ERRLOG@")),
+    "A@ = TST_ERRLOG@": Assignment(Reference("A@"), FunctionCall("TST_ERRLOG@")),
     "REM a remark \\ with & signs": Remark("a remark \\ with & signs", False),
     "! a remark": Remark("a remark", True),
     "!": Remark("", True),
@@ -273,7 +273,7 @@ def test_if_on_one_line() -> None:
         If(FLAG, (one, Assignment(B, TWO)), (Assignment(B, ONE), two), one_line=True, number=40),
         If(
             FLAG,
-            (If(Variable("A@"), (one,), (two,), one_line=True),),
+            (If(Reference("A@"), (one,), (two,), one_line=True),),
             (Assignment(B, ONE),),
             one_line=True,
             number=50,
@@ -297,7 +297,7 @@ def test_if_in_block_form_nests() -> None:
 70 END_IF
 80 END
 """
-    inner = If(Variable("A@"), (Assignment(A, ONE, number=30),), number=20)
+    inner = If(Reference("A@"), (Assignment(A, ONE, number=30),), number=20)
     assert statements_of(text) == (
         If(
             FLAG,
@@ -330,12 +330,12 @@ def test_several_statements_on_a_line_have_the_number_once() -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("10 A% = X!", Assignment(A, Variable("X!"), number=10)),
-        ("10 A% = X !", Assignment(A, Variable("X"), number=10)),
-        ("10 A% = X!! text", Assignment(A, Variable("X!"), number=10)),
+        ("10 A% = X!", Assignment(A, Reference("X!"), number=10)),
+        ("10 A% = X !", Assignment(A, Reference("X"), number=10)),
+        ("10 A% = X!! text", Assignment(A, Reference("X!"), number=10)),
         ("10 A% = 1! text", Assignment(A, ONE, number=10)),
         ("10 A% = T%(1)! text", Assignment(A, Element("T%", (ONE,)), number=10)),
-        ("10 X! = 1 !======", Assignment(Variable("X!"), ONE, number=10)),
+        ("10 X! = 1 !======", Assignment(Reference("X!"), ONE, number=10)),
     ],
 )
 def test_exclamation_mark_is_a_type_character_only_behind_a_name(text: str, expected: Assignment) -> None:

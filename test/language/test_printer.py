@@ -21,16 +21,16 @@ from automax_ros.language.syntax.tree import (
     Label,
     Module,
     RealLiteral,
+    Reference,
     Remark,
     Scope,
     StringLiteral,
-    Variable,
 )
 from language.parser_support import expression_of, module_of
 from language.random_trees import DEEP_EXPRESSIONS, modules
 
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
-FLAG, ASSIGN = Variable("FLAG@"), Assignment(Variable("A%"), IntegerLiteral(1))
+FLAG, ASSIGN = Reference("FLAG@"), Assignment(Reference("A%"), IntegerLiteral(1))
 CANONICAL = """10 LOCAL A%, T%(3, 4), S$:50(2), GAIN [CURRENT=1.5, HIGH=2.0, LOW=-2.0, STEP=0.1]
 20 COMMON SPEED%, RUN@ \\ ! the line's own
 30 EVENT NAME = START, INTERRUPT_STATUS = SPEED%, TIMEOUT = 6
@@ -147,9 +147,9 @@ def test_only_calls_that_are_too_long_are_broken() -> None:
         Module((If(FLAG, (), one_line=True),)),
         Module((If(FLAG, (If(FLAG, (ASSIGN,), one_line=True),), (ASSIGN,), one_line=True),)),
         Module((If(FLAG, (If(FLAG, (ASSIGN,), one_line=True), ASSIGN), one_line=True),)),
-        Module((If(FLAG, (For(Variable("I%"), IntegerLiteral(1), IntegerLiteral(2), None, ()),), one_line=True),)),
+        Module((If(FLAG, (For(Reference("I%"), IntegerLiteral(1), IntegerLiteral(2), None, ()),), one_line=True),)),
         Module((Remark("ends with &", True),)),
-        Module((Assignment(Variable("A$"), StringLiteral("both \" and '")),)),
+        Module((Assignment(Reference("A$"), StringLiteral("both \" and '")),)),
     ],
 )
 def test_trees_that_no_text_gives_are_refused(module: Module) -> None:

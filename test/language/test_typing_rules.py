@@ -6,7 +6,7 @@ import pytest
 
 from automax_ros.core.types import DataType
 from automax_ros.language.checks.typing_rules import LOGICAL, RELATIONAL, binary_type, type_of, unary_type
-from automax_ros.language.syntax.tree import Binary, IntegerLiteral, Unary, Variable
+from automax_ros.language.syntax.tree import Binary, IntegerLiteral, Reference, Unary
 
 N, D, R, B, S = DataType.INTEGER, DataType.DOUBLE, DataType.REAL, DataType.BOOLEAN, DataType.STRING
 ARITHMETIC = frozenset({"+", "-", "*", "/", "**"})
@@ -58,12 +58,12 @@ def test_a_constant_is_an_integer_up_to_32767() -> None:
 
 
 def test_long_chain_does_not_recurse() -> None:
-    chain: Binary | Variable = Variable("A%")
+    chain: Binary | Reference = Reference("A%")
     for _ in range(20_000):
-        chain = Binary("+", chain, Variable("R"))
+        chain = Binary("+", chain, Reference("R"))
     assert type_of(chain) is R
 
 
 def test_ill_typed_expression_has_no_type() -> None:
     with pytest.raises(ValueError, match="cannot take"):
-        type_of(Unary("-", Variable("X@")))
+        type_of(Unary("-", Reference("X@")))

@@ -16,7 +16,7 @@ from automax_ros.language.checks.parameters import checked_value
 from automax_ros.language.checks.structures import check_channels, structure_of
 from automax_ros.language.checks.tables import elements_of
 from automax_ros.language.program import BoundCall
-from automax_ros.language.syntax.tree import Argument, Call, Expression, IntegerLiteral, Variable
+from automax_ros.language.syntax.tree import Argument, Call, Expression, IntegerLiteral, Reference
 from automax_ros.language.syntax.walk import variables_in
 
 Arguments = dict[str, "tuple[Input | Output, Argument]"]
@@ -60,7 +60,7 @@ def check_call(context: Context, call: Call) -> None:
 def _elements(context: Context, block: Block, values: Mapping[str, Expression]) -> int:
     """Return the number of elements of a block's tables, 0 without one."""
     tables = [values[item.name] for item in block.inputs if item.type is Special.TABLE and item.name in values]
-    sizes = [elements_of(context, table) for table in tables if isinstance(table, Variable)]
+    sizes = [elements_of(context, table) for table in tables if isinstance(table, Reference)]
     return sizes[0] or 0 if sizes else 0
 
 
@@ -109,7 +109,7 @@ def _check_keywords(context: Context, block: Block, call: Call, given: Collectio
         context.report("AMX4072", message, _keyword(context, argument), hint)
         meant.add(name)
         for variable in variables_in(argument.value):
-            if isinstance(variable, Variable) and variable.name not in context.events:
+            if isinstance(variable, Reference) and variable.name not in context.events:
                 check_variable(context, variable)
     for name in missing:
         if name not in meant:
@@ -145,4 +145,4 @@ def _seen_by_rules(context: Context, value: Expression | None) -> Given:
     literal = None if value is None else literal_of(value)
     if literal is not None:
         return Given(value=literal.value)
-    return Given(size=elements_of(context, value) if isinstance(value, Variable) else None)
+    return Given(size=elements_of(context, value) if isinstance(value, Reference) else None)

@@ -10,7 +10,7 @@ from automax_ros.blocks.bounds import loose_bounds, range_within
 from automax_ros.blocks.coefficients import is_within
 from automax_ros.blocks.declaration import Block, Coefficients, Limit
 from automax_ros.language.checks.context import Context
-from automax_ros.language.syntax.tree import BooleanLiteral, Element, Expression, IntegerLiteral, RealLiteral, Variable
+from automax_ros.language.syntax.tree import BooleanLiteral, Element, Expression, IntegerLiteral, RealLiteral, Reference
 
 _NUMBERS = (IntegerLiteral, RealLiteral)
 _CONSTANTS = (IntegerLiteral, RealLiteral, BooleanLiteral)
@@ -51,7 +51,7 @@ def check_coefficients(
     ranges: dict[str, tuple[float, float]] = {}
     for limit in block.coefficients.limits:
         value = values.get(limit.parameter)
-        if isinstance(value, (Variable, Element)):
+        if isinstance(value, (Reference, Element)):
             ends = range_within(limit, period, known, *_tuning_range(context, value))
             if ends is not None:
                 ranges[limit.parameter] = ends
@@ -77,7 +77,7 @@ def _sides(
     return _Sides(low, high, "".join(f", {text}" for text in left))
 
 
-def _tuning_range(context: Context, variable: Variable | Element) -> tuple[float, float]:
+def _tuning_range(context: Context, variable: Reference | Element) -> tuple[float, float]:
     """Return between which values a variable moves: LOW and HIGH of a tunable."""
     symbol = context.symbols.get(variable.name)
     tuning = None if symbol is None else symbol.tuning

@@ -31,9 +31,9 @@ from automax_ros.language.syntax.tree import (
     FunctionCall,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     StringLiteral,
     Unary,
-    Variable,
 )
 
 _HEXADECIMAL = re.compile(r"[A-F][0-9A-F]{0,7}H")
@@ -46,7 +46,7 @@ def check_expression(context: Context, expression: Expression) -> DataType | Non
         return _check_chain(context, expression)
     if isinstance(expression, Unary):
         return _check_unary(context, expression)
-    if isinstance(expression, (Variable, Element)):
+    if isinstance(expression, (Reference, Element)):
         return check_variable(context, expression)
     if isinstance(expression, IntegerLiteral):
         return _check_integer(context, expression, INT32_MAX)
@@ -63,13 +63,13 @@ _LITERAL_TYPES: dict[type, DataType] = {
 }
 
 
-def _report_structure(context: Context, target: Variable | Element) -> None:
+def _report_structure(context: Context, target: Reference | Element) -> None:
     message = f"{target.name} is a data structure: only SHIFT, READ and WRITE blocks can use it"
     note = Note("it is made here", context.structures[target.name][1])
     context.report("AMX4093", message, target.span, notes=(note,))
 
 
-def check_variable(context: Context, target: Variable | Element) -> DataType | None:
+def check_variable(context: Context, target: Reference | Element) -> DataType | None:
     """Report a variable that is not declared or not used as what it was declared, and return its type.
 
     The type counts as not known where a whole array stands for a value, and where the variable is not declared but one
@@ -185,7 +185,7 @@ def _report_operation(context: Context, operation: Binary, left: DataType, right
         context.report("AMX2001", f"{operator} cannot join {left.word} and {right.word}", span, hint)
 
 
-def _report_undeclared(context: Context, target: Variable | Element) -> None:
+def _report_undeclared(context: Context, target: Reference | Element) -> None:
     if context.broken.may_declare(target.name):
         return
     if target.name in context.events:

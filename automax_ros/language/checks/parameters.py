@@ -18,10 +18,10 @@ from automax_ros.language.syntax.tree import (
     Expression,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     Scope,
     StringLiteral,
     Unary,
-    Variable,
 )
 
 _Constant = IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral
@@ -57,7 +57,7 @@ def _checked_input(context: Context, parameter: Input, kind: DataType, argument:
         _check_literal(context, parameter, kind, literal, value)
         return literal
     variable = _inverted(value) if kind is DataType.BOOLEAN else None
-    if variable is None and isinstance(value, (Variable, Element)):
+    if variable is None and isinstance(value, (Reference, Element)):
         variable = value
     if variable is None:
         _report_expression(context, parameter, kind, value)
@@ -76,7 +76,7 @@ def _checked_output(context: Context, parameter: Output, argument: Argument) -> 
     elif _inverted(value) is not None:
         hint = "a boolean is inverted where it is used as an input"
         context.report("AMX4079", f"the output {parameter.name} cannot be inverted", value.span, hint)
-    elif not isinstance(value, (Variable, Element)):
+    elif not isinstance(value, (Reference, Element)):
         _report_expression(context, parameter, parameter.type, value)
     else:
         _check_type(context, parameter, parameter.type, check_written(context, value), value)
@@ -85,7 +85,7 @@ def _checked_output(context: Context, parameter: Output, argument: Argument) -> 
 
 def _checked_event(context: Context, argument: Argument) -> Expression | None:
     value = argument.value
-    if not isinstance(value, Variable):
+    if not isinstance(value, Reference):
         context.report("AMX4060", f"{argument.keyword} takes the name of an event", value.span)
         return None
     event = context.events.get(value.name)
@@ -100,7 +100,7 @@ def _checked_event(context: Context, argument: Argument) -> Expression | None:
 
 
 def _check_type(
-    context: Context, parameter: Input | Output, wanted: DataType, kind: DataType | None, variable: Variable | Element
+    context: Context, parameter: Input | Output, wanted: DataType, kind: DataType | None, variable: Reference | Element
 ) -> None:
     also = parameter.also if isinstance(parameter, Input) else None
     if kind is not None and kind is not wanted and kind is not also:
@@ -163,7 +163,7 @@ def _report_expression(context: Context, parameter: Input | Output, kind: object
     """Report an expression where a block takes only a variable or a constant."""
     operand = value.operand if isinstance(value, Unary) else None
     hint = "assign it to a LOCAL variable first"
-    if isinstance(operand, (Variable, Element)) and operand.type is DataType.BOOLEAN:
+    if isinstance(operand, (Reference, Element)) and operand.type is DataType.BOOLEAN:
         if isinstance(parameter, Output):
             hint = "an output cannot be inverted"
         elif kind is DataType.BOOLEAN:
@@ -177,12 +177,12 @@ def _report_expression(context: Context, parameter: Input | Output, kind: object
     context.report("AMX4077", f"{parameter.name} takes {what}, no expression", value.span, hint)
 
 
-def _inverted(value: Expression) -> Variable | Element | None:
+def _inverted(value: Expression) -> Reference | Element | None:
     """Return the boolean variable of ``-NAME@``, None where the value is something else."""
     if not isinstance(value, Unary) or value.operator != "-":
         return None
     operand = value.operand
-    return operand if isinstance(operand, (Variable, Element)) and operand.type is DataType.BOOLEAN else None
+    return operand if isinstance(operand, (Reference, Element)) and operand.type is DataType.BOOLEAN else None
 
 
 def _is_of(literal: _Constant, kind: DataType) -> bool:

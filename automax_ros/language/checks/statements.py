@@ -20,8 +20,8 @@ from automax_ros.language.syntax.tree import (
     OnJump,
     Print,
     Read,
+    Reference,
     Statement,
-    Variable,
 )
 
 _KINDS = {DataType.STRING: "string", DataType.BOOLEAN: "boolean"}
@@ -48,7 +48,7 @@ def check_statement(context: Context, statement: Statement) -> None:
         _check_io_write(context, statement)
 
 
-def check_written(context: Context, target: Variable | Element) -> DataType | None:
+def check_written(context: Context, target: Reference | Element) -> DataType | None:
     """Report a target that cannot be written: a tunable, an input point; return its type."""
     kind = check_variable(context, target)
     symbol = context.symbols.get(target.name)

@@ -13,7 +13,7 @@ from automax_ros.language.checks.constant_values import literal_of
 from automax_ros.language.checks.context import Context
 from automax_ros.language.checks.task_layout import TaskLayout
 from automax_ros.language.program import DataStructure
-from automax_ros.language.syntax.tree import Argument, Call, Expression, IntegerLiteral, Scope, Variable
+from automax_ros.language.syntax.tree import Argument, Call, Expression, IntegerLiteral, Reference, Scope
 
 
 def find_structures(context: Context, layout: TaskLayout) -> None:
@@ -23,7 +23,7 @@ def find_structures(context: Context, layout: TaskLayout) -> None:
         if isinstance(statement, Call) and block is not None and block.structure is Access.MAKES:
             given = {argument.keyword: argument.value for argument in statement.arguments}
             name = given.get("STRUCTURE_NAME")
-            if isinstance(name, Variable) and name.name not in context.structures:
+            if isinstance(name, Reference) and name.name not in context.structures:
                 channels = sum(f"INPUT{channel}" in given for channel in range(1, MOST_CHANNELS + 1))
                 made = DataStructure(name.name, name.type, _columns(given.get("MAX_COLUMNS")), max(channels, 1))
                 context.structures[name.name] = (made, name.span)
@@ -42,7 +42,7 @@ def checked_structure(context: Context, block: Block, parameter: Input, argument
     assert isinstance(parameter.type, Special)
     wanted, value = parameter.type.element, argument.value
     assert wanted is not None
-    if not isinstance(value, Variable):
+    if not isinstance(value, Reference):
         message = f"{parameter.name} takes the name of a data structure, such as QUEUE{wanted.value}"
         context.report("AMX4087", message, value.span)
         return None
@@ -63,7 +63,7 @@ def checked_structure(context: Context, block: Block, parameter: Input, argument
     return value
 
 
-def _check_declaration(context: Context, name: Variable) -> None:
+def _check_declaration(context: Context, name: Reference) -> None:
     symbol = context.symbols.get(name.name)
     if symbol is not None and (symbol.scope is not Scope.LOCAL or symbol.tuning is not None):
         note = Note("it is declared here", symbol.span)
@@ -72,7 +72,7 @@ def _check_declaration(context: Context, name: Variable) -> None:
         context.report("AMX4093", message, name.span, hint, (note,))
 
 
-def _check_made_once(context: Context, name: Variable) -> None:
+def _check_made_once(context: Context, name: Reference) -> None:
     _, first = context.structures[name.name]
     if first != name.span:
         note = Note("the first SHIFT block is here", first)
@@ -100,5 +100,5 @@ def check_channels(context: Context, block: Block, call: Call, given: Collection
 def structure_of(context: Context, call: Call) -> DataStructure | None:
     """Return the data structure that a CALL names, None where it names none that is known."""
     name = next((item.value for item in call.arguments if item.keyword == "STRUCTURE_NAME"), None)
-    found = context.structures.get(name.name) if isinstance(name, Variable) else None
+    found = context.structures.get(name.name) if isinstance(name, Reference) else None
     return None if found is None else found[0]

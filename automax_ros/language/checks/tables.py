@@ -7,7 +7,7 @@ from automax_ros.core.types import DataType
 from automax_ros.language.checks.constant_values import literal_of
 from automax_ros.language.checks.context import Context
 from automax_ros.language.checks.expressions import check_variable
-from automax_ros.language.syntax.tree import Argument, Element, Expression, Variable
+from automax_ros.language.syntax.tree import Argument, Element, Expression, Reference
 
 
 def checked_table(context: Context, parameter: Input, argument: Argument) -> Expression | None:
@@ -16,7 +16,7 @@ def checked_table(context: Context, parameter: Input, argument: Argument) -> Exp
     if literal_of(value) is not None:
         context.report("AMX4075", f"{parameter.name} takes an array, no constant", value.span)
         return None
-    if not isinstance(value, (Variable, Element)):
+    if not isinstance(value, (Reference, Element)):
         context.report("AMX4077", f"{parameter.name} takes an array, no expression", value.span)
         return None
     symbol = context.symbols.get(value.name)
@@ -37,7 +37,7 @@ def checked_table(context: Context, parameter: Input, argument: Argument) -> Exp
     return None
 
 
-def elements_of(context: Context, table: Variable) -> int | None:
+def elements_of(context: Context, table: Reference) -> int | None:
     """Return the number of elements of a one-dimensional array, None for anything else or one that is too large."""
     symbol = context.symbols.get(table.name)
     if symbol is None or len(symbol.dimensions) != 1:

@@ -18,8 +18,8 @@ from automax_ros.language.syntax.tree import (
     FunctionCall,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     StringLiteral,
-    Variable,
 )
 
 RELATIONAL = frozenset({"=", "<>", "<", ">", "<=", ">="})
@@ -37,7 +37,7 @@ def type_of(expression: Expression) -> DataType:
     """
     if isinstance(expression, Binary):
         return _type_of_chain(expression)
-    if isinstance(expression, (Variable, Element)):
+    if isinstance(expression, (Reference, Element)):
         return expression.type
     if isinstance(expression, IntegerLiteral):
         return literal_integer_type(expression)

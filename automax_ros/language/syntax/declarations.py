@@ -10,7 +10,7 @@ from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.expressions import close_parenthesis, constant, variable
 from automax_ros.language.syntax.functions import FUNCTIONS, REFUSED_FUNCTIONS
 from automax_ros.language.syntax.tokens import RESERVED_WORDS, Kind, Token
-from automax_ros.language.syntax.tree import Declaration, Declared, Event, Expression, Scope, Tuning, Variable
+from automax_ros.language.syntax.tree import Declaration, Declared, Event, Expression, Reference, Scope, Tuning
 
 TUNING_KEYS = ("CURRENT", "HIGH", "LOW", "STEP")
 EVENT_KEYS = ("INTERRUPT_STATUS", "TIMEOUT")
@@ -111,7 +111,7 @@ def event(cursor: Cursor, start: Token) -> Event:
         hint = "the name of an event has no type character" if token.kind is Kind.NAME else None
         cursor.fail("AMX0076", f"{cursor.found()} cannot be the name of an event", hint)
     name = cursor.check_name(cursor.advance())
-    status: Variable | None = None
+    status: Reference | None = None
     timeout: int | None = None
     while cursor.accept(","):
         key = cursor.current

@@ -21,10 +21,10 @@ from automax_ros.language.syntax.tree import (
     FunctionCall,
     IntegerLiteral,
     RealLiteral,
+    Reference,
     StringLiteral,
     Target,
     Unary,
-    Variable,
 )
 
 DEPTH_LIMIT = 64
@@ -52,10 +52,10 @@ def expression(cursor: Cursor) -> Expression:
     return _operation(cursor, 1, 1)[0]
 
 
-def variable(cursor: Cursor, what: str) -> Variable:
+def variable(cursor: Cursor, what: str) -> Reference:
     """Read the name of a simple variable; ``what`` says in a message what needs one."""
     token = _variable_name(cursor, what)
-    return Variable(cursor.check_name(token), span=token.span)
+    return Reference(cursor.check_name(token), span=token.span)
 
 
 def target(cursor: Cursor, what: str) -> Target:
@@ -64,7 +64,7 @@ def target(cursor: Cursor, what: str) -> Target:
     name = cursor.check_name(token)
     if cursor.at("(", "["):
         return Element(name, _arguments(cursor, 1)[0], span=token.span.to(cursor.previous.span))
-    return Variable(name, span=token.span)
+    return Reference(name, span=token.span)
 
 
 def constant(cursor: Cursor, what: str) -> Expression:
@@ -185,7 +185,7 @@ def _named(cursor: Cursor, depth: int) -> _Measured:
             return FunctionCall(name, arguments, span=span), height + 1
         return Element(cursor.check_name(token), arguments, span=span), height + 1
     if function is None:
-        return Variable(cursor.check_name(token), span=token.span), 1
+        return Reference(cursor.check_name(token), span=token.span), 1
     if function.arguments:
         cursor.fail("AMX0046", f"the function {name} needs its arguments in parentheses")
     return FunctionCall(name, span=token.span), 1

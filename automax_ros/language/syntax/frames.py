@@ -9,7 +9,7 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.reporter import Reporter
 from automax_ros.language.syntax.tokens import Fault
-from automax_ros.language.syntax.tree import NO_SPAN, End, For, If, Label, Statement, Variable
+from automax_ros.language.syntax.tree import NO_SPAN, End, For, If, Label, Reference, Statement
 
 NESTING_LIMIT = 16
 """Deepest nesting of IF and FOR together, one-line IFs included (decision)."""
@@ -131,7 +131,7 @@ class FrameStack:
         self._pop()
         self._label(span)
 
-    def next(self, cursor: Cursor, variable: Variable, span: Span) -> None:
+    def next(self, cursor: Cursor, variable: Reference, span: Span) -> None:
         """NEXT: its line number becomes a label at the end of the loop's body."""
         matching = next((frame for frame in reversed(self._frames) if _loops_over(frame, variable.name)), None)
         if matching is not None:
@@ -201,7 +201,7 @@ class FrameStack:
         _turn_to_else(self._top)
         cursor.fail("AMX0051", "ELSE without IF", hint)
 
-    def _refuse_next(self, cursor: Cursor, variable: Variable) -> None:
+    def _refuse_next(self, cursor: Cursor, variable: Reference) -> None:
         frame = self._top
         assert isinstance(frame.node, For)
         cursor.position -= 1

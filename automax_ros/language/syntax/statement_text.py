@@ -29,6 +29,7 @@ from automax_ros.language.syntax.tree import (
     Print,
     Read,
     RealLiteral,
+    Reference,
     Remark,
     Restore,
     Return,
@@ -37,7 +38,6 @@ from automax_ros.language.syntax.tree import (
     StringLiteral,
     Tuning,
     Unary,
-    Variable,
 )
 
 _SIGN_LEVEL = max(LEVELS.values()) + 1
@@ -54,7 +54,7 @@ def print_expression(expression: Expression) -> str:
         if expression.operator == "NOT":
             return f"NOT {_operand(expression.operand, NOT_LEVEL + 1)}"
         return f"{expression.operator}{_operand(expression.operand, _PRIMARY_LEVEL)}"
-    if isinstance(expression, Variable):
+    if isinstance(expression, Reference):
         return expression.name
     if isinstance(expression, Element):
         return f"{expression.name}({_list(expression.subscripts)})"

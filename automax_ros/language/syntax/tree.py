@@ -58,15 +58,15 @@ class BooleanLiteral:
 
 
 @dataclass(frozen=True)
-class Variable:
-    """A simple variable, or a whole array where one is expected; ``name`` ends with the type character."""
+class Reference:
+    """A simple variable by its name, or a whole array where one is expected; ``name`` ends with the type character."""
 
     name: str
     span: Span = _span()
 
     @property
     def type(self) -> DataType:
-        """The data type that the name tells."""
+        """The data type, which the name gives."""
         return type_of_name(self.name)
 
 
@@ -113,9 +113,9 @@ class FunctionCall:
 
 
 Expression = (
-    IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral | Variable | Element | Unary | Binary | FunctionCall
+    IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral | Reference | Element | Unary | Binary | FunctionCall
 )
-Target = Variable | Element
+Target = Reference | Element
 
 
 # Statements
@@ -148,7 +148,7 @@ class Declared:
 
     @property
     def type(self) -> DataType:
-        """The data type that the name tells."""
+        """The data type, which the name gives."""
         return type_of_name(self.name)
 
 
@@ -195,7 +195,7 @@ class If:
 class For:
     """FOR variable = start TO stop [STEP step] ... NEXT variable."""
 
-    variable: Variable
+    variable: Reference
     start: Expression
     stop: Expression
     step: Expression | None
@@ -291,7 +291,7 @@ class Event:
     """EVENT NAME = event [, INTERRUPT_STATUS = variable, TIMEOUT = count]."""
 
     name: str
-    interrupt_status: Variable | None = None
+    interrupt_status: Reference | None = None
     timeout: int | None = None
     number: int | None = field(default=None, kw_only=True)
     span: Span = _span()
@@ -299,7 +299,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Argument:
-    """KEYWORD = value inside a CALL. The name of an event or a data structure parses as a Variable."""
+    """KEYWORD = value inside a CALL. The name of an event or a data structure parses as a Reference."""
 
     keyword: str
     value: Expression

@@ -18,9 +18,9 @@ from automax_ros.language.syntax.tree import (
     OnJump,
     Print,
     Read,
+    Reference,
     Statement,
     Unary,
-    Variable,
 )
 
 
@@ -85,10 +85,10 @@ def parts(expression: Expression) -> Iterator[Expression]:
             pending += reversed(current.arguments)
 
 
-def variables_in(expression: Expression) -> Iterator[Variable | Element]:
+def variables_in(expression: Expression) -> Iterator[Reference | Element]:
     """Yield the variables and elements inside an expression, in the order of the text."""
     for part in parts(expression):
-        if isinstance(part, (Variable, Element)):
+        if isinstance(part, (Reference, Element)):
             yield part
 
 
