@@ -31,6 +31,7 @@ PHRASES = {
     r"\bbeside\b": "next to, with, apart from",
     r"\banew\b": "again",
     r"\bwithout a word\b": "silently",
+    r"\btells (?:why|whether|how|what|which|where)\b": "says, shows, gives",
 }
 """What we do not write, as a pattern, and what we write."""
 

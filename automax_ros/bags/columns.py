@@ -63,7 +63,7 @@ def require_another_file(bag: Path, output: Path) -> None:
 
 
 def unwritable(output: Path, error: OSError) -> BagError:
-    """Return the error that tells why an output cannot be written."""
+    """Return the error that says why an output cannot be written."""
     return BagError("AMX6824", output, f"cannot be written: {error.strerror or error}")
 
 

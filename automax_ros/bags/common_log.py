@@ -1,4 +1,4 @@
-"""The write log of common memory as a recording tells it: one run of one rack, its values in their variables' types."""
+"""The write log of common memory as a recording gives it: one run of one rack, its values in their variables' types."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Cell = Value
 
 
 class CommonLog:
-    """Takes the messages of the write log of one run; what is of another run or known already tells nothing.
+    """Takes the messages of the write log of one run; what is of another run, or known already, is passed over.
 
     Writes that are missing are an error here, numbers that a variable cannot have are not: ``_bridge``, ``_odd``.
 

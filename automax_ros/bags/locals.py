@@ -24,7 +24,7 @@ def is_local(name: str) -> bool:
 
 
 class WatchedLocals:
-    """The locals that are watched. Their types are told by their names; the first TaskState tells where they stand.
+    """The locals that are watched. Their types are told by their names; the first TaskState says where they stand.
 
     Raises:
         BagError: a name is not that of a local, or that of a text.
@@ -79,7 +79,7 @@ class WatchedLocals:
         """
         missing = [task for task in self._asked if task not in self._places]
         if missing:
-            hint = f"it tells those of {', '.join(list(self._places)[:8])}" if self._places else ""
+            hint = f"it holds those of {', '.join(list(self._places)[:8])}" if self._places else ""
             raise BagError("AMX6827", self._bag, f"holds no states of a task {missing[0][:40]!r}", hint)
 
     def _found(self, state: TaskState, asked: Sequence[tuple[int, str, int]]) -> list[tuple[int, int]]:

@@ -32,7 +32,7 @@ def opened(path: Path) -> Iterator[BufferedReader]:
 
 
 def no_recording(path: Path) -> BagError:
-    """Return the error that tells why nothing can be read at a path that is neither a folder nor a regular file."""
+    """Return the error that says why nothing can be read at a path that is neither a folder nor a regular file."""
     what = "does not exist"
     if path.exists():
         what = "is not a regular file"

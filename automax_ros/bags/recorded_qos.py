@@ -1,4 +1,4 @@
-"""The quality of service that a recording tells of a topic, in the words of rosbag2 or its older numbers."""
+"""The quality of service that a recording gives for a topic, in the words of rosbag2 or its older numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MAX_QOS_BYTES = 1 << 16
 MAX_DEPTH = 10_000
 """Deepest history that playback asks for, whatever was recorded (decision: ROS would hold as many messages)."""
 STREAM = QosProfile("reliable", "volatile", "keep_last", 1000)
-"""What a topic gets of which nothing is told."""
+"""What a topic gets for which nothing was recorded."""
 _KEEP_ALL_DEPTH = 1000
 _NESTING = 6
 _RELIABILITY = {"1": "reliable", "2": "best_effort"}

@@ -35,7 +35,7 @@ class RecordingOptions:
 class Recorder(Recording):
     """Records one run. Make it before the rack is started; ``close`` finishes the bag.
 
-    When the disk refuses, recording ends and ``failure`` tells why; the rack goes on.
+    When the disk refuses, recording ends and ``failure`` says why; the rack goes on.
     """
 
     def __init__(self, rack: Rack, stream: RackStream, folder: Path, options: RecordingOptions | None = None) -> None:

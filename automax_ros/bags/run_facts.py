@@ -74,4 +74,4 @@ def sent_files(bag: BagReader) -> list[RackFile]:
 _NO_TABLE = "AMX6820"
 _STRING = "std_msgs/msg/String"
 _MOST_RUNS = 1000
-"""Most runs whose first write is remembered until the table tells which of them it is."""
+"""Most runs whose first write is remembered until the table says which of them it is."""

@@ -25,7 +25,7 @@ _OWN = (
     count_column("error_line"),
     count_column("error_code"),
 )
-"""What every scan tells of itself; line and code are those of its first error, 0 without one."""
+"""What every scan says of itself; line and code are those of its first error, 0 without one."""
 
 
 class ScanTable:

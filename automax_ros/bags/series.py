@@ -88,7 +88,7 @@ class Series:
     def changes(self) -> Iterator[Change]:
         """Return the instants of the window at which something changed, or those of its grid.
 
-        The first one inside of a window tells what holds there already. No value is told before the recording tells it.
+        The first one inside of a window says what holds there already. No value is told before the recording tells it.
 
         Raises:
             BagError: the recording is damaged, or the window holds nothing, or too many rows.

@@ -5,7 +5,7 @@ stands anywhere else.
 
 The step function is pure. Its parameters are named after the declaration, in lower case: inputs, coefficients and
 states, in any order, and only those it uses. It returns one tuple of plain names: the outputs, then the new states,
-both in the order of the declaration; then, where outputs hold, ``writes``, which tells whether those are written; and
+both in the order of the declaration; then, where outputs hold, ``writes``, which says whether those are written; and
 last, where the block has ``logs``, the number of the problem (0 for none). Its body is straight assignments, ``if``,
 ``while`` and one ``return`` at the end; it uses integers, floats, booleans, comparisons, numeric constants of its
 module and the helpers of ``HELPERS``. So it can be called as it stands, inlined by the compiler from its syntax tree,
@@ -321,7 +321,7 @@ class Block:
     """A control block. ``function`` is its equation in one or a few lines, ``notes`` what a user must know besides.
 
     ``step`` is None for the block that ``begins_scan`` (SCAN_LOOP) alone: the task itself carries it out. ``logs``
-    are the problems whose number the step function returns. ``structure`` tells what the block does with a data
+    are the problems whose number the step function returns. ``structure`` says what the block does with a data
     structure: the states of the block that makes it are the structure's, and the step functions of those that use it
     take them too, to read, or to write a buffer in place. ``expected_on`` are Processors whose every task should call
     the block, for the reason ``expected_since``.

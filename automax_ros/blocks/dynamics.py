@@ -57,7 +57,7 @@ class Dynamics:
     numbers put in, ``equation`` what it executes in the terms of its coefficients, and ``corners`` the names of the
     frequencies in rad/s at which it bends, each from the parameters in force. The corners of a band
     have no ``time_constants``. ``exact_at`` names the parameter at whose frequency the discrete function is the
-    Laplace function itself, empty where the mapping is plain bilinear; ``steps`` tells how a block without a mapping
+    Laplace function itself, empty where the mapping is plain bilinear; ``steps`` says how a block without a mapping
     is made.
 
     ``signals`` are the inputs that carry a signal through it; ``carrier(inputs)`` is the one to drive, and 1 or -1 for

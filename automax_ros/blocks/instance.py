@@ -34,7 +34,7 @@ class Instance:
 
     ``outputs`` and ``state`` are the values of its output variables and hidden states after the last scan, ``error`` is
     the number of the last problem that the last scan logged, 0 for none; ``coefficients`` are those it was run with.
-    ``results`` names what the step function returns: outputs, then states. ``wrote`` tells whether the last scan wrote
+    ``results`` names what the step function returns: outputs, then states. ``wrote`` says whether the last scan wrote
     outputs that hold; those it does not write stay as they are, whoever wrote into ``outputs``. A table is any sequence
     of numbers. The name of a data structure is not given: READ and WRITE blocks get the instance of the SHIFT block
     that makes theirs.

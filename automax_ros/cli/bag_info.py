@@ -1,4 +1,4 @@
-"""Tell what a recording holds: rack, tasks and scans, variables, topics, files, and whether it is sound.
+"""Show what a recording holds: rack, tasks and scans, variables, topics, files, and whether it is sound.
 
 All of it is counted, so the recording is read from its beginning to its end. Exit code 1: it is not sound.
 """

@@ -1,7 +1,7 @@
 """Save what is sound of a recording whose writer was killed, whose disk was full, or whose files were cut or damaged.
 
 The recording itself is never changed: what can be saved goes into a new folder, with index, summary and
-metadata.yaml, and what was lost is told. A sound recording is left alone. Exit code 0: the recording is sound, or a
+metadata.yaml, and what was lost is reported. A sound recording is left alone. Exit code 0: the recording is sound, or a
 repaired one stands next to it; 2: nothing of it can be used.
 """
 

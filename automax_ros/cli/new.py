@@ -1,7 +1,7 @@
 """Make a rack file (.yaml) from a folder of tasks (.BLK), then check it.
 
 Every COMMON of the tasks becomes a common variable of the rack, with its type, dimensions and length of strings; where
-two tasks differ both places are told. Common memory stands in slot 0, the tasks share the Processors evenly, and the
+two tasks differ both places are named. Common memory stands in slot 0, the tasks share the Processors evenly, and the
 one that scans most often gets the highest priority. Folders inside the folder are not looked at.
 """
 
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     for name, reason in drafted.left_out:
         print(f"left out {quoted(name)}: it {reason}", file=sys.stderr)
     if _has_errors(output, drafted):
-        print(f"mend what is told above, then: automax check {output}", file=sys.stderr)
+        print(f"correct what is shown above, then run: automax check {output}", file=sys.stderr)
         return 1
     print(f"next: automax run {output} --simulated --duration 10")
     return 0

@@ -1,4 +1,4 @@
-"""The tables that a subcommand writes: opened so that what goes wrong is told, and never over what is read."""
+"""The tables that a subcommand writes: opened so that what goes wrong is reported, and never over what is read."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def _measured(arguments: argparse.Namespace, program: Program, call: DynamicCall
 
 def _require_known(call: DynamicCall, tuning: Tuning) -> None:
     if call.dynamics.not_measured:
-        raise UsageError(f"{call.title}: {call.dynamics.not_measured}", "`automax tune-info` tells its time constant")
+        raise UsageError(f"{call.title}: {call.dynamics.not_measured}", "`automax tune-info` shows its time constant")
     if tuning.missing:
         names = [call.parameters[name].variable for name in tuning.missing]
         what = " and ".join(f"{name} = {call.parameters[name].variable}" for name in tuning.missing)

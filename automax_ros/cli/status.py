@@ -49,7 +49,7 @@ class StatusDisplay:
                 self.message(f"{task.name}: {printable(task.printed.popleft())}")
 
     def finish(self, bag: Path | None, *, complete: bool = True) -> None:
-        """Print the last state and the summary; ``complete`` tells whether all of the run is in the recording."""
+        """Print the last state and the summary; ``complete`` says whether all of the run is in the recording."""
         self._tell_news()
         self._line.clear()
         rack = self._rack

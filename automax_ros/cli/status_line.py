@@ -1,4 +1,4 @@
-"""A line that tells how far a command is: rewritten on a terminal, plain lines elsewhere."""
+"""A line that says how far a command is: rewritten on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ and the limits of sections 36 and 41 to 50 as numbers; what comes within 10 % of
 that is a variable has a tunable's CURRENT, or what --set gives it.
 
 --ki Y X gives the KI with which INTEGRATE gains Y counts per second at a constant INPUT of X (section 42.3). FILE, or
---ticks with --tick-ms, tells the scan time against which it is checked.
+--ticks with --tick-ms, gives the scan time against which it is checked.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class Binding:
 class Inlined:
     """Statements that carry a block out; the other fields are expressions valid after them.
 
-    ``outputs`` stay valid while outputs are stored in the order of ``wanted``. ``writes`` tells whether outputs that
+    ``outputs`` stay valid while outputs are stored in the order of ``wanted``. ``writes`` says whether outputs that
     hold are written. ``error`` is None where the block cannot log anything as it is programmed.
     """
 

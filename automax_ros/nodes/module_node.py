@@ -112,7 +112,7 @@ class ModuleNode(Node):  # type: ignore[misc]
         )
 
     def misfit(self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo) -> None:
-        """Tell of a reader or writer with an incompatible quality of service; ``what`` says what is lost."""
+        """Report a reader or writer with an incompatible quality of service; ``what`` says what is lost."""
         policy = str(qos_policy_name_from_kind(info.last_policy_kind)).lower()
         text = f"{what}: its quality of service does not fit ({policy})"
         self.site.health.note("QoS conflict", what, lambda: text, times=info.total_count_change)

@@ -83,7 +83,7 @@ class ProcessorNode(ModuleNode):
         """Writes from outside do not concern a Processor."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Who tunes a task tells its parameter."""
+        """Whoever tunes a task updates its parameter."""
 
     def operated(self, operation: Operation) -> None:
         """Report a STOP ALL, and the health of the tasks after each operation on one of them."""

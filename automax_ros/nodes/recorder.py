@@ -2,7 +2,7 @@
 
 Subscribes to the rack's ``variables``, ``config``, ``backplane``, ``backplane/snapshot``, ``scans``, ``states`` and to
 the topics of all common variables; publishes nothing. Messages are taken as bytes, in a look at all topics every 25 ms:
-that costs a fraction of one callback each, and one look tells how far the topics have come. Each message brings the
+that costs a fraction of one callback each, and one look says how far the topics have come. Each message brings the
 time at which it was sent, which is the order of the rack's own log.
 """
 

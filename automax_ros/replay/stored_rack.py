@@ -48,7 +48,7 @@ class ReplaySource:
     """A task that is executed again.
 
     ``compiled`` is what runs; ``recorded`` is what ran when the recording was made, None if that cannot be told;
-    ``edited`` tells whether their sources differ.
+    ``edited`` says whether their sources differ.
     """
 
     name: str

@@ -23,7 +23,7 @@ MOST_SCANS_TO_REST = 1 << 16
 class DrivenBlock:
     """A block that one signal of whole counts drives, from rest: where it comes to stand while the signal is 0.
 
-    The block's declaration tells which input carries the signal; the others that could are 0. ``integrator`` is the
+    The block's declaration says which input carries the signal; the others that could are 0. ``integrator`` is the
     one inside the block, None where it has none.
     """
 

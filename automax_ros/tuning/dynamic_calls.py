@@ -81,7 +81,7 @@ class Parameter:
 class DynamicCall:
     """A CALL of a block with coefficients: ``label`` is its line as in state names, ``output`` the variable it writes.
 
-    ``parameters`` are the inputs that are programmed, by keyword. ``inside`` tells where it stands if it may not run
+    ``parameters`` are the inputs that are programmed, by keyword. ``inside`` says where it stands if it may not run
     once in every scan: ``IF``, ``FOR`` or ``subroutine``, the innermost.
     """
 

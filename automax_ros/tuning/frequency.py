@@ -33,7 +33,7 @@ _LEFT = 1e-6
 class Measured:
     """The gain at one frequency: ``amplitude`` of the sine in counts, ``gain`` from it to OUTPUT.
 
-    ``uncertainty`` is the greatest error that the rounding of OUTPUT can make, as a gain. ``touched`` tells what the
+    ``uncertainty`` is the greatest error that the rounding of OUTPUT can make, as a gain. ``touched`` says what the
     block ran into: then the point is not the linear function's.
     """
 

@@ -28,7 +28,7 @@ class StepResponse:
     """The outputs from scan 0, in which the step comes, on: a value each ``period_s``, in counts.
 
     ``rest`` is OUTPUT before the step, ``final`` where the discrete function ends, None for one that goes on (an
-    integrator). ``touched`` tells what the block ran into, nothing where OUTPUT is the design's within a count: to
+    integrator). ``touched`` says what the block ran into, nothing where OUTPUT is the design's within a count: to
     settle at a limit is not to run into it.
     """
 

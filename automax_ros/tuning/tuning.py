@@ -34,7 +34,7 @@ class Verdict(enum.Enum):
 class LimitNow:
     """The limits of one parameter as numbers at a scan period, in its own unit; one that cannot be known is None.
 
-    ``value`` is what the CALL gives or the default, before it is limited; ``given`` tells which of the two. A default
+    ``value`` is what the CALL gives or the default, before it is limited; ``given`` says which of the two. A default
     is not limited. Where the limits cross the high one is both.
     """
 

@@ -90,7 +90,7 @@ def test_conflict_is_told_with_both_places(plant):
         in result.err
     )
     assert "NOTE$ has the length 8 here, 12 at plant/FAST.BLK:1:41" in result.err
-    assert result.err.endswith("mend what is told above, then: automax check plant/rack.yaml\n")
+    assert result.err.endswith("correct what is shown above, then run: automax check plant/rack.yaml\n")
     assert Path("plant/rack.yaml").exists()
 
 

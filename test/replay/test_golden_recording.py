@@ -32,5 +32,5 @@ def test_the_example_rack_does_what_the_recording_says(tmp_path: Path) -> None:
     recorder.close()
     present, golden = messages(tmp_path / "bag"), messages(GOLDEN)
     first = next((pair for pair in zip(present, golden, strict=False) if pair[0] != pair[1]), None)
-    assert first is None, f"bags/README.md tells how to renew the recording; first difference: {first}"
+    assert first is None, f"bags/README.md says how to renew the recording; first difference: {first}"
     assert len(present) == len(golden) > 10_000

@@ -38,7 +38,7 @@ _MALFORMED_NAMED = 3
 class LiveRecording(Recording):
     """One recording of a running rack; ``take`` every message in order, ``close`` finishes the bag.
 
-    ``failure`` tells why the disk ended the recording, ``ended`` why the rack did; both None while all is well.
+    ``failure`` says why the disk ended the recording, ``ended`` why the rack did; both None while all is well.
     ``notes`` are lines for the person, to be taken out by the caller.
     """
 
@@ -55,7 +55,7 @@ class LiveRecording(Recording):
         """Create the bag with the rack's files in it. ``table`` is the VariableTable, ``tasks`` those to record.
 
         A further file begins with the first image after each multiple of ``split_ns`` of rack time, 0 for never, or
-        after the size that ``storage`` tells; the rack is asked for that image.
+        after the size that ``storage`` gives; the rack is asked for that image.
 
         Raises:
             RecordingError: the folder exists already or cannot be written.
@@ -247,7 +247,7 @@ class LiveRecording(Recording):
         self._write(topic, 0, self.last_stamp + (later if later > _SECOND // 1000 else 0), payload)
 
     def _keep(self, topic: str, sent_ns: int, payload: bytes) -> None:
-        """Let a message wait for the next write, which tells whether one is missing before it."""
+        """Let a message wait for the next write, which says whether one is missing before it."""
         if self._recording or self._image is not None:
             self._pending.append((topic, sent_ns, payload))
             if sent_ns - self._proven_ns > SETTLE_NS or len(self._pending) >= MAX_PENDING:

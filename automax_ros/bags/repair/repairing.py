@@ -237,9 +237,7 @@ def _check_metadata(bag: Path, report: RepairReport, provenance: Provenance) -> 
     elif all(file.sound for file in report.files):
         count = sum(file.contents.messages for file in report.files)
         if information.get("message_count") != str(count):
-            report.problems.append(
-                f"{METADATA_FILE} tells of another number of messages than the {count} that there are"
-            )
+            report.problems.append(f"{METADATA_FILE} states another number of messages than the {count} that there are")
 
 
 def _in_time(files: list[FileReport]) -> list[FileReport]:
@@ -251,7 +249,7 @@ def _in_time(files: list[FileReport]) -> list[FileReport]:
 
 
 def _check_gaps(report: RepairReport) -> None:
-    """Tell of times between two files from which there is nothing."""
+    """Report times between two files from which there is nothing."""
     filled = [file.contents for file in _in_time(report.files) if file.contents.messages]
     for before, after in pairwise(filled):
         gap = after.first_log - before.last_log
