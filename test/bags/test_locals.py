@@ -80,7 +80,7 @@ def test_states_of_the_example() -> None:
         ("SPEED.TABLE%(6)", "AMX6821", "the largest is 5"),
         ("SPEED.", "AMX6821", "write TASK.NAME"),
         ("SPEED.NOTE$", "AMX6828", "leave it out"),
-        ("LINE.RATIO%", "AMX6827", "it tells those of SPEED"),
+        ("LINE.RATIO%", "AMX6827", "it holds those of SPEED"),
     ],
 )
 def test_unknown_names_are_explained(tmp_path: Path, name: str, code: str, hint: str) -> None:

@@ -16,7 +16,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "grammar.md"
 END_OF_LINE = "\n"
 _SYMBOL = re.compile(r'\s*(?:"([^"]*)"|([a-z][a-z -]*[a-z])|([=,|;{}()\[\]]))')
 OTHER_ANSWERS = BASIC_TASK_WORDS.keys() | FOREIGN_WORDS.keys() | REFUSED_FUNCTIONS.keys()
-"""Words that are no part of the language and get a hint of their own where they begin a statement."""
+"""Words that are not part of the language and get a hint of their own where they begin a statement."""
 
 
 @dataclass(frozen=True)
