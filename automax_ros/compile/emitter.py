@@ -42,7 +42,6 @@ class Emitter:
     in_block: bool = False
     forces: frozenset[str] = frozenset()
     _temporaries: int = 0
-    _statement_start: tuple[list[ast.stmt], int] | None = None
     _overflows: bool = False
 
     def emit(self, *statements: ast.stmt) -> None:
