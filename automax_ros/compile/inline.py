@@ -10,6 +10,7 @@ import ast
 import functools
 import inspect
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar, cast
@@ -233,6 +234,8 @@ def _inlined(block: Block, binding: Binding, wanted: Mapping[str, str], free: fr
     own = frozenset(prefix + local for local in tree.assigned - set(tree.parameters))
     results_now = {**outputs, _WRITES: writes, **({_ERROR: error} if error is not None else {})}
     body, results_now = carry_on(body, results_now, own - states)
+    if block.holds:
+        body = _left_to_the_stores(body, results_now, own - states)
     error = results_now.pop(_ERROR, None)
     copies = _kept_apart(results_now, wanted, prefix)
     needed = states | {
@@ -247,6 +250,24 @@ def _inlined(block: Block, binding: Binding, wanted: Mapping[str, str], free: fr
 def names_in(expression: ast.expr) -> set[str]:
     """Return the variables that an expression reads."""
     return {node.id for node in build.nodes(expression) if isinstance(node, ast.Name)}
+
+
+def _left_to_the_stores(body: list[ast.stmt], results: dict[str, ast.expr], own: frozenset[str]) -> list[ast.stmt]:
+    """Return the body without its last assignments to locals that are each one result: those are computed when stored.
+
+    Where the outputs are not written, nothing is then computed for them.
+    """
+    names = {value.id: key for key, value in results.items() if isinstance(value, ast.Name)}
+    nodes = [node for node in build.nodes(*body, *results.values()) if isinstance(node, ast.Name)]
+    uses = Counter((node.id, isinstance(node.ctx, ast.Load)) for node in nodes)
+    kept = list(body)
+    while kept and isinstance(last := kept[-1], ast.Assign) and isinstance(target := last.targets[0], ast.Name):
+        once = uses[target.id, True] == uses[target.id, False] == 1
+        if not once or target.id not in own or target.id not in names:
+            break
+        results[names[target.id]] = last.value
+        kept.pop()
+    return kept
 
 
 def _kept_apart(results: dict[str, ast.expr], wanted: Mapping[str, str], prefix: str) -> list[ast.Assign]:
