@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.writer import StorageOptions
-from automax_ros.cli.record_options import split_period, storage_options
+from automax_ros.cli.record_options import split_seconds, storage_options
 from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.signals import StopRequest, stop_signals
@@ -58,7 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--split-mb", metavar="MB", help="begin a new file when one reaches MB megabytes (1 MB is 10^6 bytes)"
     )
-    parser.add_argument("--split-s", metavar="S", help="begin a new file each S seconds of rack time")
+    parser.add_argument(
+        "--split-s", type=split_seconds, metavar="S", help="begin a new file each S seconds of rack time"
+    )
     parser.add_argument("--compression", metavar="zstd|lz4|none", help="how the files are compressed (default: zstd)")
     parser.add_argument(
         "--wait",
@@ -72,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Record until Ctrl-C, the duration has passed or the rack starts again; 1 where recording broke off."""
     storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
-    how = _Storing(storage, split_period(arguments.split_s, "--"), arguments.tasks)
+    how = _Storing(storage, arguments.split_s or 0, arguments.tasks)
     with stop_signals() as stop:
         domain = prepare_ros()
         own, own_files = _rack(arguments.rack)

@@ -8,8 +8,9 @@ from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.bags.writer import COMPRESSIONS, StorageOptions
 from automax_ros.cli.numbers import option_number
 from automax_ros.cli.usage import UsageError
+from automax_ros.cli.window import seconds
 from automax_ros.core.text import did_you_mean, quoted
-from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.config import RackConfig
 
 _BYTES_PER_MB = 1_000_000
@@ -25,7 +26,9 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--record-split-mb", metavar="MB", help="begin a new file when one reaches MB megabytes (1 MB is 10^6 bytes)"
     )
-    group.add_argument("--record-split-s", metavar="S", help="begin a new file each S seconds of rack time")
+    group.add_argument(
+        "--record-split-s", type=split_seconds, metavar="S", help="begin a new file each S seconds of rack time"
+    )
     group.add_argument(
         "--record-compression",
         metavar="zstd|lz4|none",
@@ -54,9 +57,7 @@ def recording_options(arguments: argparse.Namespace, config: RackConfig) -> Reco
         raise UsageError(f"--record-{given[0].replace('_', '-')} says how to record", "add --record DIR")
     storage = storage_options(arguments.record_compression, arguments.record_split_mb, "--record-")
     tasks = _tasks(arguments.record_tasks, config)
-    return RecordingOptions(
-        storage, split_period(arguments.record_split_s, "--record-"), tasks, arguments.record_locals
-    )
+    return RecordingOptions(storage, arguments.record_split_s or 0, tasks, arguments.record_locals)
 
 
 def storage_options(
@@ -77,20 +78,11 @@ def storage_options(
         raise UsageError(f"{prefix}split-mb: {error}") from error
 
 
-def split_period(text: str | None, prefix: str) -> int:
-    """Return the rack time in ns after which another file begins, 0 for never.
-
-    Raises:
-        UsageError: no time, or too short a one.
-    """
-    if text is None:
-        return 0
-    try:
-        period_ns = seconds_ns(text)
-    except ValueError as error:
-        raise UsageError(f"{prefix}split-s: {error}") from error
+def split_seconds(text: str) -> int:
+    """Return the rack time in ns after which another file begins: the type of an option."""
+    period_ns = seconds(text)
     if period_ns < MIN_SPLIT_NS:
-        raise UsageError(f"{prefix}split-s: {text} s is too short", "1 s is the shortest")
+        raise argparse.ArgumentTypeError(f"{text} s is too short: 1 s is the shortest")
     return period_ns
 
 

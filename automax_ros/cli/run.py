@@ -21,9 +21,9 @@ from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
+from automax_ros.cli.window import seconds_above_0
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.faults import Fault
-from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value, bare_name
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import RackError
@@ -40,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--simulated", action="store_true", help="simulated time, as fast as the machine can, without ROS"
     )
-    parser.add_argument("--duration", metavar="S", help="seconds of rack time after which the run ends by itself")
+    parser.add_argument(
+        "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
+    )
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
     parser.add_argument(
         "--set",
@@ -66,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
-    duration_ns = _duration(arguments.duration)
+    duration_ns = arguments.duration
     if arguments.simulated and arguments.record is not None and duration_ns is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
     with stop_signals() as stop:
@@ -95,18 +97,6 @@ def run(arguments: argparse.Namespace) -> int:
         except (BagError, RetentionFault) as error:
             print(error, file=sys.stderr)
             return 2
-
-
-def _duration(text: str | None) -> int | None:
-    if text is None:
-        return None
-    try:
-        duration_ns = seconds_ns(text)
-    except ValueError as error:
-        raise UsageError(f"--duration: {error}") from error
-    if duration_ns == 0:
-        raise UsageError("--duration: 0 s is too short to run: give more")
-    return duration_ns
 
 
 def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.core.numbers import REAL_LIMIT, sign_extended
-from automax_ros.language.syntax.tokens import Fault
+from automax_ros.language.syntax.tokens import SourceFault
 
 HEX_DIGITS = 8
 REAL_DIGITS = 8
@@ -15,46 +15,48 @@ SMALLEST_POSITIVE = 5.4210107e-20
 SMALLEST_NEGATIVE = 2.7105054e-20
 
 
-def hexadecimal_fault(text: str) -> tuple[int, Fault | None]:
+def hexadecimal_fault(text: str) -> tuple[int, SourceFault | None]:
     """Return the value of a hexadecimal constant, a signed 32-bit integer, and its fault (J-3675, 4.3)."""
     digits = text[:-1].lstrip("0") or "0"
     if len(digits) > HEX_DIGITS:
-        return 0, Fault("AMX0024", f"a hexadecimal constant has at most {HEX_DIGITS} digits, here {len(digits)}")
+        return 0, SourceFault("AMX0024", f"a hexadecimal constant has at most {HEX_DIGITS} digits, here {len(digits)}")
     return sign_extended(int(digits, 16), 32), None
 
 
-def integer_value(text: str) -> tuple[int, Fault | None]:
+def integer_value(text: str) -> tuple[int, SourceFault | None]:
     """Return the value of a decimal constant and its fault; 2147483648 is allowed, for the minus sign before it."""
     digits = text.lstrip("0") or "0"
     value = int(digits) if len(digits) <= 10 else LARGEST_INTEGER + 1
     if value > LARGEST_INTEGER:
-        return LARGEST_INTEGER - 1, Fault(
+        return LARGEST_INTEGER - 1, SourceFault(
             "AMX0027", "the integer constant does not fit 32 bits", "a REAL constant has a decimal point"
         )
     return value, None
 
 
-def real_fault(text: str) -> Fault | None:
+def real_fault(text: str) -> SourceFault | None:
     """Return what is wrong with a real constant; its sign is not known yet."""
     mantissa = text.partition("E")[0].replace(".", "")
     digits = len(mantissa.lstrip("0"))
     if digits > REAL_DIGITS:
-        return Fault("AMX0025", f"a real constant has at most {REAL_DIGITS} digits, here {digits}")
+        return SourceFault("AMX0025", f"a real constant has at most {REAL_DIGITS} digits, here {digits}")
     value = float(text)
     if value > LARGEST_REAL:
-        return Fault("AMX0026", "the real constant is too large", "a REAL reaches from -9.2233717E18 to 9.2233717E18")
+        return SourceFault(
+            "AMX0026", "the real constant is too large", "a REAL reaches from -9.2233717E18 to 9.2233717E18"
+        )
     if digits and value < SMALLEST_NEGATIVE:
-        return Fault("AMX0026", "the real constant is too small", "the smallest positive REAL is 5.4210107E-20")
+        return SourceFault("AMX0026", "the real constant is too small", "the smallest positive REAL is 5.4210107E-20")
     return None
 
 
-def string_fault(value: str) -> Fault | None:
+def string_fault(value: str) -> SourceFault | None:
     """Return what is wrong with a string constant."""
     if len(value) > STRING_LIMIT:
-        return Fault("AMX0021", f"a string constant has at most {STRING_LIMIT} characters, here {len(value)}")
+        return SourceFault("AMX0021", f"a string constant has at most {STRING_LIMIT} characters, here {len(value)}")
     bad = next((char for char in value if char != "\t" and not char.isprintable()), None)
     if bad is not None:
-        return Fault(
+        return SourceFault(
             "AMX0004", f"character with the code {ord(bad):02X} hex in a string", "use CHR$ for control characters"
         )
     return None

@@ -8,7 +8,7 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import did_you_mean, printable
 from automax_ros.core.types import NAME_LIMIT, bare_name
 from automax_ros.language.syntax.reporter import Reporter, SyntaxFaultError
-from automax_ros.language.syntax.tokens import RESERVED_WORDS, Fault, Kind, Token
+from automax_ros.language.syntax.tokens import RESERVED_WORDS, Kind, SourceFault, Token
 
 
 class Cursor:
@@ -70,7 +70,7 @@ class Cursor:
         token = self.current
         if token.kind is Kind.ERROR and token.fault is not None:
             raise SyntaxFaultError(token.fault, token.span)
-        raise SyntaxFaultError(Fault(code, message, hint), self.here(), notes)
+        raise SyntaxFaultError(SourceFault(code, message, hint), self.here(), notes)
 
     def here(self) -> Span:
         """The span of the current token; at the end of a line the place after the last character."""
@@ -118,7 +118,7 @@ class Cursor:
         if len(bare_name(name)) > NAME_LIMIT and name not in self._long_names:
             self._long_names.add(name)
             message = f"a name has at most {NAME_LIMIT} characters, here {len(bare_name(name))}"
-            self.reporter.report(Fault("AMX0028", message, "shorten it everywhere in the rack"), token.span)
+            self.reporter.report(SourceFault("AMX0028", message, "shorten it everywhere in the rack"), token.span)
         return name
 
     def skip_statement(self) -> None:

@@ -12,7 +12,7 @@ from automax_ros.core.diagnostics import Span
 from automax_ros.language.syntax.constants import LARGEST_REAL, SMALLEST_POSITIVE
 from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.functions import FUNCTIONS, REFUSED_FUNCTIONS
-from automax_ros.language.syntax.tokens import BOOLEAN_WORDS, RESERVED_WORDS, Fault, Kind, Token
+from automax_ros.language.syntax.tokens import BOOLEAN_WORDS, RESERVED_WORDS, Kind, SourceFault, Token
 from automax_ros.language.syntax.tree import (
     Binary,
     BooleanLiteral,
@@ -163,7 +163,7 @@ def _literal(cursor: Cursor, negative: bool) -> _Measured:
         value = value if token.fault is None else min(value, LARGEST_REAL)
         if not negative and token.fault is None and 0.0 < value < SMALLEST_POSITIVE:
             hint = "the smallest positive REAL is 5.4210107E-20"
-            cursor.reporter.report(Fault("AMX0026", "the real constant is too small", hint), span)
+            cursor.reporter.report(SourceFault("AMX0026", "the real constant is too small", hint), span)
         return RealLiteral(value, token.text, span=span), 1
     if isinstance(value, str):
         return StringLiteral(value, span=span), 1

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.reporter import Reporter
-from automax_ros.language.syntax.tokens import Fault
+from automax_ros.language.syntax.tokens import SourceFault
 from automax_ros.language.syntax.tree import NO_SPAN, End, For, If, Label, Reference, Statement
 
 NESTING_LIMIT = 16
@@ -185,7 +185,7 @@ class FrameStack:
                 hint = f"close the loop with NEXT {frame.node.variable.name[:20]}, before the end of a block around it"
                 self._crossed.add(frame.node.variable.name)
             in_force, self._reporter.statement = self._reporter.statement, frame.number
-            self._reporter.report(Fault(code, f"{frame.word} without {end}", hint), frame.span)
+            self._reporter.report(SourceFault(code, f"{frame.word} without {end}", hint), frame.span)
             self._reporter.statement = in_force
         self._pop()
         if frame.doubtful:
@@ -226,6 +226,8 @@ def _loops_over(frame: Frame, name: str) -> bool:
     return not isinstance(frame.node, For) or frame.node.variable.name == name
 
 
-def too_deep(word: str) -> Fault:
+def too_deep(word: str) -> SourceFault:
     """Return the fault of a block nested too deep."""
-    return Fault("AMX0058", f"{word} nested more than {NESTING_LIMIT} deep", "move the inner part into a subroutine")
+    return SourceFault(
+        "AMX0058", f"{word} nested more than {NESTING_LIMIT} deep", "move the inner part into a subroutine"
+    )

@@ -11,7 +11,7 @@ import re
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import printable
 from automax_ros.language.syntax.constants import hexadecimal_fault, integer_value, real_fault, string_fault
-from automax_ros.language.syntax.tokens import Fault, Kind, Token
+from automax_ros.language.syntax.tokens import Kind, SourceFault, Token
 
 BLANKS = " \t\f"
 _TOKEN = re.compile(
@@ -161,7 +161,7 @@ def _begins_statement(before: list[Token]) -> bool:
 
 
 def _error(text: str, span: Span, code: str, message: str, hint: str | None) -> Token:
-    return Token(Kind.ERROR, text, span.line, span.column, span.end_column, fault=Fault(code, message, hint))
+    return Token(Kind.ERROR, text, span.line, span.column, span.end_column, fault=SourceFault(code, message, hint))
 
 
 def _foreign(text: str, span: Span) -> Token:

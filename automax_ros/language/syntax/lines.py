@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from automax_ros.core.diagnostics import Note, SourceText, Span
 from automax_ros.language.syntax.lexer import BLANKS, BROKEN_END, LineLexer
 from automax_ros.language.syntax.reporter import Reporter
-from automax_ros.language.syntax.tokens import OPERATOR_WORDS, STATEMENT_WORDS, Fault, Kind, Token
+from automax_ros.language.syntax.tokens import OPERATOR_WORDS, STATEMENT_WORDS, Kind, SourceFault, Token
 
 LAST_LINE_NUMBER = 32767
 _NUMBER = re.compile(r"[ \t\f]*([0-9]+)")
@@ -84,15 +84,15 @@ class LineReader:
         self._reporter.statement = number
         if number is None or not 1 <= number <= LAST_LINE_NUMBER:
             self._reporter.report(
-                Fault("AMX0011", f"line numbers go from 1 to {LAST_LINE_NUMBER}", "renumber this line"), span
+                SourceFault("AMX0011", f"line numbers go from 1 to {LAST_LINE_NUMBER}", "renumber this line"), span
             )
             return number
         if number in self._seen:
             note = Note(f"line {number} stands here already", self._seen[number])
-            self._reporter.report(Fault("AMX0012", f"line number {number} is used twice"), span, (note,))
+            self._reporter.report(SourceFault("AMX0012", f"line number {number} is used twice"), span, (note,))
         elif number < self._previous:
             hint = f"line numbers ascend: use one above {self._previous}"
-            fault = Fault("AMX0013", f"line number {number} stands after line {self._previous}", hint)
+            fault = SourceFault("AMX0013", f"line number {number} stands after line {self._previous}", hint)
             self._reporter.report(fault, span)
         self._seen.setdefault(number, span)
         self._previous = number
@@ -105,7 +105,7 @@ class LineReader:
             self._reporter.report(first.fault, first.span)
             return
         hint = "begin the line with a number, or end the line before it with `&`"
-        fault = Fault("AMX0010", "the line has no line number", hint)
+        fault = SourceFault("AMX0010", "the line has no line number", hint)
         self._reporter.report(fault, first.span)
 
     def _assemble(self, line: LogicalLine, start: int) -> None:
@@ -152,7 +152,9 @@ class LineReader:
         if remark or following is None or not nesting.unfinished or _NUMBER.match(self._lines[following]):
             return False
         if not line.faulty:
-            fault = Fault("AMX0016", "the statement ends too early", "end the line with `&` to go on in the next one")
+            fault = SourceFault(
+                "AMX0016", "the statement ends too early", "end the line with `&` to go on in the next one"
+            )
             self._reporter.report(fault, end)
         line.faulty = True
         self._index = following
@@ -160,9 +162,11 @@ class LineReader:
 
     def _checked_continuation(self, line: LogicalLine, following: int | None, mark: Span) -> bool:
         if following is None:
-            fault = Fault("AMX0017", "nothing follows the `&`", "remove it, or write the rest of the statement")
+            fault = SourceFault("AMX0017", "nothing follows the `&`", "remove it, or write the rest of the statement")
         elif _NUMBERED_STATEMENT.match(self._lines[following]):
-            fault = Fault("AMX0017", "the line after this `&` has a line number", "remove the `&` or the line number")
+            fault = SourceFault(
+                "AMX0017", "the line after this `&` has a line number", "remove the `&` or the line number"
+            )
         else:
             self._index = following
             return True

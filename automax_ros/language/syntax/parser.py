@@ -8,7 +8,7 @@ from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.frames import FrameStack
 from automax_ros.language.syntax.lines import END_OF_FILE, LineReader, LogicalLine
 from automax_ros.language.syntax.reporter import Reporter, SyntaxFaultError, TooManyProblemsError
-from automax_ros.language.syntax.tokens import Fault, Kind, Token
+from automax_ros.language.syntax.tokens import Kind, SourceFault, Token
 from automax_ros.language.syntax.tree import Label, Module, Remark, Statement
 
 SOURCE_LIMIT = 1_000_000
@@ -56,7 +56,7 @@ class _TaskParser:
         if cursor.at_line_end():
             if not line.faulty:
                 hint = "remove the line, or put a REM after its number"
-                self._reporter.report(Fault("AMX0014", "the line has no statement", hint), line.number_span)
+                self._reporter.report(SourceFault("AMX0014", "the line has no statement", hint), line.number_span)
             self._frames.add(Label(span=line.number_span))
             return
         while not cursor.at_line_end():
@@ -82,7 +82,7 @@ class _TaskParser:
         if cursor.at_separator():
             after = cursor.advance().span
             if cursor.at_line_end():
-                fault = Fault("AMX0036", "a statement is missing after `\\`", "remove the `\\`")
+                fault = SourceFault("AMX0036", "a statement is missing after `\\`", "remove the `\\`")
                 self._report(line, SyntaxFaultError(fault, after))
 
     def _report(self, line: LogicalLine, error: SyntaxFaultError) -> None:
@@ -98,7 +98,7 @@ class _TaskParser:
         if cursor.tokens[index].offset - first.offset <= STATEMENT_LIMIT:
             return False
         message = f"the statement has more than {STATEMENT_LIMIT} characters"
-        fault = Fault("AMX0005", message, "divide it over several statements")
+        fault = SourceFault("AMX0005", message, "divide it over several statements")
         self._report(line, SyntaxFaultError(fault, first.span))
         return True
 
@@ -106,7 +106,7 @@ class _TaskParser:
         span = self._reader.lexer.lower_case
         if span is not None:
             self._reporter.statement = None
-            fault = Fault("AMX0003", "lower case is read as upper case", "the real compiler wants upper case")
+            fault = SourceFault("AMX0003", "lower case is read as upper case", "the real compiler wants upper case")
             self._reporter.report(fault, span)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.core.diagnostics import Diagnostic, Note, Span
-from automax_ros.language.syntax.tokens import Fault, Token
+from automax_ros.language.syntax.tokens import SourceFault, Token
 
 DIAGNOSTIC_LIMIT = 200
 """Most problems reported of one source; one more says that there are others (decision: nobody reads more)."""
@@ -16,7 +16,7 @@ class TooManyProblemsError(Exception):
 class SyntaxFaultError(Exception):
     """Ends the parse of one statement; carries what is wrong and where."""
 
-    def __init__(self, fault: Fault, span: Span, notes: tuple[Note, ...] = ()) -> None:
+    def __init__(self, fault: SourceFault, span: Span, notes: tuple[Note, ...] = ()) -> None:
         super().__init__(fault.message)
         self.fault = fault
         self.span = span
@@ -30,7 +30,7 @@ class Reporter:
         self.diagnostics: list[Diagnostic] = []
         self.statement: int | None = None
 
-    def report(self, fault: Fault, span: Span, notes: tuple[Note, ...] = ()) -> None:
+    def report(self, fault: SourceFault, span: Span, notes: tuple[Note, ...] = ()) -> None:
         """Add a problem; raises TooManyProblemsError at the limit."""
         if len(self.diagnostics) >= DIAGNOSTIC_LIMIT:
             message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"

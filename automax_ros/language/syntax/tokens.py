@@ -35,7 +35,7 @@ class Kind(enum.Enum):
         return self in (Kind.END, Kind.SEPARATOR, Kind.REMARK)
 
 
-class Fault(NamedTuple):
+class SourceFault(NamedTuple):
     """A problem that a token carries until the parser meets it."""
 
     code: str
@@ -57,7 +57,7 @@ class Token(NamedTuple):
     end_column: int
     offset: int = 0
     value: int | float | str | None = None
-    fault: Fault | None = None
+    fault: SourceFault | None = None
 
     @property
     def span(self) -> Span:
