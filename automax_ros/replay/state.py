@@ -13,6 +13,7 @@ from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import Value
 from automax_ros.language.program import Program
+from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS
 from automax_ros.running.task import Task
 from automax_ros.wire.messages import TaskState
 
@@ -137,6 +138,11 @@ def state_differences(bag: Path, task: Task, state: TaskState) -> list[tuple[str
                 found.append((f"{field.name}({index})" if field.is_array else field.name, value, own[position]))
             position += 1
     return found
+
+
+def log_is_empty(state: TaskState) -> bool:
+    """Return whether a state tells that the error log is empty."""
+    return list(state.field[-1:]) == [LOG_FIELD] and not any(state.value[-LOG_NUMBERS:])
 
 
 def tunable_names(layout: Layout) -> list[str]:

@@ -18,11 +18,7 @@ from automax_ros.replay.commons import RecordedCommons, UnknownValue
 from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
 from automax_ros.replay.inputs import ScanMemory, same_bits
 from automax_ros.replay.report import Kind, NamedValue, TaskReport, errors_text
-from automax_ros.replay.state import (
-    fitting_state,
-    state_differences,
-    whole_state,
-)
+from automax_ros.replay.state import fitting_state, log_is_empty, state_differences, whole_state
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.task import ScanRecord, Status, Task
@@ -71,6 +67,7 @@ class TaskReplay:
         self._last_stamp = 0
         self._recorded_ended = False
         self._synchronous = False
+        self._stored_ran: bool | None = None
         self._stopped_in: int | None = None
         self._record: ScanRecord | None = None
         self._compared = self._different = self._states = self._left_out = 0
@@ -161,20 +158,26 @@ class TaskReplay:
         return True
 
     def take_state(self, state: TaskState, log_time: int, *, counted: bool) -> None:
-        """Begin with a recorded state, or compare it with ours; a tunable that was set since is set here too.
+        """Begin with a recorded state, or compare it with ours; what an operator has done since is done here too.
+
+        Between two scans a state changes by operations alone: a tunable was set, the error log cleared, the task
+        installed again.
 
         Raises:
             BagError: it does not fit the task.
         """
+        stored_ran = self._follow_source(state)
         if self._starts_at is not None:
             if log_time != self._starts_at:
                 return
             self._starts_at = None
             self._synchronous = False
-        self._require_source(state)
-        last = self._last
-        if last is not None and state.scan < last:
+        last, between = self._last, state.stamp > self._last_stamp
+        if not stored_ran or (last is not None and state.scan < last and not between):
             return
+        if last is not None and state.scan < last:
+            self._note(f"installed again at {self._when(state.stamp)} s")
+            self._synchronous = False
         if state.scan == last and state.stamp - self._last_stamp > _QUIET_SCANS * self._period_ns:
             self._recorded_ended = True
         if self._synchronous and last is not None and state.scan > last:
@@ -185,6 +188,8 @@ class TaskReplay:
             self._adopt(state)
             return
         self._tunables.set_again(self._task, state)
+        if between and log_is_empty(state):
+            self._task.errors.clear()
         if counted and not self._source.edited and not self._tolerance and state.layout_hash == self._layout_hash:
             self._compare_state(state)
 
@@ -313,13 +318,20 @@ class TaskReplay:
         self.memory.apart.clear()
         self._synchronous = True
 
-    def _require_source(self, state: TaskState) -> None:
-        """Make sure that the source stored inside is the one that ran."""
+    def _follow_source(self, state: TaskState) -> bool:
+        """Return whether the source that is stored inside ran; after a reload it may be another. BagError: never."""
         recorded = self._source.recorded
-        if recorded is not None and state.source_hash != recorded.program.source_hash:
+        ran = recorded is None or state.source_hash == recorded.program.source_hash
+        if not ran and self._stored_ran is None:
             raise BagError(
                 "AMX6831", self._bag, f"task {self.name} ran with another source than the {self.name}.BLK stored inside"
             )
+        if not ran and self._stored_ran:
+            self._note(f"reloaded at {self._when(state.stamp)} s with a source that is not stored inside")
+            self._synchronous = False
+            self.memory.apart.clear()
+        self._stored_ran = ran
+        return ran
 
     def _lose(self, scan: Scan, error: UnknownValue) -> None:
         """A value is missing: after a gap in the write log the task waits for a state, otherwise that is an error."""

@@ -80,5 +80,7 @@ class ErrorLog:
         self.first, self.second, self.last = entries
 
 
+LOG_FIELD = "ERROR LOG"
+"""The log's name in a snapshot."""
 LOG_NUMBERS = 10
 """How many numbers ``ErrorLog.flatten`` returns."""

@@ -17,7 +17,7 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.running.backplane import BUS_ERROR, NO_MODULES, Backplane
-from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
+from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.views import Memory
 
 SCAN_TOO_LONG = 7040
@@ -205,7 +205,7 @@ class Task:
     @property
     def layout(self) -> Layout:
         """The layout of a snapshot: the state, then the error log."""
-        log = StateField("ERROR LOG", DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
+        log = StateField(LOG_FIELD, DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
         return Layout((*self.compiled.layout.fields, log))
 
     @property
