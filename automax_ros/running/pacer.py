@@ -80,6 +80,7 @@ class Pacer:
             now = self.now_ns
             if until_ns is not None and now >= until_ns:
                 self._scheduler.run_due(until_ns - 1)
+                self._scheduler.pass_until(until_ns)
                 return
             self._scheduler.run_due(now)
             if on_idle is not None and now >= next_chore:

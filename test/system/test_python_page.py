@@ -1,0 +1,49 @@
+"""The examples of docs/python.md, each run as it stands there."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.S)
+SIMULATED, REAL_TIME, IN_ROS = EXAMPLES
+
+
+def ran(program: str, domain: int) -> str:
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    result = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env=environment,
+        timeout=100,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    return result.stdout
+
+
+def test_a_rack_in_simulated_time(ros_domain_id):
+    assert int(ran(SIMULATED, ros_domain_id)) > 0
+
+
+def test_a_rack_in_real_time_without_ros(ros_domain_id):
+    assert "10 * NS_PER_S" in REAL_TIME
+    short = REAL_TIME.replace("10 * NS_PER_S", "NS_PER_S // 2")
+    program = f"{SIMULATED}\n{short}\nprint(rack.now_ns, any('rclpy' in name for name in __import__('sys').modules))"
+    assert ran(program, ros_domain_id).split()[1:] == ["500000000", "False"]
+
+
+@pytest.mark.timeout(110)
+def test_a_rack_in_a_process_and_executor_of_its_user(ros_domain_id):
+    seen = json.loads(ran(IN_ROS, ros_domain_id))
+    assert len(seen) == 20
+    assert seen == sorted(seen), "the ramp of the line goes up"
