@@ -41,6 +41,9 @@ class PointReader:
         if slot is None or module is None:
             return None
         last = module.registers.count - (2 if declared.type is DataType.DOUBLE else 1)
+        if last < 0:
+            self._findings.add("AMX6421", f"{what} takes two registers; the {module.model} has one", span)
+            return None
         register = self._number(section, "register", what, 0, last)
         bit = self._number(section, "bit", what, 0, 15) if "bit" in section else None
         if register is None or (bit is None and "bit" in section):

@@ -27,7 +27,7 @@ from automax_ros.rack.settings import common_named
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
-from automax_ros.running.memory import CommonMemory
+from automax_ros.running.memory import FORCING, CommonMemory
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.running.views import MemoryValueError
@@ -181,8 +181,8 @@ class Rack:
 
         Raises:
             KeyError: the rack has no such variable.
-            MemoryValueError: the value does not fit, or the variable cannot be forced: a string, an array, or a
-                register of which both the word and bits are named (J2-3106-1 p. 18-10).
+            MemoryValueError: the value does not fit, or the variable cannot be forced: a string, an array,
+                FORCINGSTATUS@, or a register of which both the word and bits are named (J2-3106-1 p. 18-10).
         """
         view = self.memory.view(name)
         reason = self._why_not_forced(view)
@@ -206,6 +206,8 @@ class Rack:
         spec = self.memory.specs[view]
         if spec.is_array or spec.type is DataType.STRING:
             return "it is an array" if spec.is_array else "it is a string"
+        if spec.name == FORCING:
+            return "it shows whether anything is forced"
         others = self.memory.registers.others(view)
         return f"{self.memory.specs[others[0]].name} is part of the same register" if others else None
 

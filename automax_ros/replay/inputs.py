@@ -205,10 +205,8 @@ class ScanMemory:
         Raises:
             UnknownValue: the recording has not told it.
         """
-        for view, element, value in (*reversed(self._committed), *reversed(self._writes)):
-            if (view, element) == key:
-                return value
-        return self._commons.value(key)
+        changes = self._recorded_changes()
+        return changes[key] if key in changes else self._commons.value(key)
 
     def overwritten(self, entries: Iterable[Entry]) -> None:
         """Somebody else has written: what the task wrote there before is gone."""
@@ -220,9 +218,9 @@ class ScanMemory:
         if (view, element) in self._commons.forced:
             return
         if view in self._commons.registers.views:
-            others = list(self._commons.registers.consequences(view, element, value, self._present))
-            self._own.update({entry[:2]: entry[2] for entry in others if entry[:2] not in self._commons.forced})
-        self._own[view, element] = value
+            self._own.update(self._spread(view, element, value, self._present))
+        else:
+            self._own[view, element] = value
 
     def _recorded_changes(self) -> dict[Key, Value]:
         """Return what the recorded scan changed: its writes, and what else shows the same registers."""
@@ -236,10 +234,17 @@ class ScanMemory:
             if (view, element) in commons.forced:
                 continue
             if view in commons.registers.views:
-                others = list(commons.registers.consequences(view, element, value, read))
-                changes.update({entry[:2]: entry[2] for entry in others if entry[:2] not in commons.forced})
-            changes[view, element] = value
+                changes.update(self._spread(view, element, value, read))
+            else:
+                changes[view, element] = value
         return changes
+
+    def _spread(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[Key, Value]:
+        """Return what a write of registers changes: them, and what else shows them; a force keeps its value."""
+        registers, forced = self._commons.registers, self._commons.forced
+        value = registers.keeping(view, element, value, forced, read)
+        others = {entry[:2]: entry[2] for entry in registers.consequences(view, element, value, read)}
+        return {**{key: shown for key, shown in others.items() if key not in forced}, (view, element): value}
 
     def _present(self, view: int, element: int) -> Value:
         """Return a value as the task has left it, else as the recording has it."""

@@ -134,8 +134,11 @@ class CommonMemory(Image):
             changed()
 
     def _store(self, view: int, element: int, value: Value, writer: int, kind: WriteKind) -> None:
-        if self._forced and (view, element) in self._forced:
-            return
+        if self._forced:
+            if (view, element) in self._forced:
+                return
+            if view in self._shared:
+                value = self.registers.keeping(view, element, value, self._forced, self.read_now)
         entries = self._spread(view, element, value) if view in self._shared else None
         # Written out rather than by ``_put``: every write of every scan comes through here.
         array = self._arrays[view]
@@ -147,11 +150,13 @@ class CommonMemory(Image):
         if self._log is not None:
             self._log.append(Write(self.sequence, self.now_ns, writer, kind, view, element, value))
         if entries:
+            # What shares registers with a forced view is not forced itself.
+            told = WriteKind.OUTSIDE if kind in (WriteKind.FORCE, WriteKind.RELEASE) else kind
             for other, place, shown in entries:
                 self._put(other, place, shown)
                 self.sequence += 1
                 if self._log is not None:
-                    self._log.append(Write(self.sequence, self.now_ns, writer, kind, other, place, shown))
+                    self._log.append(Write(self.sequence, self.now_ns, writer, told, other, place, shown))
 
     def _spread(self, view: int, element: int, value: Value) -> list[tuple[int, int, Value]]:
         """Return what else a write of a register changes; what is forced stays."""

@@ -38,6 +38,7 @@ class PrivateImage(Image):
         """Write the image, unless a force holds the view; words and bits of the same register change together."""
         if self._common.is_forced(view):
             return
+        value = self.registers.keeping(view, element, value, self._common.forced, self.read_now)
         entries = list(self.registers.consequences(view, element, value, self.read_now)) if view in self._shared else []
         for entry in ((view, element, value), *entries):
             self._put(*entry)

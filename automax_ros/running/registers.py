@@ -5,7 +5,7 @@ A word and its bits alias in actual memory; the latch copies views, so that in a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 from automax_ros.core.types import DataType, Value
 from automax_ros.running.views import Place, ViewSpec
@@ -47,6 +47,22 @@ class RegisterMap:
             shown = self._shown(other, words, read)
             if shown != read(other, 0):
                 yield other, 0, shown
+
+    def keeping(
+        self,
+        view: int,
+        element: int,
+        value: Value,
+        forced: Collection[tuple[int, int]],
+        read: Callable[[int, int], Value],
+    ) -> Value:
+        """Return what a write leaves where ``view`` is a bank: the bits of forced points stay as they are."""
+        for point in self._points.get((view, element), ()):
+            if (point, 0) in forced:
+                bit = self._places[point].bit
+                mask = _WORD if bit is None else 1 << bit
+                value = _signed(_unsigned(value) & ~mask | _unsigned(read(view, element)) & mask)
+        return value
 
     def apart_from(self, bank: int, outputs: range, registers: int) -> frozenset[tuple[int, int]]:
         """Return view and element of all that shows registers of a bank that are not outputs: its inputs."""

@@ -16,6 +16,7 @@ from automax_ros.rack.loader import load
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.running.task import Status
+from automax_ros.running.views import MemoryValueError
 
 YAML = """\
 rack: LINE1
@@ -321,3 +322,10 @@ def test_a_state_is_refused_by_a_rack_that_runs_or_has_other_modules(made, tmp_p
     assert config is not None
     with pytest.raises(ValueError, match="other modules"):
         Rack(config).load(rack.state())
+
+
+def test_forcing_status_cannot_be_forced_itself(made):
+    rack, _ = made
+    with pytest.raises(MemoryValueError, match="shows whether anything is forced"):
+        rack.force("FORCINGSTATUS@", False)
+    assert not rack.memory.forced

@@ -83,3 +83,35 @@ def test_an_edited_task_reads_its_own_bits_in_the_word(bag, tmp_path):
     assert replayed(alone).identical
     back = {item.name for item in replayed(alone, {"WORK": WORK}).differences}
     assert {"GREEN@", "SEEN%"} <= back
+
+
+BITS = edited(YAML, ("  LAMPS%: {slot: 6, register: 0}\n", ""))
+BIT_SPEED = (
+    "10 COMMON RED@, ODD@\n20 CALL SCAN_LOOP(TICKS=1)\n30 CALL AND(INPUT1=RED@, INPUT2=RED@, OUTPUT=ODD@)\n40 END\n"
+)
+BIT_WORK = """\
+10 COMMON RED@, GREEN@, SEEN%
+20 LOCAL N%
+100 CALL SCAN_LOOP(TICKS=2)
+110 N% = N% + 1
+120 IOWRITE 6, 0, N%
+130 GREEN@ = NOT RED@
+140 SEEN% = IOREAD%(6, 0)
+150 END
+"""
+
+
+def forcing_bits(rack: Rack, number: int) -> None:
+    if number == 3:
+        rack.force("RED@", True)
+    if number == 15:
+        rack.unforce("RED@")
+
+
+def test_a_forced_bit_holds_in_its_register_and_nothing_else_does(tmp_path):
+    bag = recorded(tmp_path / "rack", forcing_bits, yaml=BITS, SPEED=BIT_SPEED, WORK=BIT_WORK)
+    for from_ms in (0, 750):
+        assert replayed(bag, from_ns=from_ms * 10**6).identical
+    range_ns = {"from_ns": 400 * 10**6, "to_ns": 1400 * 10**6}
+    assert replayed(bag, {"WORK": edited(BIT_WORK, ("0, N%", "0, N% / 2 * 2"))}, **range_ns).identical
+    assert not replayed(bag, {"WORK": edited(BIT_WORK, ("0, N%", "0, N% / 8 * 8"))}, **range_ns).identical

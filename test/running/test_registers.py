@@ -128,6 +128,25 @@ def test_a_forced_bit_stays_when_its_word_is_written():
     assert (memory.read_now(LOW), memory.read_now(HIGH), memory.read_now(BANK, 1)) == (True, False, 0)
 
 
+def test_the_register_of_a_forced_bit_shows_it_whatever_is_written_there():
+    """Else an output would be off, and IOREAD% read it so, while its common and the operator see it on."""
+    memory = CommonMemory(SPECS)
+    memory.keep_log()
+    memory.force(LONGBIT, True)
+    assert [(entry.view, entry.kind) for entry in memory.drain()] == [
+        (LONGBIT, WriteKind.FORCE),
+        (BANK, WriteKind.OUTSIDE),
+        (LONG, WriteKind.OUTSIDE),
+    ], "a replay holds what is forced, and nothing else"
+    memory.write_now(BANK, 3, WRITER, 3)
+    assert (memory.read_now(BANK, 3), memory.read_now(LONG), memory.read_now(LONGBIT)) == (0x13, 0x13, True)
+    memory.release(LONGBIT)
+    memory.force(LONG, 0x10005)
+    memory.write_now(BANK, 7, WRITER, 2)
+    memory.clear()
+    assert (memory.read_now(BANK, 2), memory.read_now(BANK, 3), memory.read_now(LONG)) == (1, 5, 0x10005)
+
+
 def test_stop_all_keeps_what_a_module_keeps():
     memory = CommonMemory(SPECS)
     memory.write_now(WORD, 5, OTHER)

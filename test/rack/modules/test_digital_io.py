@@ -104,6 +104,7 @@ def test_a_task_that_writes_an_input_point_is_an_error(tmp_path, statement):
         ("A@: {slot: 5, register: -1, bit: 0}", "AMX6421"),
         ("A@: {slot: 5, register: 0, bit: 16}", "AMX6421"),
         ("A!: {slot: 5, register: 1}", "AMX6421"),
+        ("A!: {slot: 6, register: 0}", "AMX6421"),
         ("A@: {slot: 5, register: 0}", "AMX6009"),
         ("A%: {slot: 5}", "AMX6009"),
         ("A%: {register: 0}", "AMX6009"),
