@@ -12,6 +12,7 @@ Its tasks' run-time errors and PRINT lines go to /rosout.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -49,9 +50,8 @@ class ProcessorNode(ModuleNode):
             for topic in stream.module_topics
             if topic.slot == self._slot
         }
-        self._tunables: dict[str, Tunable] = {item.parameter: item for item in tunables_of(self._tasks)}
-        for tunable in self._tunables.values():
-            self.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor())
+        self._tunables: dict[str, Tunable] = {}
+        self._declare(self._tasks)
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._tune)
         self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in self._tasks}
@@ -89,8 +89,21 @@ class ProcessorNode(ModuleNode):
         """Report a STOP ALL, and the health of the tasks after each operation on one of them."""
         if operation.what == "stop_all":
             self.get_logger().error(f"STOP ALL: {operation.reason}")
-        if operation.task in ("", *(task.name for task in self._tasks)):
+        concerned = [task for task in self._tasks if operation.task in ("", task.name)]
+        if operation.ok and operation.what in ("reload", "power_on"):
+            self._declare(concerned)
+        if concerned:
             self.publish_diagnostics(operation.at_ns)
+
+    def _declare(self, tasks: Sequence[Task]) -> None:
+        """Declare the tunables of tasks, as they are installed now, in place of those that they had."""
+        for name in [name for name, item in self._tunables.items() if item.task in tasks]:
+            del self._tunables[name]
+            self.undeclare_parameter(name)
+        found = tunables_of(tasks)
+        for tunable in found:
+            self.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor())
+        self._tunables |= {item.parameter: item for item in found}
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         """Refuse what a task would refuse, before any of the parameters is set; those that are not tunables pass."""
@@ -106,12 +119,13 @@ class ProcessorNode(ModuleNode):
 
     def _tune(self, parameters: list[Parameter[Any]]) -> None:
         """Tune tasks by the parameters that have been set."""
+        chosen = [(self._tunables[item.name], item.value) for item in parameters if item.name in self._tunables]
+        if not chosen:
+            return
         with self.site.lock:
             self.site.pacer.catch_up()
-            for parameter in parameters:
-                tunable = self._tunables.get(parameter.name)
-                if tunable is not None:
-                    self._rack.tune(tunable.task, tunable.variable, parameter.value)
+            for tunable, value in chosen:
+                self._rack.tune(tunable.task, tunable.variable, value)
 
     def _health(self, now_ns: int) -> list[DiagnosticStatus]:
         return [self._status(task, now_ns) for task in self._tasks]

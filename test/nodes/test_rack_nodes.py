@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from system.support import TYPES, wait_until
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
@@ -237,3 +238,23 @@ def test_digital_modules_show_their_registers(context, tmp_path):
         spin_until(executor, lambda: shown() == {"register_0": "0008H", "register_1": "0000H"})
     button.destroy_node()
     executor.shutdown()
+
+
+def test_parameters_are_those_of_the_source_that_runs(context):
+    from rclpy.parameter import Parameter
+
+    from automax_ros.nodes import RackNodes
+
+    with RackNodes(TYPES, context=context) as nodes:
+        node = next(node for node in nodes.nodes if node.get_name() == "processor_1")
+        nodes.start(paced=False)
+        source = nodes.rack.sources["FAST"]
+        node.set_parameters([Parameter("FAST.TRIM", value=50)])
+        assert nodes.rack.task("FAST").value("TRIM%") == 50
+        text = source.text.replace("CURRENT=3, HIGH=100", "CURRENT=4, HIGH=40").replace("FREE", "LOOSE")
+        nodes.rack.operations.reload("FAST", SourceText("new/FAST.BLK", text))
+        assert not node.has_parameter("FAST.FREE")
+        assert (node.get_parameter("FAST.TRIM").value, node.get_parameter("FAST.LOOSE").value) == (4, 1.5)
+        low, high = node.set_parameters([Parameter("FAST.TRIM", value=39), Parameter("FAST.TRIM", value=41)])
+        assert (low.successful, high.successful) == (True, False)
+        assert nodes.rack.task("FAST").value("TRIM%") == 39
