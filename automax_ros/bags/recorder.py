@@ -96,5 +96,6 @@ class Recorder(Recording):
         if self.failure is not None:
             return
         with self._enduring():
+            self._store(files_of(self._rack))  # a task may have been reloaded, and each file can be replayed alone
             self._writer.split()
         self._stream.repeat_facts(self._takes)

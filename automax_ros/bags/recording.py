@@ -24,8 +24,8 @@ class Recording:
         """
         self.failure: RecordingError | None = None
         self._writer = writer
-        for file in files:
-            writer.attach(file.name, file.media_type, file.data)
+        self._stored: dict[str, RackFile] = {}
+        self._store(files)
 
     def sync(self) -> None:
         """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
@@ -36,6 +36,17 @@ class Recording:
         self.sync()
         with self._enduring():
             self._writer.require_synced()
+
+    def _store(self, files: Iterable[RackFile]) -> None:
+        """Store files that are not stored as they are now.
+
+        Raises:
+            RecordingError: the disk refuses.
+        """
+        for file in files:
+            if self._stored.get(file.name) != file:
+                self._stored[file.name] = file
+                self._writer.attach(file.name, file.media_type, file.data)
 
     @contextmanager
     def _enduring(self) -> Iterator[None]:

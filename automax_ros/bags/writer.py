@@ -192,6 +192,8 @@ class BagWriter:
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Store a file that belongs to the recording, such as the rack's YAML or a task's source; in each data file.
 
+        One of the same name takes the place of the former in the data files to come.
+
         Raises:
             RecordingError: it is too long, the writer is closed, or the disk refuses.
         """
@@ -202,7 +204,7 @@ class BagWriter:
         attachment = Attachment(
             create_time=0, log_time=max(self._last_time, 0), name=name, media_type=media_type, data=data
         )
-        self._attachments.append(attachment)
+        self._attachments = [*(item for item in self._attachments if item.name != name), attachment]
         try:
             self._mcap.add_attachment(attachment)
         except OSError as error:

@@ -9,7 +9,7 @@ from typing import Any
 from bags.live_racks import build
 
 from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder
+from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.bags.writer import BagWriter
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
@@ -81,10 +81,17 @@ def busy(rack: Rack, number: int) -> None:
     rack.write("TABLE%", number * 10 - 90, element=number % 3)
 
 
-def record(rack: Rack, bag: Path, steps: Steps | None = None, slices: int = 20, seconds: float = 2.0) -> Path:
+def record(
+    rack: Rack,
+    bag: Path,
+    steps: Steps | None = None,
+    slices: int = 20,
+    seconds: float = 2.0,
+    options: RecordingOptions | None = None,
+) -> Path:
     """Record a run; ``steps`` does something to the rack before each of the slices."""
     stream = RackStream(rack, rack.fingerprint)
-    recorder = Recorder(rack, stream, bag)
+    recorder = Recorder(rack, stream, bag, options)
     stream.begin()
     rack.start()
     for number in range(slices):
@@ -97,12 +104,18 @@ def record(rack: Rack, bag: Path, steps: Steps | None = None, slices: int = 20, 
     return bag
 
 
-def recorded(folder: Path, steps: Steps | None = busy, seconds: float = 2.0, yaml: str = YAML, **tasks: str) -> Path:
+def recorded(
+    folder: Path,
+    steps: Steps | None = busy,
+    seconds: float = 2.0,
+    yaml: str = YAML,
+    options: RecordingOptions | None = None,
+    **tasks: str,
+) -> Path:
     """Record the rack of this module, with some of its sources replaced."""
     folder.mkdir(exist_ok=True)
-    return record(
-        build(folder, yaml, **{"SPEED": SPEED, "WORK": WORK, **tasks}), folder / "bag", steps, seconds=seconds
-    )
+    rack = build(folder, yaml, **{"SPEED": SPEED, "WORK": WORK, **tasks})
+    return record(rack, folder / "bag", steps, seconds=seconds, options=options)
 
 
 def replayed(bag: Path, new: Mapping[str, str] | None = None, **options: Any) -> ReplayReport:

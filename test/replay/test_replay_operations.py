@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 
@@ -34,7 +35,7 @@ OPERATED = {
 }
 
 
-def operated(folder: Path, first, then) -> Path:
+def operated(folder: Path, first, then, **options) -> Path:
     """A recording of 2 s in which a tunable is set at 0.2 s, the rack operated at 0.9 s and once more at 1.2 s."""
 
     def steps(rack: Rack, number: int) -> None:
@@ -44,7 +45,7 @@ def operated(folder: Path, first, then) -> Path:
         if number in (9, 12):
             (first if number == 9 else then)(rack)
 
-    return recorded(folder / "rack", steps)
+    return recorded(folder / "rack", steps, **options)
 
 
 @pytest.mark.parametrize("name", OPERATED)
@@ -78,3 +79,19 @@ def test_what_ran_after_a_reload_with_another_source_is_left_out_and_the_rest_is
     later = replayed(bag, from_ns=10**9)
     assert later.identical
     assert later.tasks[0].scans > 140, "from 1.2 s on the stored source runs again"
+
+
+def test_each_file_of_a_recording_has_the_source_that_ran_when_it_began(tmp_path):
+    options = RecordingOptions(split_ns=500 * 10**6)
+    first, then = (lambda rack: reload(rack, "SPEED", OTHER_SPEED)), (lambda rack: rack.operations.stop("WORK"))
+    bag = operated(tmp_path, first, then, options=options)
+    reports = [replayed(file) for file in sorted(bag.glob("*.mcap"))]
+    assert len(reports) == 4
+    assert all(report.identical for report in reports)
+    assert [any("reloaded" in note for note in report.tasks[0].notes) for report in reports] == [
+        False,
+        True,
+        False,
+        False,
+    ]
+    assert all(report.tasks[0].scans > 70 for report in reports)
