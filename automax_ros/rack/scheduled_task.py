@@ -67,6 +67,7 @@ class ScheduledTask:
         """Return what the task keeps, and when its next scan is due (ns)."""
         task = self.task
         return {
+            "source": task.compiled.program.source_hash,
             "status": task.status.name,
             "scan": task.scan_number,
             "values": task.snapshot(),
@@ -77,8 +78,10 @@ class ScheduledTask:
         """Take over a state; a task that ran goes on with its next scan.
 
         Raises:
-            ValueError: the state does not fit the task.
+            ValueError: the state does not fit the task, or another source ran.
         """
+        if state["source"] != self.task.compiled.program.source_hash:
+            raise ValueError(f"task {self.task.name} had another source: reload it first")
         self.stop()
         self.task.restore(list(state["values"]))
         self.task.status, self.task.scan_number = Status[state["status"]], state["scan"]

@@ -324,6 +324,22 @@ def test_a_state_is_refused_by_a_rack_that_runs_or_has_other_modules(made, tmp_p
         Rack(config).load(rack.state())
 
 
+def test_the_state_of_a_reloaded_task_needs_its_source(made, tmp_path):
+    rack, _ = made
+    source = SourceText("new/FAST.BLK", FAST.replace("COUNT% + 1", "COUNT% + 2"))
+    rack.operations.reload("FAST", source)
+    rack.run(0.02)
+    twin, _ = build(tmp_path)
+    with pytest.raises(ValueError, match="task FAST had another source: reload it first"):
+        twin.load(rack.state())
+    twin, _ = build(tmp_path)
+    twin.operations.reload("FAST", source)
+    twin.load(rack.state())
+    for one in (rack, twin):
+        one.run(0.02)
+    assert twin.state() == rack.state()
+
+
 def test_forcing_status_cannot_be_forced_itself(made):
     rack, _ = made
     with pytest.raises(MemoryValueError, match="shows whether anything is forced"):
