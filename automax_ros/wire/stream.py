@@ -150,6 +150,8 @@ class RackStream:
         ``epoch_ns`` is the wall clock at rack time 0; simulated time has none.
         """
         self._messages.epoch_ns = epoch_ns
+        for task in self._tasks:
+            self._messages.reinstalled(task)
         _send(self._messages.table(), self._tables, self._messages.stamp(self._rack.now_ns))
         self._send_image(self._rack.now_ns)
         self._send_values(self._values, self._rack.now_ns)

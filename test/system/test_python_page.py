@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.S)
-SIMULATED, REAL_TIME, IN_ROS = EXAMPLES
+SIMULATED, OPERATED, REAL_TIME, IN_ROS = EXAMPLES
 
 
 def ran(program: str, domain: int) -> str:
@@ -33,6 +33,11 @@ def ran(program: str, domain: int) -> str:
 
 def test_a_rack_in_simulated_time(ros_domain_id):
     assert int(ran(SIMULATED, ros_domain_id)) > 0
+
+
+def test_a_rack_that_is_operated(ros_domain_id):
+    goes_on = "rack.run(1.0)\nassert rack.state() == twin.state()\nprint(len(rack.tasks), rack.value('SECT_REF%'))"
+    assert ran(f"{SIMULATED}\n{OPERATED}\n{goes_on}", ros_domain_id).split()[2:] == ["1200"]
 
 
 def test_a_rack_in_real_time_without_ros(ros_domain_id):

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import pytest
 from bags.live_racks import SPEED, YAML, build
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import Direction, WriteKind, WriterKind
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType
@@ -335,6 +336,23 @@ def test_state_is_the_tasks_own(started):
     assert sum(state.size) == len(state.value)
     assert dict(zip(state.field, state.value, strict=False))["TRIM%"] == 4
     assert list(state.value) == [float(value) for value in task.snapshot()]
+
+
+def test_task_reloaded_before_the_beginning_is_described_as_it_is(tmp_path):
+    rack = build(tmp_path)
+    stream = RackStream(rack, 77)
+    rack.operations.reload("SPEED", SourceText("SPEED.BLK", SPEED.replace("TRIM%", "SHIM%")))
+    hashes: list[str] = []
+    stream.add_sink(
+        lambda topic: (
+            (lambda _, data: hashes.append(decode(topic.type_name, data).source_hash))
+            if topic is stream.states_topics[1]
+            else None
+        )
+    )
+    stream.begin()
+    rack.start()
+    assert rack.task("SPEED").compiled.program.source_hash in hashes
 
 
 def test_end_sends_final_states(started):
