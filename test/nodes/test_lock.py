@@ -56,5 +56,5 @@ def test_domain(monkeypatch, text, domain):
 @pytest.mark.parametrize("text", ["-1", "233", "x", "1.5", "²", "9" * 5000])
 def test_wrong_domain(monkeypatch, text):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)
-    with pytest.raises(RosUnavailable, match="no number from 0 to 232"):
+    with pytest.raises(RosUnavailable, match="is not a number from 0 to 232"):
         domain_id()

@@ -186,7 +186,8 @@ def test_a_latched_common_in_a_blocks_subscript_is_the_latch():
     assert (task.value("BLOCK%"), task.value("BASIC%")) == (11, 1111)
 
 
-def test_a_held_output_that_nothing_changes_is_not_written():
+def test_a_held_output_is_written_when_the_block_updates_and_not_otherwise():
+    """A LATCH updates while SET or RESET is TRUE, equal values included (decision); END writes only what differs."""
     text = """10 COMMON SET@, FLAG@(2), LIT@
 20 CALL SCAN_LOOP(TICKS=4)
 30 CALL LATCH(SET=SET@, RESET=FALSE, OUTPUT=FLAG@(1))
@@ -202,7 +203,8 @@ def test_a_held_output_that_nothing_changes_is_not_written():
     memory.drain()
     for now in (1, 2, 3):
         task.scan(now)
-    assert [(entry.view, entry.element, entry.value) for entry in memory.drain()] == [(1, 1, True), (2, 0, True)]
+    written = [(entry.view, entry.element, entry.value) for entry in memory.drain()]
+    assert written == [(1, 1, True), (2, 0, True), (1, 1, True), (1, 1, True)]
     memory.write_from_outside(memory.view("LIT@"), False, OTHER)
     memory.write_from_outside(memory.view("SET@"), False, OTHER)
     task.scan(4)

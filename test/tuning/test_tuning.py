@@ -262,7 +262,7 @@ def test_corner_of_thermal_overload():
     assert corner.rad_s == pytest.approx(expected)
     assert found.transfer.mapping == pytest.approx(200.0)
     assert found.transfer.b[0] == pytest.approx(found.coefficients["gain"])
-    assert -found.transfer.a[1] == pytest.approx(found.coefficients["feedback"])
+    assert -found.transfer.a[1] == pytest.approx(1.0 - 2.0 * found.coefficients["gain"])
     beyond = tuning(CATALOGUE["THERMAL_OVERLOAD"], 0.01, {**given, "LIM_BAR": 500.0})
     assert {item.parameter: item.verdict for item in beyond.limits}["LIM_BAR"] is Verdict.ABOVE
     assert beyond.values["LIM_BAR"] == 400.0
