@@ -27,7 +27,7 @@ class OperationRefused(Exception):
 class Operations:
     """Operates one rack. ``stop_reason`` is what stopped all tasks, None while the rack runs.
 
-    ``ran_at_power_off`` are the tasks that AUTO RUN starts again.
+    ``ran_at_power_off`` are the tasks that AUTO RUN starts again; ``battery_good`` is what BATTERYSTATUSn@ show.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Operations:
         self._tasks = {item.task.name: item for module in modules for item in module.tasks}
         self._ticks = {item.task.name: module.config.tick_ns for module in modules for item in module.tasks}
         self.ran_at_power_off: frozenset[str] = frozenset()
-        self.powered = True
+        self.powered = self.battery_good = True
         self.stop_reason: str | None = None
 
     def start(self) -> None:
@@ -167,7 +167,7 @@ class Operations:
         """
         if self.powered:
             self._refuse("power_on", "", "the power is on")
-        self.powered = True
+        self.powered, self.battery_good = True, battery
         self._clear_memory(keep_non_volatile=battery)
         for item in self._tasks.values():
             if not battery:
@@ -186,7 +186,7 @@ class Operations:
         present = {f"BATTERYSTATUS{module.config.slot}@" for module in self._modules if module.config.has_battery}
         for view, spec in enumerate(self._memory.specs):
             if spec.name in present:
-                self._memory.write_from_outside(view, True, PRESET_WRITER)
+                self._memory.write_from_outside(view, self.battery_good, PRESET_WRITER)
 
     def _run_together(self, tasks: Sequence[ScheduledTask], first_ns: Callable[[ScheduledTask], int]) -> None:
         """Put tasks into RUN: first all start-up parts, then scans; a fault among them stops all."""

@@ -44,6 +44,7 @@ class RackState:
     image: tuple[tuple[int, int, Value], ...]
     forced: frozenset[tuple[int, int]]
     powered: bool
+    battery_good: bool
     stop_reason: str | None
     ran_at_power_off: frozenset[str]
     modules: Mapping[int, ModuleState]
@@ -247,6 +248,7 @@ class Rack:
             image=tuple(self.memory.image()),
             forced=self.memory.forced,
             powered=self.operations.powered,
+            battery_good=self.operations.battery_good,
             stop_reason=self.stop_reason,
             ran_at_power_off=self.operations.ran_at_power_off,
             modules={module.config.slot: module.state() for module in self.modules},
@@ -265,7 +267,8 @@ class Rack:
         self.scheduler.run_until(state.now_ns)
         self.memory.load_image(state.image)
         self.memory.hold(state.forced)
-        self.operations.powered, self.operations.stop_reason = state.powered, state.stop_reason
+        self.operations.powered, self.operations.battery_good = state.powered, state.battery_good
+        self.operations.stop_reason = state.stop_reason
         self.operations.ran_at_power_off = state.ran_at_power_off
         for module in self.modules:
             module.load(state.modules[module.config.slot])

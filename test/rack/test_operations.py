@@ -199,6 +199,12 @@ def test_without_a_battery_everything_is_as_at_installation(made):
     fast = rack.task("FAST")
     assert (rack.value("KEPT!"), fast.value("OWN%"), fast.value("GAIN%")) == (0, 0, 2)
     assert rack.task("SLOW").errors.count == 0
+    assert rack.value("BATTERYSTATUS0@") is False
+    rack.operations.stop_all("test")
+    assert rack.value("BATTERYSTATUS0@") is False
+    rack.operations.power_off()
+    rack.operations.power_on()
+    assert rack.value("BATTERYSTATUS0@") is True
 
 
 def test_a_task_is_reloaded_while_the_others_run(made):
