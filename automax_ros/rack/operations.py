@@ -6,6 +6,7 @@ Stimuli, services, commands and lifecycle transitions all call these; observers 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import did_you_mean, quoted
@@ -150,7 +151,6 @@ class Operations:
         running = [name for name, item in self._tasks.items() if item.task.status is Status.RUNNING]
         self.ran_at_power_off = frozenset(running)
         self.powered = False
-        self.stop_tasks()
         for module in self._modules:
             module.power_off()
         self._clear_memory(keep_non_volatile=True)
@@ -216,12 +216,11 @@ class Operations:
         if item is None:
             hint = did_you_mean(name, self._tasks) or f"it has {', '.join(self._tasks)}"
             self._refuse(what, name, f"the rack has no task {quoted(name)}: {hint}")
-            raise AssertionError
         return item
 
     def _tell(self, what: str, task: str = "", *, ok: bool = True, reason: str = "") -> None:
         self._observers.operated(Operation(self._scheduler.now_ns, what, task, ok, reason))
 
-    def _refuse(self, what: str, task: str, reason: str) -> None:
+    def _refuse(self, what: str, task: str, reason: str) -> NoReturn:
         self._tell(what, task, ok=False, reason=reason)
         raise OperationRefused(reason)

@@ -21,7 +21,7 @@ from automax_ros.replay.report import Kind, NamedValue, TaskReport, errors_text
 from automax_ros.replay.state import fitting_state, log_is_empty, state_differences, whole_state
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
-from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.running.task import ScanRecord, Status, Task, snapshot_layout
 from automax_ros.wire.messages import Scan, TaskState
 
 _MOST_NOTES = 20
@@ -58,8 +58,7 @@ class TaskReplay:
         self._task.record_scans()
         self._layout = self._task.layout
         self._layout_hash = self._layout.hash
-        recorded = Task(source.recorded, ScanMemory(commons)) if source.recorded else None
-        self._recorded_layout = recorded.layout if recorded else None
+        self._recorded_layout = snapshot_layout(source.recorded) if source.recorded else None
         self._written_at = source.written_at
         program = (source.recorded or source.compiled).program
         self._period_ns: float = math.inf if program.event is not None else program.period_ns

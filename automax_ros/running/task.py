@@ -204,9 +204,8 @@ class Task:
 
     @property
     def layout(self) -> Layout:
-        """The layout of a snapshot: the state, then the error log."""
-        log = StateField(LOG_FIELD, DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
-        return Layout((*self.compiled.layout.fields, log))
+        """The layout of a snapshot."""
+        return snapshot_layout(self.compiled)
 
     @property
     def state(self) -> StateValues:
@@ -366,6 +365,12 @@ class Task:
     def _too_long(self, error: ScanTooLong) -> None:
         self._io.log(error.line, SCAN_TOO_LONG)
         self.status = Status.FAULTED
+
+
+def snapshot_layout(compiled: CompiledTask) -> Layout:
+    """Return the layout of a task's snapshots: the state, then the error log."""
+    log = StateField(LOG_FIELD, DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
+    return Layout((*compiled.layout.fields, log))
 
 
 def format_print(values: tuple[Value, ...], separators: str) -> str:
