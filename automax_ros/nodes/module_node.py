@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -53,6 +54,13 @@ class Site:
     context: Context
     health: Health
     lock: threading.RLock = field(default_factory=threading.RLock)
+
+    @contextmanager
+    def present(self) -> Iterator[None]:
+        """Enter the rack from outside: between two scans, and what happens is stamped with its own instant."""
+        with self.lock:
+            self.pacer.catch_up()
+            yield
 
 
 class ModuleNode(Node):  # type: ignore[misc]
@@ -122,9 +130,8 @@ class ModuleNode(Node):  # type: ignore[misc]
         """Return an action as a callback: in the rack's present, between two scans, its exceptions reported."""
 
         def entered(*arguments: Any) -> None:
-            with self.site.lock:
+            with self.site.present():
                 try:
-                    self.site.pacer.catch_up()
                     action(*arguments)
                 except Exception as error:
                     self.guard.report(what, error)

@@ -122,8 +122,7 @@ class ProcessorNode(ModuleNode):
         chosen = [(self._tunables[item.name], item.value) for item in parameters if item.name in self._tunables]
         if not chosen:
             return
-        with self.site.lock:
-            self.site.pacer.catch_up()
+        with self.site.present():
             for tunable, value in chosen:
                 self._rack.tune(tunable.task, tunable.variable, value)
 

@@ -15,6 +15,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -65,10 +66,14 @@ class RackNodes:
         self._pacer = Pacer(self.rack.scheduler, wait=self._serve)
         self._context = get_default_context() if context is None else context
         self._site = Site(self.rack, self.stream, self._pacer, self._context, self.health)
-        self.lock = self._site.lock
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._site)
+
+    @property
+    def lock(self) -> AbstractContextManager[None]:
+        """What holds off scans and messages: ``with nodes.lock``. The rack's time is the present then."""
+        return self._site.present()
 
     def add_to(self, executor: Any) -> None:
         """Let an executor of rclpy serve the nodes: any kind, alone or with nodes of your own."""
@@ -83,7 +88,7 @@ class RackNodes:
             settings: those of ``Rack.start``, which raises what it says.
             paced: whether a thread scans from then on; without one, ``run`` does.
         """
-        with self.lock:
+        with self._site.lock:
             self._pacer.begin(START_LEAD_NS)
             self.stream.begin(time.time_ns() + START_LEAD_NS)
             self._begun = True
@@ -111,7 +116,7 @@ class RackNodes:
         self._closed = True
         if self._thread is not None:
             self._thread.join()
-        with self.lock:
+        with self._site.lock:
             self.rack.operations.stop_tasks()
             if self._begun:
                 self.stream.end()
@@ -133,13 +138,16 @@ class RackNodes:
     def _keep_pace(self) -> None:
         try:
             while not self._closed:
-                with self.lock:
+                with self._site.lock:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
             self.nodes[0].guard.report(f"rack {self.rack.config.name} has ended", error)
 
     def _serve(self, seconds: float) -> None:
+        if self._executor is None:  # the nodes' owner serves them elsewhere, or nobody does
+            time.sleep(seconds)
+            return
         self.nodes[0].guard.serve(self._executor, self._context, seconds)
 
 

@@ -57,8 +57,12 @@ class Pacer:
         return self._clock() - self._zero_ns
 
     def catch_up(self) -> None:
-        """Bring the scheduler's time to the present, before something comes from outside; nothing is carried out."""
-        self._scheduler.pass_until(self.now_ns)
+        """Bring the scheduler's time to the present, before something comes from outside; nothing is carried out.
+
+        Before ``begin`` no time passes.
+        """
+        if self._zero_ns is not None:
+            self._scheduler.pass_until(self.now_ns)
 
     def step(self) -> float:
         """Carry out what is due, and return how long (s) the caller may spend before the next call."""
