@@ -390,6 +390,27 @@ def test_restarted_rack_ends_the_recording(wire, tmp_path, messages):
     assert BagReader(tmp_path / "bag").custom_data["ended"] == recording.ended
 
 
+def test_task_put_into_run_again_does_not_end_the_recording(wire, tmp_path):
+    """Scans of this run stand before a write of this run: they count from 0 again since the task alone began again."""
+    wire.run(0.5)
+    wire.rack.operations.stop("WORK")
+    wire.run(0.2)
+    wire.rack.operations.run("WORK")
+    wire.run(0.2)
+    wire.rack.operations.stop_all("test")
+    wire.rack.operations.run_all()
+    wire.run(0.1)
+    wire.rack.operations.reload("WORK", wire.rack.sources["WORK"])
+    wire.run(0.3)
+    recording = recording_of(wire, tmp_path / "bag")
+    sent = wire.end()
+    feed(recording, sent)
+    recording.close()
+    assert (recording.ended, recording.gaps) == (None, [])
+    assert recording.scans == sum(item.topic == "/line1/scans" for item in sent)
+    assert replay(tmp_path / "bag").identical
+
+
 def test_repeated_messages_are_dropped(wire, tmp_path):
     wire.run(0.5)
     recording = recording_of(wire, tmp_path / "bag")

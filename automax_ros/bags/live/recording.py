@@ -75,6 +75,7 @@ class LiveRecording(Recording):
         names = [writer.name for writer in self._facts.writers if writer.kind == WriterKind.TASK]
         self._tasks = {name: TaskTrack() for name in names if tasks is None or name in tasks}
         self._wrong_sources: list[str] = []
+        self._proves = False
         self._recording = False
         self._image: tuple[int, WriteHead, bytes] | None = None
         self._pending: list[tuple[str, int, bytes]] = []
@@ -209,7 +210,7 @@ class LiveRecording(Recording):
         track = self._tasks.get(head.task)
         if track is None:
             return
-        if track.began_anew(head.scan, head.stamp):
+        if track.began_anew(head.scan, head.stamp, proven=self._proves):
             self._end(_RESTARTED)
         if head.scan <= track.last:
             return
@@ -230,7 +231,7 @@ class LiveRecording(Recording):
         track = self._tasks.get(state.task)
         if track is None:
             return
-        if track.began_anew(state.scan, state.stamp):
+        if track.began_anew(state.scan, state.stamp, proven=self._proves):
             self._end(_RESTARTED)
             return
         if track.state < 0:
@@ -259,10 +260,11 @@ class LiveRecording(Recording):
 
     def _prove(self, sent_ns: int) -> None:
         """Record what waits: nothing is missing before this time."""
-        self._proven_ns = sent_ns
+        self._proven_ns, self._proves = sent_ns, True
         pending, self._pending = self._pending, []
         for topic, sent, payload in pending:
             self._record(topic, sent, payload)
+        self._proves = False
 
     def _settle(self, *, at_end: bool = False) -> None:
         """Record what waits though no write proves it, up to a scan that wrote: its write has not come."""

@@ -40,9 +40,15 @@ class TaskTrack:
         """Wait for a full scan and a state."""
         self.state, self.follows, self.ready, self.alone = -1, False, False, False
 
-    def began_anew(self, scan: int, stamp: int) -> bool:
-        """Whether a scan or state of this number and time belongs to a later run of the task."""
-        return scan < self.last and stamp > self.stamp
+    def began_anew(self, scan: int, stamp: int, *, proven: bool = False) -> bool:
+        """Whether a scan or state of this number and time belongs to a later run of the rack.
+
+        Where it is ``proven`` to be of this run, the task alone was put into RUN again, and counts from 0.
+        """
+        anew = scan < self.last and stamp > self.stamp
+        if anew and proven:
+            self.last = -1
+        return anew and not proven
 
     def take_scan(self, scan: int, stamp: int) -> None:
         """Note a scan that is full or follows the last one."""
