@@ -82,6 +82,8 @@ class ScheduledTask:
         """
         if state["source"] != self.task.compiled.program.source_hash:
             raise ValueError(f"task {self.task.name} had another source: reload it first")
+        if state["status"] not in Status.__members__:
+            raise ValueError(f"task {self.task.name} cannot be {state['status']!r}")
         self.stop()
         self.task.restore(list(state["values"]))
         self.task.status, self.task.scan_number = Status[state["status"]], state["scan"]

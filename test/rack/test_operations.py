@@ -351,3 +351,10 @@ def test_forcing_status_cannot_be_forced_itself(made):
     with pytest.raises(MemoryValueError, match="shows whether anything is forced"):
         rack.force("FORCINGSTATUS@", False)
     assert not rack.memory.forced
+
+
+def test_a_state_with_a_status_that_no_task_has_is_refused(made, tmp_path):
+    state = made[0].scheduled[0].state()
+    rack, _ = build(tmp_path)
+    with pytest.raises(ValueError, match="FAST cannot be 'ASLEEP'"):
+        rack.scheduled[0].load({**state, "status": "ASLEEP"})
