@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from automax_ros.core.kinds import Direction
-from automax_ros.core.names import Element, element
+from automax_ros.core.names import Element, NameFault, element
 from automax_ros.core.settings import setting as core_setting
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.names import PREDEFINED
 
 CommonElement = Element[CommonVariable]
 """A simple common variable, or one element of an array."""
@@ -21,9 +22,11 @@ def setting(config: RackConfig, text: str) -> tuple[str, Value]:
     """Return the name and value of ``NAME=VALUE``; the name may be that of an array's element.
 
     Raises:
-        Fault: not of that form, no such common, or the value does not fit.
+        Fault: not of that form, no such common, the value does not fit, or the rack itself writes that common (2.4.6).
     """
     meant, value = core_setting(text, _by_name(config), _ABSENT)
+    if meant.name in PREDEFINED:
+        raise NameFault(f"{meant.name} cannot be set: the rack itself writes it", "leave it out")
     return meant.label, value
 
 

@@ -82,6 +82,14 @@ def test_an_element_can_be_set(config):
         setting(config, "GRID%=3")
 
 
+@pytest.mark.parametrize("name", ["FORCINGSTATUS@", "BATTERYSTATUS0@", "AUTORUNSTATUS@"])
+def test_what_the_rack_itself_writes_cannot_be_set(tmp_path, name):
+    """2.4.6."""
+    config = good(tmp_path, f"{HEAD}common:\n  {name}:\n")
+    with pytest.raises(NameFault, match="the rack itself writes it"):
+        setting(config, f"{name.lower()}=1")
+
+
 def test_lone_surrogates_are_no_text(config):
     with pytest.raises(Fault, match=r"not a value for NOTE\$"):
         setting(config, "NOTE$=\udcff")
