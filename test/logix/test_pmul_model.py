@@ -121,7 +121,7 @@ def test_against_an_independent_model(rows):
     for *inputs, what in rows:
         if what == "prescan":
             tag.prescan()
-            model.began, model.initialized, model.out = False, False, 0.0
+            model.began, model.initialized, model.out, model.status = False, False, 0.0, 0
         tag.EnableIn = what != "disabled"
         tag.In, tag.Initialize, tag.InitialValue, tag.Mode, tag.WordSize, tag.Multiplier = inputs
         tag.scan()
