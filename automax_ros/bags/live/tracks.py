@@ -45,10 +45,10 @@ class TaskTrack:
 
         Where it is ``proven`` to be of this run, the task alone was put into RUN again, and counts from 0.
         """
-        anew = scan < self.last and stamp > self.stamp
-        if anew and proven:
+        again = scan < self.last and stamp > self.stamp
+        if again and proven:
             self.last = -1
-        return anew and not proven
+        return again and not proven
 
     def take_scan(self, scan: int, stamp: int) -> None:
         """Note a scan that is full or follows the last one."""
