@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,13 @@ MAX_SLOT = 15
 """Highest slot of the largest rack (J2-3106-1 p. 10-2)."""
 DEFAULT_OUT_LIMIT = 200
 """How many simple commons, from the top of the file, are published without `ros` (decision)."""
+
+
+class Timing(enum.Enum):
+    """How long scans take: no time at all, or the manual's time for their Processor (53)."""
+
+    IDEAL = "ideal"
+    MODELED = "modeled"
 
 
 @dataclass(frozen=True)
@@ -99,6 +107,7 @@ class RackConfig:
     operator: bool
     modules: tuple[ModuleConfig, ...]
     variables: tuple[CommonVariable, ...]
+    execution: Timing = Timing.IDEAL
 
     @property
     def declared(self) -> tuple[CommonVariable, ...]:

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
+from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
-from automax_ros.rack.config import RackConfig
+from automax_ros.language.program import Program
+from automax_ros.rack.config import RackConfig, Timing
+from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of
 
 Finding = tuple[SourceText, list[Diagnostic]]
@@ -46,7 +49,7 @@ class Installation:
             self.sources[task.name] = source
             if result.diagnostics:
                 self.warnings.append((source, result.diagnostics))
-            self._compiled[task.name] = compile_program(result.program, self._views)
+            self._compiled[task.name] = self._compile(task.name, result.program)
 
     def compiled(self, task: str) -> CompiledTask:
         """Return a task of the rack's file."""
@@ -58,8 +61,14 @@ class Installation:
         Raises:
             RackError: the source has errors.
         """
-        module = next(module for module, item in self._config.placed_tasks if item.name == task)
-        result = check_source(source, task, module.tick_ns, commons_of(self._config))
+        result = check_source(source, task, self._module(task).tick_ns, commons_of(self._config))
         if result.program is None or has_errors(result.diagnostics):
             raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
-        return compile_program(result.program, self._views)
+        return self._compile(task, result.program)
+
+    def _compile(self, task: str, program: Program) -> CompiledTask:
+        modeled = self._config.execution is Timing.MODELED
+        return compile_program(program, self._views, CostModel(self._module(task).times if modeled else Model.NONE))
+
+    def _module(self, task: str) -> ModuleConfig:
+        return next(module for module, item in self._config.placed_tasks if item.name == task)

@@ -10,7 +10,7 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Node, read_yaml
 from automax_ros.rack.commons import CommonReader
-from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.config import CommonVariable, RackConfig, Timing
 from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
@@ -23,7 +23,7 @@ from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.views import bank_variables
 
 _START = Span(1, 1, 2)
-_KEYS = ("rack", "operator", "slots", "common")
+_KEYS = ("rack", "operator", "execution", "slots", "common")
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,7 @@ class _RackReader:
         section.require(("rack", "slots"), "the rack file", _START, self._findings)
         name = self._name(section.get("rack"))
         operator = self._operator(section.get("operator"))
+        execution = self._execution(section.get("execution"))
         modules = self._modules(section)
         common = section.get("common")
         variables = CommonReader(modules, self._findings).read(common) if common is not None else ()
@@ -109,6 +110,7 @@ class _RackReader:
             operator=operator,
             modules=modules,
             variables=(*variables, *bank_variables(modules)),
+            execution=execution,
         )
 
     def _name(self, node: Node | None) -> str | None:
@@ -128,6 +130,16 @@ class _RackReader:
 
     def _operator(self, node: Node | None) -> bool:
         return bool(node is not None and boolean_value(node, "operator", self._findings))
+
+    def _execution(self, node: Node | None) -> Timing:
+        text = text_value(node, "execution", self._findings, limit=100) if node is not None else None
+        for timing in Timing:
+            if text == timing.value:
+                return timing
+        if node is not None and text is not None:
+            hint = "write ideal (a scan takes no time) or modeled (it takes the manual's time)"
+            self._findings.add("AMX6430", f"{quoted(text)} is not a way of execution", node.span, hint)
+        return Timing.IDEAL
 
     def _modules(self, section: Section) -> tuple[ModuleConfig, ...]:
         node = section.get("slots")

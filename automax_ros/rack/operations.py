@@ -6,6 +6,7 @@ Stimuli, services, commands and lifecycle transitions all call these; observers 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NoReturn
 
 from automax_ros.core.diagnostics import SourceText
@@ -16,6 +17,7 @@ from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.observers import Observers, Operation
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.writers import PRESET_WRITER
+from automax_ros.running.events import Events
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import Status
@@ -25,8 +27,18 @@ class OperationRefused(Exception):
     """An operation cannot be carried out now; the text says why and what to do."""
 
 
+@dataclass(frozen=True)
+class StopCause:
+    """What stopped all tasks: ``code`` is the hardware's, None where none is known, ``task`` who caused it, or ""."""
+
+    time_ns: int
+    reason: str
+    code: str | None = None
+    task: str = ""
+
+
 class Operations:
-    """Operates one rack. ``stop_reason`` is what stopped all tasks, None while the rack runs.
+    """Operates one rack. ``stopped`` is what stopped all tasks, None while the rack runs.
 
     ``ran_at_power_off`` are the tasks that AUTO RUN starts again; ``battery_good`` is what BATTERYSTATUSn@ show.
     """
@@ -38,16 +50,23 @@ class Operations:
         installation: Installation,
         memory: CommonMemory,
         scheduler: Scheduler,
+        events: Events,
         observers: Observers,
     ) -> None:
         """Take the parts of a rack that is built and not yet started."""
+        self._events = events
         self._config, self._modules, self._installation = config, modules, installation
         self._memory, self._scheduler, self._observers = memory, scheduler, observers
         self._tasks = {item.task.name: item for module in modules for item in module.tasks}
         self._ticks = {item.task.name: module.config.tick_ns for module in modules for item in module.tasks}
         self.ran_at_power_off: frozenset[str] = frozenset()
         self.powered = self.battery_good = True
-        self.stop_reason: str | None = None
+        self.stopped: StopCause | None = None
+
+    @property
+    def stop_reason(self) -> str | None:
+        """Why all tasks were stopped, None while the rack runs."""
+        return None if self.stopped is None else self.stopped.reason
 
     def start(self) -> None:
         """Begin what modules do by themselves, and put all tasks into RUN with their first scan at this instant."""
@@ -96,15 +115,19 @@ class Operations:
         for item in self._tasks.values():
             item.stop()
 
-    def stop_all(self, reason: str) -> None:
+    def stop_all(self, reason: str, code: str | None = None, task: str = "") -> None:
         """Stop all tasks of the rack, by command or because of a fault (2.4.5).
 
         Volatile commons and outputs become 0; inputs, forced and non-volatile variables, locals and error logs stay.
+        ``code`` is the hardware's for the fault, ``task`` the one that caused it.
         """
-        self.stop_reason = reason
+        self.stopped = StopCause(self._scheduler.now_ns, reason, code, task)
         self.stop_tasks()
+        self._events.clear()
         self._clear_memory(keep_non_volatile=True)
-        self._tell("stop_all", reason=reason)
+        for module in self._modules:
+            module.stopped_all()
+        self._tell("stop_all", task, reason=reason)
 
     def clear_errors(self, name: str | None = None) -> None:
         """Clear the error log of a task or of all; a faulted task is a stopped one then, and can be put into RUN.
@@ -153,6 +176,7 @@ class Operations:
         self.powered = False
         for module in self._modules:
             module.power_off()
+        self._events.clear()
         self._clear_memory(keep_non_volatile=True)
         self._tell("power_off")
 
@@ -191,9 +215,9 @@ class Operations:
     def _run_together(self, tasks: Sequence[ScheduledTask], first_ns: Callable[[ScheduledTask], int]) -> None:
         """Put tasks into RUN: first all start-up parts, then scans; a fault among them stops all."""
         if tasks:
-            self.stop_reason = None
+            self.stopped = None
         for item in tasks:
-            if self.stop_reason is None:
+            if self.stopped is None:
                 item.start_up()
         for item in tasks:
             item.scan_from(first_ns(item))

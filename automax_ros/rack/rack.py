@@ -12,40 +12,47 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.config import RackConfig
+from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.installation import Finding, Installation
 from automax_ros.rack.modules.kind import Module, ModuleState, Parts
 from automax_ros.rack.observers import Observers, RackObserver
-from automax_ros.rack.operations import Operations
+from automax_ros.rack.operations import Operations, StopCause
 from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
 from automax_ros.rack.settings import common_named
 from automax_ros.rack.task_config import TaskConfig
+from automax_ros.rack.triggers import MakeTrigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
+from automax_ros.running.events import Events
+from automax_ros.running.execution import IDEAL, Execution
 from automax_ros.running.memory import FORCING, CommonMemory
+from automax_ros.running.processor_time import ProcessorTime
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
-from automax_ros.running.views import MemoryValueError
+from automax_ros.running.views import Memory, MemoryValueError
 
 
 @dataclass(frozen=True)
 class RackState:
     """All that the future of a rack depends on, apart from its configuration and sources.
 
-    ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``modules`` by slot.
+    ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``events`` those that are kept
+    for the next who waits, ``modules`` by slot.
     """
 
     now_ns: int
     image: tuple[tuple[int, int, Value], ...]
     forced: frozenset[tuple[int, int]]
+    events: tuple[str, ...]
     powered: bool
     battery_good: bool
-    stop_reason: str | None
+    stopped: StopCause | None
     ran_at_power_off: frozenset[str]
     modules: Mapping[int, ModuleState]
 
@@ -69,10 +76,11 @@ class Rack:
         self._installation = Installation(config)
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
-        parts = Parts(self.memory, self.scheduler, self.backplane, self._install)
+        self.events = Events()
+        parts = Parts(self.memory, self.scheduler, self.backplane, self.events, self._install, self._execution)
         self.modules: list[Module] = [module.build(parts) for module in config.modules]
         self.operations = Operations(
-            config, self.modules, self._installation, self.memory, self.scheduler, self.observers
+            config, self.modules, self._installation, self.memory, self.scheduler, self.events, self.observers
         )
 
     @property
@@ -247,9 +255,10 @@ class Rack:
             now_ns=self.now_ns,
             image=tuple(self.memory.image()),
             forced=self.memory.forced,
+            events=self.events.pending,
             powered=self.operations.powered,
             battery_good=self.operations.battery_good,
-            stop_reason=self.stop_reason,
+            stopped=self.operations.stopped,
             ran_at_power_off=self.operations.ran_at_power_off,
             modules={module.config.slot: module.state() for module in self.modules},
         )
@@ -268,29 +277,48 @@ class Rack:
         self.memory.load_image(state.image)
         self.memory.hold(state.forced)
         self.operations.powered, self.operations.battery_good = state.powered, state.battery_good
-        self.operations.stop_reason = state.stop_reason
+        self.operations.stopped = state.stopped
         self.operations.ran_at_power_off = state.ran_at_power_off
         for module in self.modules:
             module.load(state.modules[module.config.slot])
+        self.events.load(state.events)
 
-    def _install(self, item: TaskConfig) -> ScheduledTask:
-        task = Task(
-            self._installation.compiled(item.name),
-            self.memory,
-            writer=self._ids[item.name],
-            slot=self._slots[item.name],
-            priority=item.priority,
+    def _execution(self, module: str) -> Execution:
+        return ProcessorTime(self.scheduler, module) if self.config.execution is Timing.MODELED else IDEAL
+
+    def _install(
+        self,
+        task: TaskConfig,
+        execution: Execution,
+        *,
+        memory: Memory | None = None,
+        trigger: MakeTrigger | None = None,
+    ) -> ScheduledTask:
+        installed = Task(
+            self._installation.compiled(task.name),
+            memory or self.memory,
+            writer=self._ids[task.name],
+            slot=self._slots[task.name],
+            priority=task.priority,
             backplane=self.backplane,
         )
-        source = self._installation.sources[item.name]
-        return ScheduledTask(task, source, self.scheduler, self._after, self._stopwatch)
+        return ScheduledTask(
+            installed,
+            self._installation.sources[task.name],
+            scheduler=self.scheduler,
+            trigger=trigger or partial(usual_trigger, events=self.events, scheduler=self.scheduler),
+            execution=execution,
+            after=self._after,
+            stopwatch=self._stopwatch,
+        )
 
     def _after(self, task: Task, record: ScanRecord | None) -> None:
         if record is not None:
             self.observers.scanned(task, record)
         if task.status is Status.FAULTED:
             last = task.errors.last
-            self.operations.stop_all(f"task {task.name}: {last.describe() if last else 'fault'}")
+            reason = f"task {task.name}: {last.describe() if last else 'fault'}"
+            self.operations.stop_all(reason, last.hardware if last else None, task.name)
 
 
 def scans_per_second(rack: Rack) -> float:

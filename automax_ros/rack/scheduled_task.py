@@ -1,4 +1,4 @@
-"""A task of a running rack with the one event that the scheduler keeps for its scans."""
+"""A task of a running rack: what makes it scan, what executes it, and its statistics."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
+from automax_ros.rack.triggers import Due, MakeTrigger
+from automax_ros.running.execution import Execution, Ideal, Steps
+from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
 
 After = Callable[[Task, ScanRecord | None], None]
@@ -27,17 +29,38 @@ class TaskStatistics:
 
 
 class ScheduledTask:
-    """Puts a task into RUN and STOP, any number of times: between the two there is one event, never more."""
+    """Puts a task into RUN and STOP, any number of times: between the two its trigger says when a scan is due."""
 
     def __init__(
-        self, task: Task, source: SourceText, scheduler: Scheduler, after: After, stopwatch: Callable[[], int] | None
+        self,
+        task: Task,
+        source: SourceText,
+        *,
+        scheduler: Scheduler,
+        trigger: MakeTrigger,
+        execution: Execution,
+        after: After,
+        stopwatch: Callable[[], int] | None = None,
     ) -> None:
         """Take an installed task; nothing is scheduled yet."""
         self.task = task
         self.source = source
         self.statistics = TaskStatistics()
-        self._scheduler, self._after, self._stopwatch = scheduler, after, stopwatch
-        self._event: ScheduledEvent | None = None
+        self._scheduler, self._execution = scheduler, execution
+        self._after, self._stopwatch = after, stopwatch
+        self._make_trigger = trigger
+        self.trigger = trigger(task)
+        self.due: Due = self.whole if isinstance(execution, Ideal) else self._begin
+
+    @property
+    def name(self) -> str:
+        """The task's name."""
+        return self.task.name
+
+    @property
+    def priority(self) -> int:
+        """The task's priority: 4 (first) to 11."""
+        return self.task.priority
 
     def start_up(self) -> None:
         """Execute what stands before SCAN_LOOP, at the present; no scan is scheduled yet."""
@@ -46,21 +69,22 @@ class ScheduledTask:
         self._after(self.task, record)
 
     def scan_from(self, first_ns: int) -> None:
-        """Scan at ``first_ns`` and each period after it, if the task is in RUN."""
-        self._cancel()
+        """Scan whenever it is due from ``first_ns`` on, if the task is in RUN."""
+        self.trigger.disarm()
         if self.task.status is Status.RUNNING:
-            key = EventKey(EventClass.SCAN, self.task.priority, self.task.name)
-            self._event = self._scheduler.every(self.task.period_ns, first_ns, key, self._scan)
+            self.trigger.arm(first_ns, self.due)
 
     def stop(self) -> None:
-        """Stop the task: no scan happens until it is put into RUN again."""
-        self._cancel()
+        """Stop the task: no scan happens until it is put into RUN again; one under way is given up."""
+        self.trigger.disarm()
+        self._execution.drop(self)
         self.task.stop()
 
     def install(self, compiled: CompiledTask, source: SourceText) -> None:
         """Replace what the task executes; its state is as at installation, and it is stopped."""
         self.stop()
         self.task.install(compiled)
+        self.trigger = self._make_trigger(self.task)
         self.source = source
 
     def state(self) -> dict[str, Any]:
@@ -71,7 +95,7 @@ class ScheduledTask:
             "status": task.status.name,
             "scan": task.scan_number,
             "values": task.snapshot(),
-            "next_ns": self._scheduler.due_ns(self._event) if self._event is not None else None,
+            "next_ns": self.trigger.next_ns,
         }
 
     def load(self, state: Mapping[str, Any]) -> None:
@@ -90,12 +114,8 @@ class ScheduledTask:
         if state["next_ns"] is not None:
             self.scan_from(state["next_ns"])
 
-    def _cancel(self) -> None:
-        if self._event is not None:
-            self._event.cancel()
-            self._event = None
-
-    def _scan(self, now_ns: int, skipped: int) -> None:
+    def whole(self, now_ns: int, skipped: int) -> None:
+        """Execute a scan at one instant."""
         task, statistics, stopwatch = self.task, self.statistics, self._stopwatch
         if task.status is not Status.RUNNING:
             return
@@ -111,3 +131,24 @@ class ScheduledTask:
             if record is not None:
                 record.duration_ns = taken
         self._after(task, record)
+
+    def steps(self, now_ns: int, skipped: int) -> Steps:
+        """Return a scan in steps."""
+        self.statistics.skipped += skipped
+        return self.task.scan_modeled(now_ns, skipped)
+
+    def done(self, record: ScanRecord | None) -> None:
+        """Tell of a scan whose last step was made."""
+        self.statistics.scans += 1
+        self._after(self.task, record)
+
+    def _begin(self, now_ns: int, skipped: int) -> None:
+        """Let a scan be executed, unless the last one is still under way: that is an overlap (J2-3106-1 p. C-1)."""
+        if self.task.status is not Status.RUNNING:
+            return
+        if self._execution.busy(self):
+            self._execution.drop(self)
+            self.task.overlap()
+            self._after(self.task, None)
+        else:
+            self._execution.begin(self, now_ns, skipped)

@@ -20,11 +20,17 @@ class LogEntry:
         """The problem's code, such as AMX7001."""
         return f"AMX{self.code:04d}"
 
+    @property
+    def hardware(self) -> str | None:
+        """The hardware's code, where one is known."""
+        problem = PROBLEMS.get(self.problem)
+        return problem.hardware or None if problem else None
+
     def describe(self) -> str:
         """Return the entry as a person reads it."""
         problem = PROBLEMS.get(self.problem)
         title = problem.title if problem else "unknown problem"
-        hardware = f" (code {problem.hardware} on the rack)" if problem and problem.hardware else ""
+        hardware = f" (code {self.hardware} on the rack)" if self.hardware else ""
         return f"scan {self.scan}, line {self.line}: {self.problem} {title}{hardware}"
 
 

@@ -19,13 +19,17 @@ PeriodicAction = Callable[[int, int], None]
 
 
 class EventClass(enum.IntEnum):
-    """What comes first at one instant: writes from outside, start of tasks, I/O, scans, observers."""
+    """What comes first at one instant: writes from outside, start of tasks, I/O, execution, scans, observers.
+
+    EXECUTE is what a Processor goes on with in modeled time; a scan that ends when the next is due has ended.
+    """
 
     OUTSIDE = 0
     START = 1
     IO = 2
-    SCAN = 3
-    OBSERVE = 4
+    EXECUTE = 3
+    SCAN = 4
+    OBSERVE = 5
 
 
 @dataclass(frozen=True, order=True)
@@ -63,6 +67,7 @@ class Scheduler:
         self.now_ns = start_ns
         self._queue: list[_Queued] = []
         self._serial = 0
+        self._end_ns = start_ns
 
     def at(self, time_ns: int, key: EventKey, action: Action) -> ScheduledEvent:
         """Post an event that happens once.
@@ -94,9 +99,23 @@ class Scheduler:
         found = (entry[0] for entry in self._queue if entry[5] is event)
         return None if event.cancelled else next(found, None)
 
+    def advance_to(self, time_ns: int, key: EventKey) -> bool:
+        """Let it be ``time_ns`` if no event comes before one of that instant and key, and simulated time goes so far.
+
+        For an action that goes on at a later instant: quicker than an event of its own.
+        """
+        if time_ns >= self._end_ns:
+            return False
+        queue = self._queue
+        if queue and queue[0][:4] <= (time_ns, key.event_class, key.priority, key.name):
+            return False
+        self.now_ns = time_ns
+        return True
+
     def run_until(self, end_ns: int) -> None:
         """Let simulated time pass: every event before ``end_ns`` happens at its instant, then it is ``end_ns``."""
         queue = self._queue
+        self._end_ns = end_ns
         while queue and queue[0][0] < end_ns:
             instant, event = queue[0][0], queue[0][5]
             if event.cancelled:

@@ -21,6 +21,7 @@ from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog, LogE
 from automax_ros.running.views import Memory
 
 SCAN_TOO_LONG = 7040
+OVERLAP = 7070
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
 PRINT_ZONE = 14
@@ -288,6 +289,11 @@ class Task:
         """Stop the task; its locals keep their values."""
         if self.status is Status.RUNNING:
             self.status = Status.STOPPED
+
+    def overlap(self) -> None:
+        """Fault the task: a scan was still under way when the next one was due (code 14, J2-3106-1 p. C-1)."""
+        self.errors.add(LogEntry(self.compiled.program.scan_loop_line, OVERLAP, self.scan_number))
+        self.status = Status.FAULTED
 
     def snapshot(self) -> list[Value]:
         """Return the task's state as flat values, in the order of ``layout``."""

@@ -238,7 +238,7 @@ def test_a_faulted_task_runs_again_after_its_log_is_cleared(tmp_path):
     rack.run(0.02)
     assert rack.stop_reason is not None
     assert rack.task("SLOW").status is Status.FAULTED
-    assert ("stop_all", "", True) in notes.operations
+    assert ("stop_all", "SLOW", True) in notes.operations
     rack.operations.clear_errors("SLOW")
     assert (rack.task("SLOW").status, rack.task("SLOW").errors.count) == (Status.STOPPED, 0)
     rack.operations.run("OTHER")

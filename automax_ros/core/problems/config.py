@@ -50,6 +50,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6407", "direction on ROS 2"),
     Problem("AMX6408", "rate limit"),
     Problem("AMX6409", "common variables do not fit into the rack"),
+    Problem("AMX6430", "not a way of execution"),
     Problem("AMX6410", "pre-defined common variable"),
     Problem("AMX6411", "name in lower case", Severity.WARNING),
     Problem("AMX6412", "commons without a topic", Severity.WARNING),

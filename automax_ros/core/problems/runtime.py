@@ -24,5 +24,6 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX7032", "DATA value of another kind than the variable"),
     Problem("AMX7031", "bus error", hardware="31"),
     Problem("AMX7040", "scan stopped: too many statements", hardware="14"),
+    Problem("AMX7070", "overlap: the last scan was still under way", hardware="14"),
     Problem("AMX7042", "deadline missed on the wall clock"),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from automax_ros.compile.cost import Model
 from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule, Module, Parts, QuietModule, Registers
 from automax_ros.rack.task_config import TaskConfig
 
@@ -21,6 +22,7 @@ class CommonMemoryConfig:
     line: int = 0
 
     tick_ns = 0
+    times = Model.NONE
     has_battery = True
     registers: Registers = NO_REGISTERS
 

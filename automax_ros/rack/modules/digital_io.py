@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from automax_ros.compile.cost import Model
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, QuietModule, Registers
 from automax_ros.rack.task_config import TaskConfig
 
@@ -28,6 +29,7 @@ class DigitalIoConfig:
     line: int = 0
 
     tick_ns = 0
+    times = Model.NONE
     has_battery = False
     common_registers = 0
 

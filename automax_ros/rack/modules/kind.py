@@ -9,15 +9,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from automax_ros.compile.cost import Model
 from automax_ros.core.diagnostics import Span
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.sections import Section
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.tasks import TaskReader
+from automax_ros.rack.triggers import MakeTrigger
 from automax_ros.running.backplane import Backplane
+from automax_ros.running.events import Events
+from automax_ros.running.execution import Execution
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import Scheduler
+from automax_ros.running.views import Memory
 
 ModuleState = Mapping[str, Any]
 """What a module keeps next to common memory, as numbers, texts, lists and mappings: ``{}`` where that is nothing."""
@@ -67,6 +72,11 @@ class ModuleConfig(Protocol):
 
     @property
     def has_battery(self) -> bool: ...  # noqa: D102
+
+    @property
+    def times(self) -> Model:
+        """Whose execution times its tasks have, Model.NONE for a module without tasks."""
+        ...
 
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""
@@ -136,14 +146,37 @@ class ModuleKind(Protocol):
         ...
 
 
+class Install(Protocol):
+    """Makes a task of a module's configuration."""
+
+    def __call__(
+        self,
+        task: TaskConfig,
+        execution: Execution,
+        *,
+        memory: Memory | None = None,
+        trigger: MakeTrigger | None = None,
+    ) -> ScheduledTask:
+        """Return the task, installed; it works on the rack's ``memory`` unless it has another.
+
+        Without ``trigger`` its scans begin by the clock, or by the event that SCAN_LOOP names.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Parts:
-    """What a rack gives to its modules; ``install`` makes a task of a module's configuration."""
+    """What a rack gives to its modules.
+
+    ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them.
+    """
 
     memory: CommonMemory
     scheduler: Scheduler
     backplane: Backplane
-    install: Callable[[TaskConfig], ScheduledTask]
+    events: Events
+    install: Install
+    execution: Callable[[str], Execution]
 
 
 class Module(Protocol):
@@ -166,6 +199,10 @@ class Module(Protocol):
 
     def power_off(self) -> None:
         """End all that it does by itself."""
+        ...
+
+    def stopped_all(self) -> None:
+        """Follow a STOP ALL: its tasks are stopped, and common memory is cleared but for what it ``kept``."""
         ...
 
     def state(self) -> ModuleState:
@@ -194,6 +231,9 @@ class QuietModule:
 
     def power_off(self) -> None:
         """Nothing ends."""
+
+    def stopped_all(self) -> None:
+        """Nothing follows."""
 
     def state(self) -> ModuleState:
         """Return nothing: its registers are in common memory."""

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from automax_ros.compile.cost import Model
 from automax_ros.core.ticks import DEFAULT_TICK_NS, tick_ns
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
@@ -42,10 +43,16 @@ class ProcessorConfig:
         """The module's name in the rack, as that of its node."""
         return f"processor_{self.slot}"
 
+    @property
+    def times(self) -> Model:
+        """Whose execution times its tasks have."""
+        return Model(self.model)
+
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""
         in_order = sorted(self.tasks, key=lambda item: (item.priority, item.name))
-        return ProcessorModule(self, [parts.install(item) for item in in_order])
+        execution = parts.execution(self.name)
+        return ProcessorModule(self, [parts.install(item, execution) for item in in_order])
 
 
 @dataclass
@@ -63,6 +70,9 @@ class ProcessorModule:
         """Stop the tasks; locals, tunables and error logs stay (2.4.5)."""
         for task in self.tasks:
             task.stop()
+
+    def stopped_all(self) -> None:
+        """Nothing follows: locals, tunables and error logs stay (2.4.5)."""
 
     def state(self) -> ModuleState:
         """Return the state of each task."""
