@@ -25,8 +25,8 @@ SOURCE = TOOLS.parent / "msg_defs"
 PREFIX = Path(sys.prefix)
 STAMP = PREFIX / "share" / NAME / "build.json"
 # Interface packages whose types ours use; CMakeLists.txt names the same.
-DEPENDENCIES = ("builtin_interfaces",)
-RUN_DEPENDENCIES = ("builtin_interfaces", "rosidl_default_runtime")
+DEPENDENCIES = ("builtin_interfaces", "service_msgs")
+RUN_DEPENDENCIES = ("builtin_interfaces", "rosidl_default_runtime", "service_msgs")
 
 
 def main() -> int:
@@ -53,7 +53,7 @@ def source_fingerprint() -> str:
         BuildError: no generators are installed here.
     """
     digest = hashlib.sha256()
-    definitions = [SOURCE / "package.xml", *SOURCE.glob("msg/*.msg")]
+    definitions = [SOURCE / "package.xml", *SOURCE.glob("msg/*.msg"), *SOURCE.glob("srv/*.srv")]
     tools = [TOOLS / name for name in ("build_messages.py", "message_code.py", "message_libraries.py")]
     for path in sorted([*definitions, *tools]):
         content = path.read_bytes()
@@ -102,7 +102,9 @@ def install(package: Interfaces) -> list[str]:
 def replace_folder(source: Path, target: Path) -> list[Path]:
     """Copy the files that matter at run time to `target`, and nothing else stays there."""
     wanted = [
-        path for path in sorted(source.rglob("*")) if path.suffix in {".py", ".so", ".msg", ".idl", ".json", ".xml"}
+        path
+        for path in sorted(source.rglob("*"))
+        if path.suffix in {".py", ".so", ".msg", ".srv", ".idl", ".json", ".xml"}
     ]
     shutil.rmtree(target, ignore_errors=True)
     return [replace_file(path, target / path.relative_to(source)) for path in wanted]
@@ -119,7 +121,8 @@ def replace_file(source: Path, target: Path) -> Path:
 
 def write_index(package: Interfaces) -> list[Path]:
     """The entries of the ament index by which ROS 2 programs find the package and its interfaces."""
-    interfaces = [f"msg/{message.stem}.{kind}" for message in package.messages for kind in ("idl", "json", "msg")]
+    stems = [(path.parent.name, path.stem) for path in package.definitions]
+    interfaces = [f"{kind}/{stem}.{suffix}" for kind, stem in stems for suffix in ("idl", "json", kind)]
     entries = {
         "packages": "",
         "rosidl_interfaces": "\n".join(interfaces),

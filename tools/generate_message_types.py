@@ -14,6 +14,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "automax_ros" / "wire" / "message_types.json"
 OWN = "automax_msgs"
+# Parts of services' answers; no recording holds them.
+SERVED = frozenset({"LoggedError", "TaskInfo"})
 STANDARD = (
     "builtin_interfaces/msg/Time",
     "rosgraph_msgs/msg/Clock",
@@ -49,9 +51,8 @@ def definition_texts() -> dict[str, str]:
     Raises:
         FileNotFoundError: a standard definition is not installed.
     """
-    texts = {
-        f"{OWN}/msg/{path.stem}": path.read_text(encoding="utf-8") for path in (ROOT / "msg_defs" / "msg").glob("*.msg")
-    }
+    own = [path for path in (ROOT / "msg_defs" / "msg").glob("*.msg") if path.stem not in SERVED]
+    texts = {f"{OWN}/msg/{path.stem}": path.read_text(encoding="utf-8") for path in own}
     for name in STANDARD:
         path = installed_file(name, ".msg")
         if path is None:

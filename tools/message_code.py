@@ -15,6 +15,8 @@ from pathlib import Path
 # rclpy loads the C type support, which finds the one of its middleware by name at run time.
 TYPE_SUPPORTS = ["rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"]
 PYTHON_TYPE_SUPPORT = "rosidl_typesupport_c"
+# Folder and suffix of each kind of interface.
+KINDS = ("msg", "srv")
 
 
 @dataclass(frozen=True)
@@ -22,15 +24,15 @@ class Interfaces:
     """One interface package: its sources, where its code goes, and the prefix that holds ROS 2."""
 
     name: str
-    folder: Path  # holds package.xml and msg/
+    folder: Path  # holds package.xml, msg/ and srv/
     output: Path
     prefix: Path
     dependencies: tuple[str, ...]  # interface packages whose types it uses
 
     @property
-    def messages(self) -> list[Path]:
-        """The .msg files, absolute, sorted by name."""
-        return sorted(self.folder.resolve().glob("msg/*.msg"))
+    def definitions(self) -> list[Path]:
+        """The .msg and .srv files, absolute, sorted by kind and name."""
+        return sorted(path for kind in KINDS for path in self.folder.resolve().glob(f"{kind}/*.{kind}"))
 
     @property
     def share(self) -> Path:
@@ -52,16 +54,17 @@ def generate(package: Interfaces) -> None:
 
 
 def _write_share(package: Interfaces) -> None:
-    """The .msg files, their .idl form and the .json type descriptions, from which the hashes of all generators come."""
+    """The definitions, their .idl form, and the .json type descriptions, of which the hashes are made."""
     from rosidl_adapter import convert_to_idl
     from rosidl_generator_type_description import generate_type_hash
 
-    target = package.share / "msg"
-    target.mkdir(parents=True)
-    for message in package.messages:
-        (target / message.name).write_bytes(message.read_bytes())
+    for definition in package.definitions:
+        kind = definition.parent.name
+        target = package.share / kind
+        target.mkdir(parents=True, exist_ok=True)
+        (target / definition.name).write_bytes(definition.read_bytes())
         with contextlib.redirect_stdout(io.StringIO()):
-            convert_to_idl(package.share.resolve(), package.name, Path("msg") / message.name, package.share.resolve())
+            convert_to_idl(package.share.resolve(), package.name, Path(kind) / definition.name, package.share.resolve())
     generate_type_hash(str(_arguments(package, "rosidl_generator_type_description", package.share)))
 
 
@@ -106,19 +109,20 @@ def _arguments(package: Interfaces, generator: str, output: Path | None = None) 
     output = output or package.code(generator)
     share = package.prefix / "share"
     templates = share / generator / "resource"
-    stems = [message.stem for message in package.messages]
+    stems = [f"{path.parent.name}/{path.stem}" for path in package.definitions]
     arguments = {
         "package_name": package.name,
-        "idl_tuples": [f"{package.share}:msg/{stem}.idl" for stem in stems],
+        "idl_tuples": [f"{package.share}:{stem}.idl" for stem in stems],
         "output_dir": str(output),
         "template_dir": str(templates),
         "target_dependencies": [],
         "include_paths": [f"{name}:{share / name}" for name in package.dependencies],
-        "ros_interface_files": [str(message) for message in package.messages],
+        "ros_interface_files": [str(path) for path in package.definitions],
     }
     if generator != "rosidl_generator_type_description":
-        arguments["type_description_tuples"] = [f"msg/{stem}.idl:{package.share / 'msg' / stem}.json" for stem in stems]
-    (output / "msg").mkdir(parents=True, exist_ok=True)
+        arguments["type_description_tuples"] = [f"{stem}.idl:{package.share / stem}.json" for stem in stems]
+    for kind in KINDS:
+        (output / kind).mkdir(parents=True, exist_ok=True)
     _write_visibility_header(package.name, templates, output)
     path = package.output / f"{generator}.json"
     path.write_text(json.dumps(arguments, indent=2))

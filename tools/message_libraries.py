@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from message_code import PYTHON_TYPE_SUPPORT, Interfaces
+from message_code import KINDS, PYTHON_TYPE_SUPPORT, Interfaces
 
 
 class BuildError(Exception):
@@ -21,36 +21,40 @@ class Library:
     """One shared library of the package."""
 
     generator: str  # whose output is compiled
-    sources: str  # glob below that output
+    sources: tuple[str, ...]  # globs below that output
     uses: tuple[str, ...]  # the package's own libraries, by suffix
     ros: tuple[str, ...]  # ROS libraries
     extension: bool = False  # a Python extension module rather than a library
 
 
+def _each(pattern: str) -> tuple[str, ...]:
+    return tuple(f"{kind}/{pattern}" for kind in KINDS)
+
+
 # In the order of linking: each is linked against those before it.
 LIBRARIES = {
-    "rosidl_generator_c": Library("rosidl_generator_c", "msg/detail/*.c", (), ("rosidl_runtime_c", "rcutils")),
+    "rosidl_generator_c": Library("rosidl_generator_c", _each("detail/*.c"), (), ("rosidl_runtime_c", "rcutils")),
     "rosidl_typesupport_c": Library(
-        "rosidl_typesupport_c", "msg/*.cpp", ("rosidl_generator_c",), ("rosidl_typesupport_c", "rosidl_runtime_c")
+        "rosidl_typesupport_c", _each("*.cpp"), ("rosidl_generator_c",), ("rosidl_typesupport_c", "rosidl_runtime_c")
     ),
     "rosidl_typesupport_introspection_c": Library(
         "rosidl_typesupport_introspection_c",
-        "msg/detail/*.c",
+        _each("detail/*.c"),
         ("rosidl_generator_c",),
         ("rosidl_typesupport_introspection_c", "rosidl_runtime_c"),
     ),
     "rosidl_typesupport_fastrtps_c": Library(
         "rosidl_typesupport_fastrtps_c",
-        "msg/detail/*.cpp",
+        _each("detail/*.cpp"),
         ("rosidl_generator_c",),
         ("rosidl_typesupport_fastrtps_c", "rosidl_typesupport_fastrtps_cpp", "rosidl_runtime_c", "rmw", "fastcdr"),
     ),
     "rosidl_generator_py": Library(
-        "rosidl_generator_py", "msg/*.c", ("rosidl_generator_c", "rosidl_typesupport_c"), ("rosidl_runtime_c",)
+        "rosidl_generator_py", _each("*.c"), ("rosidl_generator_c", "rosidl_typesupport_c"), ("rosidl_runtime_c",)
     ),
     "extension": Library(
         "rosidl_generator_py",
-        "_*_s.ep.*.c",
+        ("_*_s.ep.*.c",),
         ("rosidl_generator_c", "rosidl_typesupport_c", "rosidl_generator_py"),
         ("rosidl_typesupport_c", "rosidl_runtime_c"),
         extension=True,
@@ -98,9 +102,10 @@ def _compiler(suffix: str) -> list[str]:
 
 
 def _sources(package: Interfaces, library: Library) -> list[Path]:
-    sources = sorted(package.code(library.generator).glob(library.sources))
+    folder = package.code(library.generator)
+    sources = sorted(path for pattern in library.sources for path in folder.glob(pattern))
     if not sources:
-        raise BuildError(f"{library.generator} wrote no {library.sources} for {package.name}")
+        raise BuildError(f"{library.generator} wrote no {' or '.join(library.sources)} for {package.name}")
     return sources
 
 

@@ -70,6 +70,18 @@ class Scan(NamedTuple):
     errors: Sequence[ScanError] = ()
 
 
+class Operation(NamedTuple):
+    """Something that was done to a rack, or asked for and refused (not ``ok``)."""
+
+    stamp: int
+    run_id: int
+    what: str
+    task: str
+    ok: bool
+    reason: str
+    detail: str
+
+
 class TaskState(NamedTuple):
     """The state of a task between two scans."""
 
@@ -202,7 +214,7 @@ class UInt8MultiArray(NamedTuple):
     data: Sequence[int] = ()
 
 
-_OWN = (CommonImage, CommonWrite, Scan, ScanError, TaskState, Values, Variable, VariableTable, Writer)
+_OWN = (CommonImage, CommonWrite, Operation, Scan, ScanError, TaskState, Values, Variable, VariableTable, Writer)
 _STANDARD = (
     Bool,
     Float32,

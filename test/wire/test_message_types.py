@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import json
 from pathlib import Path
@@ -27,7 +28,7 @@ from automax_ros.wire.definitions import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
-OWN = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"))
+DEFINITIONS = ROOT / "msg_defs"
 
 
 def generator() -> ModuleType:
@@ -47,11 +48,34 @@ def test_table_is_what_the_tool_writes_today() -> None:
 
 
 def test_every_own_definition_stands_in_the_table_word_for_word() -> None:
-    assert OWN
-    for stem in OWN:
-        assert (
-            message_types()[f"automax_msgs/msg/{stem}"].text == (ROOT / "msg_defs" / "msg" / f"{stem}.msg").read_text()
-        )
+    own = {path.stem: path.read_text() for path in DEFINITIONS.glob("msg/*.msg")}
+    assert own.keys() >= generator().SERVED
+    for stem in own.keys() - generator().SERVED:
+        assert message_types()[f"automax_msgs/msg/{stem}"].text == own[stem]
+
+
+def test_what_only_services_answer_with_is_in_no_recording() -> None:
+    answers = "".join(path.read_text().partition("---")[2] for path in DEFINITIONS.glob("srv/*.srv"))
+    for stem in generator().SERVED:
+        assert f"{stem}[]" in answers
+        assert f"automax_msgs/msg/{stem}" not in message_types()
+
+
+@pytest.mark.parametrize("path", sorted(DEFINITIONS.glob("srv/*.srv")), ids=lambda path: path.stem)
+def test_services_are_built_with_the_fields_of_their_definitions(path: Path) -> None:
+    service = getattr(importlib.import_module("automax_msgs.srv"), path.stem)
+    for part, text in zip((service.Request, service.Response), path.read_text().split("---"), strict=True):
+        lines = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
+        assert list(part.get_fields_and_field_types()) == [name for _, name in lines]
+
+
+def test_installed_services_are_those_of_today_and_known_to_ros() -> None:
+    listing = Path("share") / "ament_index" / "resource_index" / "rosidl_interfaces" / "automax_msgs"
+    prefix = next(prefix for prefix in generator().ros_prefixes() if (prefix / listing).is_file())
+    listed = set((prefix / listing).read_text().splitlines())
+    for path in DEFINITIONS.glob("srv/*.srv"):
+        assert (prefix / "share" / "automax_msgs" / "srv" / path.name).read_text() == path.read_text()
+        assert {f"srv/{path.stem}.{suffix}" for suffix in ("srv", "idl", "json")} <= listed
 
 
 def test_hashes_are_those_of_rosbags_for_jazzy() -> None:
