@@ -17,7 +17,7 @@ CODE = re.compile(r"AMX\d{4}")
 
 def by_its_page(code: str) -> bool:
     """Whether the tests of the pages run the code's example: tasks, rack files, run time."""
-    compiled, rack_file = code[3] in "024", "AMX6000" <= code < "AMX6700"
+    compiled, rack_file = code[3] in "024", "AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710"
     has_example = "## Example" in (PACKAGE / "core" / "pages" / f"{code}.md").read_text(encoding="utf-8")
     return has_example and (compiled or rack_file or code[3] == "7")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value
+from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.task_config import TaskConfig
 
@@ -25,6 +26,13 @@ class Timing(enum.Enum):
 
     IDEAL = "ideal"
     MODELED = "modeled"
+
+
+class ModuleLoss(enum.Enum):
+    """What a rack of several processes does when it loses one: stop all tasks, or go on with the values it has."""
+
+    STOP_ALL = "stop_all"
+    HOLD = "hold"
 
 
 @dataclass(frozen=True)
@@ -97,7 +105,8 @@ class RackConfig:
 
     ``namespace`` is its ROS namespace without the slash, ``path`` the YAML file and ``text`` what it says. Modules
     stand in the order of slots, variables in the order of the file; after them the registers of the modules that have
-    some, each as one variable with a ``bank``.
+    some, each as one variable with a ``bank``. ``executive`` is the version of the Programming Executive in tenths (42
+    is 4.2), ``auto_run`` whether the tasks that ran are put into RUN after a power cycle.
     """
 
     name: str
@@ -108,6 +117,9 @@ class RackConfig:
     modules: tuple[ModuleConfig, ...]
     variables: tuple[CommonVariable, ...]
     execution: Timing = Timing.IDEAL
+    executive: int = NEWEST
+    auto_run: bool = False
+    on_module_loss: ModuleLoss = ModuleLoss.STOP_ALL
 
     @property
     def declared(self) -> tuple[CommonVariable, ...]:

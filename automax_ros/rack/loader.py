@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
-from automax_ros.core.text import quoted
+from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, read_yaml
 from automax_ros.rack.commons import CommonReader
-from automax_ros.rack.config import CommonVariable, RackConfig, Timing
+from automax_ros.rack.config import CommonVariable, ModuleLoss, RackConfig, Timing
+from automax_ros.rack.executive import NEWEST, executive_value
 from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
@@ -23,7 +24,8 @@ from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.views import bank_variables
 
 _START = Span(1, 1, 2)
-_KEYS = ("rack", "operator", "execution", "slots", "common")
+KEYS = ("rack", "operator", "execution", "executive", "auto_run", "on_module_loss", "slots", "common")
+"""What a rack file may say at its top."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +92,15 @@ class _RackReader:
         entries = entries_of(root, "a rack file", self._findings)
         if entries is None:
             return None
-        section = Section(entries, "a rack file", _KEYS, self._findings)
+        section = Section(entries, "a rack file", KEYS, self._findings)
         section.require(("rack", "slots"), "the rack file", _START, self._findings)
         name = self._name(section.get("rack"))
-        operator = self._operator(section.get("operator"))
+        operator = self._flag(section, "operator")
+        auto_run = self._flag(section, "auto_run")
+        loss = self._module_loss(section.get("on_module_loss"))
         execution = self._execution(section.get("execution"))
-        modules = self._modules(section)
+        executive = self._executive(section.get("executive"))
+        modules = self._modules(section, executive)
         common = section.get("common")
         variables = CommonReader(modules, self._findings).read(common) if common is not None else ()
         if common is not None:
@@ -111,6 +116,9 @@ class _RackReader:
             modules=modules,
             variables=(*variables, *bank_variables(modules)),
             execution=execution,
+            executive=executive,
+            auto_run=auto_run,
+            on_module_loss=loss,
         )
 
     def _name(self, node: Node | None) -> str | None:
@@ -128,8 +136,9 @@ class _RackReader:
             return None
         return name
 
-    def _operator(self, node: Node | None) -> bool:
-        return bool(node is not None and boolean_value(node, "operator", self._findings))
+    def _flag(self, section: Section, key: str) -> bool:
+        node = section.get(key)
+        return bool(node is not None and boolean_value(node, key, self._findings))
 
     def _execution(self, node: Node | None) -> Timing:
         text = text_value(node, "execution", self._findings, limit=100) if node is not None else None
@@ -141,11 +150,25 @@ class _RackReader:
             self._findings.add("AMX6430", f"{quoted(text)} is not a way of execution", node.span, hint)
         return Timing.IDEAL
 
-    def _modules(self, section: Section) -> tuple[ModuleConfig, ...]:
+    def _executive(self, node: Node | None) -> int:
+        return executive_value(node, self._findings) if node is not None else NEWEST
+
+    def _module_loss(self, node: Node | None) -> ModuleLoss:
+        text = text_value(node, "on_module_loss", self._findings, limit=100) if node is not None else None
+        words = [loss.value for loss in ModuleLoss]
+        if node is None or text is None:
+            return ModuleLoss.STOP_ALL
+        if text not in words:
+            message = f"on_module_loss is {quoted(text)}; it must be {' or '.join(words)}"
+            self._findings.add("AMX6704", message, node.span, did_you_mean(text, words))
+            return ModuleLoss.STOP_ALL
+        return ModuleLoss(text)
+
+    def _modules(self, section: Section, executive: int) -> tuple[ModuleConfig, ...]:
         node = section.get("slots")
         if node is None:
             return ()
-        return SlotReader(self._tasks, self._findings).read(node, section.key_span("slots"))
+        return SlotReader(self._tasks, self._findings, executive).read(node, section.key_span("slots"))
 
     def _check_size(self, variables: tuple[CommonVariable, ...], modules: tuple[ModuleConfig, ...], span: Span) -> None:
         """Compare the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""

@@ -18,7 +18,9 @@ from automax_ros.core.types import (
     type_of_name,
 )
 
-PREDEFINED = ("AUTORUNSTATUS@", "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in range(5)))
+AUTO_RUN = "AUTORUNSTATUS@"
+"""TRUE where AUTO RUN is enabled for the rack (2.4.6)."""
+PREDEFINED = (AUTO_RUN, "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in range(5)))
 """Commons that the rack itself writes (2.4.6)."""
 
 _RACK = re.compile(r"[A-Z0-9]{1,8}\Z")

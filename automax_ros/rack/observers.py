@@ -14,7 +14,8 @@ from automax_ros.running.views import Write
 class Operation:
     """Something that was done to a rack: ``what`` as stimuli files call it, ``task`` where it concerns one.
 
-    ``ok`` is FALSE where it was refused; ``reason`` says why, or what was the cause.
+    ``ok`` is FALSE where it was refused; ``reason`` says why, or what was the cause. ``detail`` is what was asked for
+    besides: ``REF% = 200`` of a force.
     """
 
     at_ns: int
@@ -22,6 +23,7 @@ class Operation:
     task: str = ""
     ok: bool = True
     reason: str = ""
+    detail: str = ""
 
 
 class RackObserver(Protocol):

@@ -14,6 +14,7 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import Installation, RackError
 from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.names import AUTO_RUN
 from automax_ros.rack.observers import Observers, Operation
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.writers import PRESET_WRITER
@@ -59,6 +60,7 @@ class Operations:
         self._memory, self._scheduler, self._observers = memory, scheduler, observers
         self._tasks = {item.task.name: item for module in modules for item in module.tasks}
         self._ticks = {item.task.name: module.config.tick_ns for module in modules for item in module.tasks}
+        self._critical = {task.name for _, task in config.placed_tasks if task.critical}
         self.ran_at_power_off: frozenset[str] = frozenset()
         self.powered = self.battery_good = True
         self.stopped: StopCause | None = None
@@ -105,9 +107,14 @@ class Operations:
         """Stop a task between two scans; its locals keep their values. One that does not run stays as it is.
 
         Raises:
-            OperationRefused: there is no such task.
+            OperationRefused: there is no such task, or it is critical (J2-3106-1 p. 8-2).
         """
-        self._task("stop", name).stop()
+        item = self._task("stop", name)
+        if name in self._critical:
+            self._refuse(
+                "stop", name, f"task {name} is critical, it does not stop alone: STOP ALL stops it with all others"
+            )
+        item.stop()
         self._tell("stop", name)
 
     def stop_tasks(self) -> None:
@@ -205,12 +212,15 @@ class Operations:
             again = [item for item in self._in_starting_order() if item.task.name in self.ran_at_power_off]
             self._run_together(again, self._next_tick)
 
-    def write_batteries(self) -> None:
-        """Set the pre-defined BATTERYSTATUSn@ of the slots that hold a module with a battery (2.4.6)."""
-        present = {f"BATTERYSTATUS{module.config.slot}@" for module in self._modules if module.config.has_battery}
+    def write_status(self) -> None:
+        """Set AUTORUNSTATUS@, and BATTERYSTATUSn@ of the slots that hold a module with a battery (2.4.6)."""
+        shown = {
+            f"BATTERYSTATUS{item.config.slot}@": self.battery_good for item in self._modules if item.config.has_battery
+        }
+        shown[AUTO_RUN] = self._config.auto_run
         for view, spec in enumerate(self._memory.specs):
-            if spec.name in present:
-                self._memory.write_from_outside(view, self.battery_good, PRESET_WRITER)
+            if spec.name in shown:
+                self._memory.write_from_outside(view, shown[spec.name], PRESET_WRITER)
 
     def _run_together(self, tasks: Sequence[ScheduledTask], first_ns: Callable[[ScheduledTask], int]) -> None:
         """Put tasks into RUN: first all start-up parts, then scans; a fault among them stops all."""
@@ -233,7 +243,7 @@ class Operations:
         kept = frozenset[tuple[int, int]]().union(*(module.kept for module in self._modules))
         self._memory.now_ns = self._scheduler.now_ns
         self._memory.clear(PRESET_WRITER, keep_non_volatile=keep_non_volatile, kept=kept)
-        self.write_batteries()
+        self.write_status()
 
     def _task(self, what: str, name: str) -> ScheduledTask:
         item = self._tasks.get(name)

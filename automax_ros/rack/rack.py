@@ -17,8 +17,9 @@ from functools import partial
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
-from automax_ros.core.types import DataType, Value
+from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig, Timing
+from automax_ros.rack.forcing import Force, Forcing
 from automax_ros.rack.installation import Finding, Installation
 from automax_ros.rack.modules.kind import Module, ModuleState, Parts
 from automax_ros.rack.observers import Observers, RackObserver
@@ -31,11 +32,11 @@ from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
 from automax_ros.running.events import Events
 from automax_ros.running.execution import IDEAL, Execution
-from automax_ros.running.memory import FORCING, CommonMemory
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.processor_time import ProcessorTime
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
-from automax_ros.running.views import Memory, MemoryValueError
+from automax_ros.running.views import Memory
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,7 @@ class Rack:
         """
         self.config = config
         self.memory = CommonMemory(view_specs(config.variables))
+        self._forcing = Forcing(config, self.memory)
         self.writers: tuple[WriterSpec, ...] = writers_of(config)
         self.scheduler = Scheduler()
         self._stopwatch = stopwatch
@@ -152,7 +154,7 @@ class Rack:
         for view, variable in enumerate(self.config.variables):
             for element, value in enumerate(variable.presets):
                 self.memory.write_from_outside(view, value, PRESET_WRITER, element)
-        self.operations.write_batteries()
+        self.operations.write_status()
         for name, value in settings:
             found = common_named(self.config, name)
             self.memory.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
@@ -190,15 +192,12 @@ class Rack:
 
         Raises:
             KeyError: the rack has no such variable.
-            MemoryValueError: the value does not fit, or the variable cannot be forced: a string, an array,
-                FORCINGSTATUS@, or a register of which both the word and bits are named (J2-3106-1 p. 18-10).
+            MemoryValueError: the value does not fit, as many are forced as the Executive allows, or it cannot
+                be forced: a string, an array, what the rack itself writes, or a register of which both the word and
+                bits are named (J2-3106-1 p. 18-10).
         """
-        view = self.memory.view(name)
-        reason = self._why_not_forced(view)
-        if reason is not None:
-            raise MemoryValueError(f"{name} cannot be forced: {reason}")
         self.memory.now_ns = self.now_ns
-        self.memory.force(view, value, writer=writer)
+        self._forcing.force(name, value, writer)
         self.observers.tell_writes()
 
     def unforce(self, name: str, writer: int = OPERATOR_WRITER) -> None:
@@ -208,17 +207,12 @@ class Rack:
             KeyError: the rack has no such variable.
         """
         self.memory.now_ns = self.now_ns
-        self.memory.release(self.memory.view(name), writer=writer)
+        self._forcing.release(name, writer)
         self.observers.tell_writes()
 
-    def _why_not_forced(self, view: int) -> str | None:
-        spec = self.memory.specs[view]
-        if spec.is_array or spec.type is DataType.STRING:
-            return "it is an array" if spec.is_array else "it is a string"
-        if spec.name == FORCING:
-            return "it shows whether anything is forced"
-        others = self.memory.registers.others(view)
-        return f"{self.memory.specs[others[0]].name} is part of the same register" if others else None
+    def forces(self) -> list[Force]:
+        """Return the force table: what is forced and at which value, in the order of the rack file."""
+        return self._forcing.table()
 
     def tune(self, task: Task, name: str, value: object) -> None:
         """Set a tunable of a task, between scans.

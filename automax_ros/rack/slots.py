@@ -8,6 +8,7 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.config import MAX_SLOT
+from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
 from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_number
@@ -21,8 +22,9 @@ _SLOT = re.compile(r"[0-9]{1,3}\Z")
 class SlotReader:
     """Reads the ``slots`` section."""
 
-    def __init__(self, tasks: TaskReader, findings: Findings) -> None:
-        """Take the reader of tasks, which knows the names of the whole rack."""
+    def __init__(self, tasks: TaskReader, findings: Findings, executive: int = NEWEST) -> None:
+        """Take the reader of tasks, which knows the names of the whole rack, and the Executive's version."""
+        self._executive = executive
         self._tasks = tasks
         self._findings = findings
         self._standing: dict[int, Standing] = {}
@@ -77,7 +79,9 @@ class SlotReader:
         standing = self._standing[slot] = Standing(slot, model, kind, key.span)
         section = Section(node.entries, _described(standing), ("module", *kind.options), self._findings)
         where = f"{_described(standing)} in slot {slot}"
-        return kind.read(FoundModule(slot, model, section, where, key.span, self._tasks, self._findings))
+        return kind.read(
+            FoundModule(slot, model, section, where, key.span, self._tasks, self._findings, self._executive)
+        )
 
     def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:
         """Return the number of a module that the emulator has; report AMX6202 to AMX6204 for others."""

@@ -13,9 +13,13 @@ MAX_TASKS = 32
 
 @dataclass(frozen=True)
 class TaskConfig:
-    """A task of a Processor: ``file`` is its source, ``priority`` is 4 (first) to 11."""
+    """A task of a Processor: ``file`` is its source, ``priority`` is 4 (first) to 11.
+
+    A ``critical`` task cannot be stopped alone, only with all others (J2-3106-1 p. 8-2).
+    """
 
     name: str
     file: Path
     priority: int
     line: int = 0
+    critical: bool = False

@@ -12,7 +12,7 @@ from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.files import FileFault, is_inside, lies_next_to, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import DeclarationFault, check_task_name
-from automax_ros.rack.scalars import integer_value, text_value
+from automax_ros.rack.scalars import boolean_value, integer_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 from automax_ros.rack.task_config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
 
@@ -58,13 +58,15 @@ class TaskReader:
         entries = entries_of(node, what, self.findings)
         if entries is None:
             return None
-        section = Section(entries, what, ("file", "priority"), self.findings)
+        section = Section(entries, what, ("file", "priority", "critical"), self.findings)
         section.require(("priority",), what, key.span, self.findings)
         priority = self._priority(section.get("priority"), what)
         file = self._file(section.get("file"), key, name, what)
+        critical = section.get("critical")
+        is_critical = bool(critical and boolean_value(critical, f"critical of {what}", self.findings))
         if name is None or priority is None or file is None:
             return None
-        return TaskConfig(name, file, priority, key.span.line)
+        return TaskConfig(name, file, priority, key.span.line, is_critical)
 
     def _name(self, key: Scalar) -> str | None:
         name = self.findings.upper_case(key.text, key.span)

@@ -13,7 +13,7 @@ from automax_ros.rack.loader import LoadResult, load
 from .helpers import write
 
 PAGES = Path(automax_ros.core.__file__).parent / "pages"
-CODES = [code for code in PROBLEMS if "AMX6000" <= code < "AMX6700"]
+CODES = [code for code in PROBLEMS if "AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710"]
 
 
 def part(code: str, heading: str) -> str:

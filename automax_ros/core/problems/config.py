@@ -63,6 +63,11 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6423", "register or bit with two names"),
     # recordings
     Problem("AMX6700", "event that no module of the rack raises"),
+    # rack files: operation
+    Problem("AMX6701", "version of the Programming Executive"),
+    Problem("AMX6702", "tick rate that the Executive could not choose yet"),
+    Problem("AMX6703", "module that the Executive did not know yet"),
+    Problem("AMX6704", "what the loss of a module does"),
     Problem("AMX6800", "folder for a recording exists already"),
     Problem("AMX6801", "recording cannot be written"),
     Problem("AMX6802", "message cannot be recorded"),

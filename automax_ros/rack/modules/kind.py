@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from automax_ros.compile.cost import Model
 from automax_ros.core.diagnostics import Span
+from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.sections import Section
@@ -85,7 +86,10 @@ class ModuleConfig(Protocol):
 
 @dataclass(frozen=True)
 class FoundModule:
-    """A module of a rack file as its kind reads it; ``where`` names it in messages."""
+    """A module of a rack file as its kind reads it; ``where`` names it in messages.
+
+    ``executive`` is the version of the Programming Executive in tenths (``rack/executive.py``).
+    """
 
     slot: int
     model: str
@@ -94,6 +98,7 @@ class FoundModule:
     span: Span
     tasks: TaskReader
     findings: Findings
+    executive: int = NEWEST
 
 
 @dataclass(frozen=True)

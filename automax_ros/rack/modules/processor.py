@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from automax_ros.compile.cost import Model
 from automax_ros.core.ticks import DEFAULT_TICK_NS, tick_ns
 from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.rack.executive import OLDEST, tick_fault, version_text
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule, Module, ModuleState, Parts, Registers
 from automax_ros.rack.scalars import wrong_kind
@@ -20,6 +21,8 @@ MAX_PROCESSORS = 4
 _COMMON_REGISTERS = 65536
 """Registers for commons where a Processor works alone (decision: as many as the 57C413 has)."""
 _TICK = re.compile(r"[0-9]{1,6}(\.[0-9]{1,9})?\Z")
+_SINCE = {"57C435": 30}
+"""The first version of the Executive with a module, in tenths, where that is not the oldest (1.1)."""
 _SLOTS = range(1, 5)
 """Where Processors stand next to a common memory module (J2-3106-1 p. 10-2)."""
 
@@ -95,6 +98,7 @@ class ProcessorKind:
 
     def read(self, found: FoundModule) -> ProcessorConfig:
         """Read tick and tasks."""
+        _check_model(found)
         tick = _tick(found.section.get("tick_ms"), found)
         tasks = found.section.get("tasks")
         read = found.tasks.read(tasks, found.where) if tasks else ()
@@ -135,7 +139,18 @@ def _tick(node: Node | None, found: FoundModule) -> int:
         wrong_kind(node, f"tick_ms of {found.where}", "a number of milliseconds such as 5.5", found.findings)
         return DEFAULT_TICK_NS
     try:
-        return tick_ns(node.text)
+        tick = tick_ns(node.text)
     except ValueError as error:
         found.findings.add("AMX6210", f"{found.where}: {error}", node.span)
         return DEFAULT_TICK_NS
+    fault = tick_fault(found.executive, tick)
+    if fault is not None:
+        found.findings.add("AMX6702", f"{found.where}: {fault}", node.span)
+    return tick
+
+
+def _check_model(found: FoundModule) -> None:
+    since = _SINCE.get(found.model, OLDEST)
+    if found.executive < since:
+        message = f"{found.where} needs executive {version_text(since)} or later, not {version_text(found.executive)}"
+        found.findings.add("AMX6703", message, found.span)
