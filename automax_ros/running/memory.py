@@ -34,6 +34,7 @@ class CommonMemory(Image):
         self._forced: set[tuple[int, int]] = set()
         self._force_watchers: list[Callable[[], None]] = []
         self._log: list[Write] | None = None
+        self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
 
     def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
         """Write what a scan's blocks changed: pairs of view and value, already within the view's type."""
@@ -103,6 +104,13 @@ class CommonMemory(Image):
         """Call ``changed`` whenever a force begins or ends."""
         self._force_watchers.append(changed)
 
+    def watch(self, bank: int, register: int, written: Callable[[], None]) -> None:
+        """Call ``written`` whenever a register of a module is written, by itself or through a point.
+
+        It may do no more than post an event, since the write may be one of several.
+        """
+        self._watched.setdefault((bank, register), []).append(written)
+
     def keep_log(self) -> None:
         """Begin to keep the write log; whoever asks must ``drain`` it."""
         if self._log is None:
@@ -157,6 +165,13 @@ class CommonMemory(Image):
                 self.sequence += 1
                 if self._log is not None:
                     self._log.append(Write(self.sequence, self.now_ns, writer, told, other, place, shown))
+        if entries is not None and self._watched:
+            self._tell_watchers([(view, element), *(entry[:2] for entry in entries)])
+
+    def _tell_watchers(self, written: Iterable[tuple[int, int]]) -> None:
+        for key in written:
+            for told in self._watched.get(key, ()):
+                told()
 
     def _spread(self, view: int, element: int, value: Value) -> list[tuple[int, int, Value]]:
         """Return what else a write of a register changes; what is forced stays."""

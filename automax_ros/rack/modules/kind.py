@@ -5,7 +5,7 @@ A kind reads its section of a rack file into a configuration; a configuration bu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -31,10 +31,28 @@ ModuleState = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Registers:
-    """The registers of a module: how many, and which of them are outputs; the others are inputs."""
+    """The registers of a module: how many, and what they are; those that are nothing else are inputs.
+
+    Attributes:
+        count: registers 0 to this less 1 answer on the backplane.
+        outputs: those that tasks write; STOP ALL clears them.
+        either: those that a task may write or, with ``ros: in``, the process; STOP ALL clears them too.
+        reserved: the operating system's: no I/O point may stand there, and no task write them (S-3006 p. 4-2).
+        reals: those where a REAL may stand, in two registers.
+        iscr: the interrupt status and control register, which an EVENT's INTERRUPT_STATUS names; None without one.
+    """
 
     count: int = 0
-    outputs: range = range(0)
+    outputs: Collection[int] = ()
+    either: Collection[int] = ()
+    reserved: Collection[int] = ()
+    reals: Collection[int] = ()
+    iscr: int | None = None
+
+    @property
+    def writable(self) -> frozenset[int]:
+        """The registers that a task may write."""
+        return frozenset((*self.outputs, *self.either))
 
 
 NO_REGISTERS = Registers()
