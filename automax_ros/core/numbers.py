@@ -19,7 +19,6 @@ REAL_MIN_NEGATIVE = 2.7105054e-20
 """Smallest magnitude of a negative REAL (2.4.2); below it a value becomes 0 (decision)."""
 
 _SINGLE = struct.Struct("<f")
-_SINGLE_BITS = struct.Struct("<i")
 
 
 def clamp16(value: int) -> int:
@@ -64,21 +63,3 @@ def stored_real(value: float) -> tuple[float, bool]:
         return 0.0, False
     single: float = _SINGLE.unpack(_SINGLE.pack(value))[0]
     return single, False
-
-
-def real_bits(value: float) -> int:
-    """Return the 32 bits of a REAL in two registers, as a signed number: IEEE 754 single precision (decision).
-
-    No source tells how a UDC's dual port holds one; the Processors' own format is Motorola's Fast Floating Point.
-    """
-    bits: int = _SINGLE_BITS.unpack(_SINGLE.pack(value))[0]
-    return bits
-
-
-def real_of_bits(bits: int) -> float:
-    """Return the REAL that 32 bits hold, as a signed number.
-
-    What is no REAL is 0, or the limit of its sign (decision).
-    """
-    value: float = _SINGLE.unpack(_SINGLE_BITS.pack(bits))[0]
-    return stored_real(value)[0]

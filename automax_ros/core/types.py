@@ -45,11 +45,6 @@ class DataType(enum.Enum):
         return self.is_integer or self is DataType.REAL
 
     @property
-    def registers(self) -> int:
-        """16-bit registers that a value takes on a module: a DOUBLE INTEGER or a REAL two, a BOOLEAN part of one."""
-        return 2 if self is DataType.DOUBLE or self is DataType.REAL else 1
-
-    @property
     def word(self) -> str:
         """The manual's word for the type, for messages and YAML files."""
         return _WORDS[self]

@@ -14,9 +14,8 @@ from automax_ros.rack.scalars import integer_value
 from automax_ros.rack.sections import Section
 
 KEYS = ("slot", "register", "bit")
-_SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32, DataType.REAL: 32}
-"""Bits of the types that a point may have (J2-3045 p. 7-1); a REAL only on some registers of a UDC (S-3056 p. 3-50)."""
-_WHAT_CAN = "an I/O point is a simple BOOLEAN (with slot, register, bit), INTEGER or DOUBLE INTEGER"
+_SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32}
+"""Bits of the types that a point may have (J2-3045 p. 7-1)."""
 
 
 class PointReader:
@@ -41,7 +40,7 @@ class PointReader:
         module = self._module(slot, section, what) if slot is not None else None
         if slot is None or module is None:
             return None
-        last = module.registers.count - declared.type.registers
+        last = module.registers.count - (2 if declared.type is DataType.DOUBLE else 1)
         if last < 0:
             self._findings.add("AMX6421", f"{what} takes two registers; the {module.model} has one", span)
             return None
@@ -50,29 +49,7 @@ class PointReader:
         if register is None or (bit is None and "bit" in section):
             return None
         point = Point(slot, register, bit)
-        return (
-            point
-            if self._may_stand(point, declared, module, section) and self._is_free(point, declared, span)
-            else None
-        )
-
-    def _may_stand(self, point: Point, declared: VariableName, module: ModuleConfig, section: Section) -> bool:
-        """Report registers that belong to the module itself, and a REAL where none can stand."""
-        own, node = module.registers, section.get("register")
-        assert node is not None
-        taken = range(point.register, point.register + declared.type.registers)
-        reserved = next((register for register in taken if register in own.reserved), None)
-        if reserved is not None:
-            message = (
-                f"register {reserved} of the {module.model} belongs to the module itself: no point can stand there"
-            )
-            self._findings.add("AMX6421", f"{declared.name}: {message}", node.span)
-        elif declared.type is DataType.REAL and not all(register in own.reals for register in taken):
-            where = f"registers {taken[0]} and {taken[1]} of the {module.model}"
-            self._findings.add("AMX6422", f"{declared.name} is REAL and cannot stand at {where}", node.span, _WHAT_CAN)
-        else:
-            return True
-        return False
+        return point if self._is_free(point, declared, span) else None
 
     def _is_possible(self, section: Section, declared: VariableName) -> bool:
         """Report what no point can be: an array, a REAL or a string, non-volatile, a word with a bit."""
@@ -87,7 +64,8 @@ class PointReader:
             message = f"{declared.name} cannot be non-volatile: its module holds it"
             place = section.key_span("non_volatile")
         if message:
-            self._findings.add("AMX6422", message, place, _WHAT_CAN)
+            hint = "an I/O point is a simple BOOLEAN (with slot, register, bit), INTEGER or DOUBLE INTEGER"
+            self._findings.add("AMX6422", message, place, hint)
         return not message
 
     def _number(self, section: Section, key: str, what: str, low: int, high: int) -> int | None:

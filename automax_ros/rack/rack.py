@@ -30,6 +30,7 @@ from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.triggers import MakeTrigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
+from automax_ros.running.common_clock import CommonClock
 from automax_ros.running.events import Events
 from automax_ros.running.execution import IDEAL, Execution
 from automax_ros.running.memory import CommonMemory
@@ -44,7 +45,7 @@ class RackState:
     """All that the future of a rack depends on, apart from its configuration and sources.
 
     ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``events`` those that are kept
-    for the next who waits, ``modules`` by slot.
+    for the next who waits, ``clock_since_ns`` since when the common clock runs, ``modules`` by slot.
     """
 
     now_ns: int
@@ -55,6 +56,7 @@ class RackState:
     battery_good: bool
     stopped: StopCause | None
     ran_at_power_off: frozenset[str]
+    clock_since_ns: int | None
     modules: Mapping[int, ModuleState]
 
 
@@ -79,7 +81,17 @@ class Rack:
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
         self.events = Events()
-        parts = Parts(self.memory, self.scheduler, self.backplane, self.events, self._install, self._execution)
+        self._clock = CommonClock(self.scheduler, self.memory, lambda why, code: self.operations.stop_all(why, code))
+        parts = Parts(
+            memory=self.memory,
+            scheduler=self.scheduler,
+            backplane=self.backplane,
+            events=self.events,
+            clock=self._clock,
+            install=self._install,
+            execution=self._execution,
+            tell_writes=self.observers.tell_writes,
+        )
         self.modules: list[Module] = [module.build(parts) for module in config.modules]
         self.operations = Operations(
             config, self.modules, self._installation, self.memory, self.scheduler, self.events, self.observers
@@ -254,6 +266,7 @@ class Rack:
             battery_good=self.operations.battery_good,
             stopped=self.operations.stopped,
             ran_at_power_off=self.operations.ran_at_power_off,
+            clock_since_ns=self._clock.since_ns,
             modules={module.config.slot: module.state() for module in self.modules},
         )
 
@@ -273,6 +286,7 @@ class Rack:
         self.operations.powered, self.operations.battery_good = state.powered, state.battery_good
         self.operations.stopped = state.stopped
         self.operations.ran_at_power_off = state.ran_at_power_off
+        self._clock.resume(state.clock_since_ns)
         for module in self.modules:
             module.load(state.modules[module.config.slot])
         self.events.load(state.events)

@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, in_order
-from automax_ros.core.kinds import Direction
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
-from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import FileFault
-from automax_ros.rack.modules.kind import ModuleConfig, Registers
+from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.task_source import read_task_source
 
@@ -28,7 +27,7 @@ class CheckedTask(NamedTuple):
 
 def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
     """Return the rack's common variables by full name, as the checker compares them with a task's COMMON."""
-    registers = {module.slot: module.registers for module in config.modules}
+    outputs = {module.slot: module.registers.outputs for module in config.modules}
     return {
         variable.name: CommonSpec(
             name=variable.name,
@@ -36,17 +35,10 @@ def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
             place=f"{config.path.name}:{variable.line}",
             dimensions=variable.dimensions,
             length=variable.length,
-            is_input=variable.point is not None and _is_input(variable, registers[variable.point.slot]),
+            is_input=variable.point is not None and variable.point.register not in outputs[variable.point.slot],
         )
         for variable in config.declared
     }
-
-
-def _is_input(variable: CommonVariable, registers: Registers) -> bool:
-    """Whether only the process writes a point; where a register may be either, `ros: in` makes it an input."""
-    assert variable.point is not None
-    register = variable.point.register
-    return register not in registers.writable or (register in registers.either and variable.direction is Direction.IN)
 
 
 def check_tasks(config: RackConfig) -> list[CheckedTask]:

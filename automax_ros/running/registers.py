@@ -5,9 +5,8 @@ A word and its bits alias in actual memory; the latch copies views, so that in a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
-from automax_ros.core.numbers import real_bits, real_of_bits
 from automax_ros.core.types import DataType, Value
 from automax_ros.running.views import Place, ViewSpec
 
@@ -65,7 +64,7 @@ class RegisterMap:
                 value = _signed(_unsigned(value) & ~mask | _unsigned(read(view, element)) & mask)
         return value
 
-    def apart_from(self, bank: int, outputs: Container[int], registers: int) -> frozenset[tuple[int, int]]:
+    def apart_from(self, bank: int, outputs: range, registers: int) -> frozenset[tuple[int, int]]:
         """Return view and element of all that shows registers of a bank that are not outputs: its inputs."""
         inputs = [register for register in range(registers) if register not in outputs]
         points = (view for register in inputs for view in self._points.get((bank, register), ()))
@@ -82,20 +81,19 @@ class RegisterMap:
 
     def _registers(self, view: int) -> range:
         first = self._places[view].register
-        return range(first, first + self._types[view].registers)
+        return range(first, first + (2 if self._types[view] is DataType.DOUBLE else 1))
 
     def _words(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[int, int]:
         """Return the registers that a write touches, as 16-bit words without sign."""
         assert not isinstance(value, str)
-        place = self._places.get(view)
-        number = real_bits(value) if self._types[view] is DataType.REAL else int(value)
+        place, number = self._places.get(view), int(value)
         if place is None:
             return {element: number & _WORD}
         first = place.register
         if place.bit is not None:
             before = _unsigned(read(place.bank, first))
             return {first: before & ~(1 << place.bit) | number << place.bit}
-        if self._types[view].registers == 2:
+        if self._types[view] is DataType.DOUBLE:
             return {first: number >> 16 & _WORD, first + 1: number & _WORD}
         return {first: number & _WORD}
 
@@ -106,8 +104,7 @@ class RegisterMap:
         if place.bit is not None:
             return bool(found[0] >> place.bit & 1)
         if len(found) == 2:
-            number = _signed(found[0]) << 16 | found[1]
-            return real_of_bits(number) if self._types[view] is DataType.REAL else number
+            return _signed(found[0]) << 16 | found[1]
         return _signed(found[0])
 
 

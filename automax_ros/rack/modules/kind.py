@@ -5,7 +5,7 @@ A kind reads its section of a rack file into a configuration; a configuration bu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -19,6 +19,7 @@ from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.triggers import MakeTrigger
 from automax_ros.running.backplane import Backplane
+from automax_ros.running.common_clock import CommonClock
 from automax_ros.running.events import Events
 from automax_ros.running.execution import Execution
 from automax_ros.running.memory import CommonMemory
@@ -31,28 +32,10 @@ ModuleState = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Registers:
-    """The registers of a module: how many, and what they are; those that are nothing else are inputs.
-
-    Attributes:
-        count: registers 0 to this less 1 answer on the backplane.
-        outputs: those that tasks write; STOP ALL clears them.
-        either: those that a task may write or, with ``ros: in``, the process; STOP ALL clears them too.
-        reserved: the operating system's: no I/O point may stand there, and no task write them (S-3006 p. 4-2).
-        reals: those where a REAL may stand, in two registers.
-        iscr: the interrupt status and control register, which an EVENT's INTERRUPT_STATUS names; None without one.
-    """
+    """The registers of a module: how many, and which of them are outputs; the others are inputs."""
 
     count: int = 0
-    outputs: Collection[int] = ()
-    either: Collection[int] = ()
-    reserved: Collection[int] = ()
-    reals: Collection[int] = ()
-    iscr: int | None = None
-
-    @property
-    def writable(self) -> frozenset[int]:
-        """The registers that a task may write."""
-        return frozenset((*self.outputs, *self.either))
+    outputs: range = range(0)
 
 
 NO_REGISTERS = Registers()
@@ -191,15 +174,18 @@ class Install(Protocol):
 class Parts:
     """What a rack gives to its modules.
 
-    ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them.
+    ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells
+    observers of writes that no scan has made.
     """
 
     memory: CommonMemory
     scheduler: Scheduler
     backplane: Backplane
     events: Events
+    clock: CommonClock
     install: Install
     execution: Callable[[str], Execution]
+    tell_writes: Callable[[], None]
 
 
 class Module(Protocol):
