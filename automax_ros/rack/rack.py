@@ -81,7 +81,7 @@ class Rack:
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
         self.events = Events()
-        self._clock = CommonClock(self.scheduler, self.memory, lambda why, code: self.operations.stop_all(why, code))
+        self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
         parts = Parts(
             memory=self.memory,
             scheduler=self.scheduler,
@@ -319,6 +319,9 @@ class Rack:
             after=self._after,
             stopwatch=self._stopwatch,
         )
+
+    def _clock_fault(self, reason: str, code: str) -> None:
+        self.operations.stop_all(reason, code)
 
     def _after(self, task: Task, record: ScanRecord | None) -> None:
         if record is not None:
