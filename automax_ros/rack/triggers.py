@@ -62,18 +62,19 @@ class ClockTrigger:
 
 
 class EventTrigger:
-    """A scan is due whenever an event is set (4.0, EVENT)."""
+    """A scan is due whenever an event is set (4.0, EVENT): at that instant, in the task's place among all scans."""
 
-    def __init__(self, event: Event, scheduler: Scheduler) -> None:
+    def __init__(self, event: Event, task: Task, scheduler: Scheduler) -> None:
         """Take the event; nobody waits for it yet."""
         self._event, self._scheduler = event, scheduler
+        self._key = EventKey(EventClass.SCAN, task.priority, task.name)
         self._due: Due | None = None
-        self._first_ns = 0
+        self._set: ScheduledEvent | None = None
 
-    def arm(self, first_ns: int, due: Due) -> None:
-        """Wait for the event from now on, again after each scan that it starts."""
+    def arm(self, first_ns: int, due: Due) -> None:  # noqa: ARG002
+        """Wait for the event from now on, and go on waiting while a scan that it started is under way."""
         self.disarm()
-        self._due, self._first_ns = due, first_ns
+        self._due = due
         self._event.pending = False
         self._event.wait(self._wake)
 
@@ -81,6 +82,9 @@ class EventTrigger:
         """Wait no longer."""
         self._due = None
         self._event.forget(self._wake)
+        if self._set is not None:
+            self._set.cancel()
+            self._set = None
 
     @property
     def next_ns(self) -> int | None:
@@ -88,9 +92,11 @@ class EventTrigger:
         return self._scheduler.now_ns if self._due is not None else None
 
     def _wake(self, now_ns: int) -> None:
+        """Let the scan be due after whatever sets the event: a scan does not begin inside another."""
         self._event.wait(self._wake)
         if self._due is not None:
-            self._due(now_ns, 0)
+            due = self._due
+            self._set = self._scheduler.at(now_ns, self._key, lambda now: due(now, 0))
 
 
 class ModuleTrigger:
@@ -118,4 +124,4 @@ class ModuleTrigger:
 def usual_trigger(task: Task, events: Events, scheduler: Scheduler) -> Trigger:
     """Return the trigger of a Processor's task: the event that its SCAN_LOOP names, else the clock (4.0)."""
     event = task.compiled.program.event
-    return ClockTrigger(task, scheduler) if event is None else EventTrigger(events.event(event), scheduler)
+    return ClockTrigger(task, scheduler) if event is None else EventTrigger(events.event(event), task, scheduler)

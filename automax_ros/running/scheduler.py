@@ -100,13 +100,15 @@ class Scheduler:
         return None if event.cancelled else next(found, None)
 
     def advance_to(self, time_ns: int, key: EventKey) -> bool:
-        """Let it be ``time_ns`` if no event comes before one of that instant and key, and simulated time goes so far.
+        """Let it be ``time_ns`` if no event comes before one of that instant and key, and time goes so far.
 
         For an action that goes on at a later instant: quicker than an event of its own.
         """
         if time_ns >= self._end_ns:
             return False
         queue = self._queue
+        while queue and queue[0][5].cancelled:
+            heapq.heappop(queue)
         if queue and queue[0][:4] <= (time_ns, key.event_class, key.priority, key.name):
             return False
         self.now_ns = time_ns
@@ -130,26 +132,39 @@ class Scheduler:
         self.now_ns = max(self.now_ns, end_ns)
 
     def run_due(self, now_ns: int) -> None:
-        """Carry out, in order, what is due at a time of the wall clock.
+        """Carry out, in order, what is due at a time of the wall clock, and what becomes due up to then meanwhile.
 
         A periodic event that is late by whole periods happens once, at the last of its instants that have passed;
-        the others are skipped and counted. What becomes due while events are carried out waits for the next call.
+        the others are skipped and counted.
         """
-        late: list[tuple[_Queued, int]] = []
-        while self._queue and self._queue[0][0] <= now_ns:
-            instant, order, priority, name, serial, event = heapq.heappop(self._queue)
-            skipped = (now_ns - instant) // event.period_ns if event.period_ns else 0
-            last = instant + skipped * event.period_ns
-            late.append(((last, order, priority, name, serial, event), skipped))
-        late.sort()
-        for (instant, _, _, _, _, event), _ in late:
+        queue = self._queue
+        self._end_ns = now_ns + 1
+        skipped = self._skip_until(now_ns)
+        while queue and queue[0][0] <= now_ns:
+            instant, _, _, _, _, event = queue[0]
             if event.period_ns and not event.cancelled:
-                heapq.heappush(self._queue, self._queued(instant + event.period_ns, event))
-        for (instant, _, _, _, _, event), skipped in late:
+                heapq.heapreplace(queue, self._queued(instant + event.period_ns, event))
+            else:
+                heapq.heappop(queue)
             if not event.cancelled:
                 self.now_ns = max(self.now_ns, instant)
-                event.action(instant, skipped)
+                event.action(instant, skipped.pop(event, 0))
         self.now_ns = max(self.now_ns, now_ns)
+
+    def _skip_until(self, now_ns: int) -> dict[ScheduledEvent, int]:
+        """Put periodic events that are late by whole periods at their last instant; return how many each skips."""
+        skipped: dict[ScheduledEvent, int] = {}
+        waiting: list[_Queued] = []
+        while self._queue and self._queue[0][0] <= now_ns:
+            entry = heapq.heappop(self._queue)
+            instant, event = entry[0], entry[5]
+            if event.period_ns and now_ns - instant >= event.period_ns:
+                skipped[event] = (now_ns - instant) // event.period_ns
+                entry = (instant + skipped[event] * event.period_ns, *entry[1:])
+            waiting.append(entry)
+        for entry in waiting:
+            heapq.heappush(self._queue, entry)
+        return skipped
 
     def pass_until(self, now_ns: int) -> None:
         """Let time of the wall clock pass, at most to the next event, which is not carried out yet.

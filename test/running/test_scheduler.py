@@ -130,13 +130,37 @@ def test_late_events_happen_in_the_order_of_the_instants_they_happen_at():
     assert scheduler.now_ns == 25
 
 
-def test_what_becomes_due_meanwhile_waits_for_the_next_call():
+def test_what_becomes_due_meanwhile_happens_in_its_order():
+    """A Processor that goes on in modeled time posts what it does next while a late call is carried out."""
     scheduler, journal = Scheduler(), Journal()
-    scheduler.at(10, key("FIRST"), lambda now: scheduler.at(now, key("SECOND"), journal.once("SECOND")))
-    scheduler.run_due(10)
-    assert journal.entries == []
-    scheduler.run_due(10)
-    assert journal.entries == [(10, "SECOND")]
+    scheduler.at(10, key("FIRST"), lambda now: scheduler.at(now + 3, key("SECOND"), journal.once("SECOND")))
+    scheduler.at(12, key("BEFORE"), journal.once("BEFORE"))
+    scheduler.at(14, key("AFTER"), journal.once("AFTER"))
+    scheduler.at(10, key("LATER"), lambda now: scheduler.at(now + 11, key("FUTURE"), journal.once("FUTURE")))
+    scheduler.run_due(20)
+    assert journal.entries == [(12, "BEFORE"), (13, "SECOND"), (14, "AFTER")]
+    assert scheduler.next_ns == 21
+
+
+def test_an_action_may_go_on_to_a_later_instant_unless_something_comes_before():
+    """Up to the end of the time that passes; an event of that instant and a lower key goes before it."""
+    scheduler, going = Scheduler(), key("ME", 5, EventClass.EXECUTE)
+    answers = []
+
+    def go(now):
+        instants = (now + 4, now + 5, now + 9, now + 10)
+        answers.extend((later, scheduler.advance_to(later, going), scheduler.now_ns) for later in instants)
+
+    scheduler.at(10, going, go)
+    gone = scheduler.at(11, key("GONE"), go)
+    gone.cancel()
+    scheduler.at(15, key("SCAN", 4), lambda _: None)
+    scheduler.run_until(16)
+    assert answers == [(14, True, 14), (15, True, 15), (19, False, 15), (20, False, 15)]
+    answers.clear()
+    scheduler.at(20, going, go)
+    scheduler.run_due(25)
+    assert answers == [(24, True, 24), (25, True, 25), (29, False, 25), (30, False, 25)]
 
 
 def test_an_event_that_another_due_one_cancels_does_not_happen():
