@@ -285,8 +285,8 @@ class Time:
 
     n outputs, k input pairs, j inputs of numbered channels, p input/output pairs, m elements searched, o order of the
     filter; t, i, b, d: common variables referenced (all latched ones, INTEGER, BOOLEAN, DOUBLE INTEGER). ``alone`` is
-    added where only one task runs on a UDC module (x and z of table 5). The elements searched are the whole table
-    (decision): the tables give maximum times.
+    added where only one task runs on a UDC module (x and z of table 5). The elements searched are those that a scan
+    looks at, from the first of the table to the one that matches (decision).
     """
 
     base: float
@@ -324,7 +324,8 @@ class Block:
     are the problems whose number the step function returns. ``structure`` says what the block does with a data
     structure: the states of the block that makes it are the structure's, and the step functions of those that use it
     take them too, to read, or to write a buffer in place. ``expected_on`` are Processors whose every task should call
-    the block, for the reason ``expected_since``.
+    the block, for the reason ``expected_since``. ``searched_to`` is the output that tells the last element searched, or
+    a negative number where all were: ``Time.m`` counts them.
     """
 
     name: str
@@ -345,6 +346,7 @@ class Block:
     begins_scan: bool = False
     expected_on: frozenset[Platform] = frozenset()
     expected_since: str = ""
+    searched_to: str = ""
 
     @property
     def parameters(self) -> tuple[Input | Output, ...]:

@@ -183,4 +183,5 @@ SEARCH = Block(
         "The table is read in the present state of memory, not as latched. The UDC's time is an estimate.",
     ),
     step=search_step,
+    searched_to="OUTPUT",
 )

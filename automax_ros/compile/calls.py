@@ -29,7 +29,7 @@ from automax_ros.compile import build
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.expressions import lower_element, lower_index
 from automax_ros.compile.folding import TableReader, value_of
-from automax_ros.compile.inline import Binding, inline, names_in
+from automax_ros.compile.inline import Binding, Inlined, inline, names_in
 from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.pynames import forced_name, latched_name, structure_prefix, variable_name
 from automax_ros.compile.simplify import log_in_place
@@ -163,6 +163,7 @@ def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     inlined = inline(block, binding, wanted, _free(values, outputs))
     body = inlined.body
     emitter.emit(*(log_in_place(body, inlined.error, emitter.log_call) if inlined.error is not None else body))
+    _cost_of_search(emitter, bound, inlined)
     for holds, places in itertools.groupby(outputs, key=lambda place: place.output.holds):
         stores = [(place, inlined.outputs[place.output.name]) for place in places]
         if holds:
@@ -170,6 +171,16 @@ def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
         else:
             _store_all(emitter, stores)
     _drop_forced(emitter, [place.target for place in outputs])
+
+
+def _cost_of_search(emitter: Emitter, bound: BoundCall, inlined: Inlined) -> None:
+    """Emit the time of the elements that a block has searched, as many as its output tells."""
+    element_ns = emitter.cost_model.element_ns(bound)
+    if emitter.modeled and element_ns:
+        last = emitter.keep(inlined.outputs[bound.block.searched_to])
+        found = build.compare(last, ">=", build.constant(0))
+        count = build.choose(found, build.binary(last, "+", build.constant(1)), build.constant(bound.elements))
+        emitter.emit(build.add_to("cost", build.binary(build.constant(element_ns), "*", count)))
 
 
 def _drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:

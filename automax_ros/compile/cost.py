@@ -50,24 +50,37 @@ SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8
 
 @dataclass(frozen=True)
 class CostModel:
-    """Times of one Processor model, in whole nanoseconds."""
+    """Times of one Processor model, in whole nanoseconds; ``alone``: the UDC runs one task, not two (table 5)."""
 
     model: Model = Model.NONE
+    alone: bool = False
 
     def block_ns(self, bound: BoundCall) -> int:
-        """Return the time of one block as it is programmed."""
+        """Return the time of one block as it is programmed, without that of the elements that it searches."""
         time = self._time(bound.block.times)
         return 0 if time is None else _to_ns(_sum(time, _programmed(bound)))
 
+    def element_ns(self, bound: BoundCall) -> int:
+        """Return the time of each element that a block searches: how many those are, a scan tells (m of the tables)."""
+        time = self._time(bound.block.times)
+        return 0 if time is None else _to_ns(time.m)
+
+    def block_bounds_ns(self, bound: BoundCall) -> tuple[int, int]:
+        """Return the least and the most time of one block: of what it searches, one element or all."""
+        programmed, each = self.block_ns(bound), self.element_ns(bound)
+        return programmed + each, programmed + each * max(1, bound.elements)
+
+    def is_estimate(self, statement: Statement) -> bool:
+        """Return whether a statement's time is one of the estimates, not the manual's."""
+        return self.model is not Model.NONE and type(statement).__name__ in STATEMENT_ESTIMATES_US
+
     def scan_loop_ns(self, program: Program) -> int:
         """Return the time of SCAN_LOOP, the latch included."""
-        time = self._time(SCAN_LOOP.times)
-        return 0 if time is None else _to_ns(_sum(time, _commons(program.symbols.values())))
+        return self._scan_part(SCAN_LOOP.times, program)
 
     def end_ns(self, program: Program) -> int:
         """Return the time of END, the write-back included."""
-        time = self._time(END_TIMES)
-        return 0 if time is None else _to_ns(_sum(time, _commons(program.symbols.values())))
+        return self._scan_part(END_TIMES, program)
 
     def statement_ns(self, statement: Statement) -> int:
         """Return the estimated time of a BASIC statement without what stands inside it."""
@@ -78,6 +91,12 @@ class CostModel:
             return 0
         estimate = STATEMENT_ESTIMATES_US.get(type(statement).__name__, 0.0)
         return _to_ns(estimate * SLOWER_THAN_7010.get(self.model, 1.0))
+
+    def _scan_part(self, times: Times, program: Program) -> int:
+        time = self._time(times)
+        if time is None:
+            return 0
+        return _to_ns(_sum(time, _commons(program.symbols.values())) + (time.alone if self.alone else 0.0))
 
     def _time(self, times: Times) -> Time | None:
         if self.model is Model.MODEL_7010:
@@ -94,13 +113,17 @@ def _to_ns(microseconds: float) -> int:
 
 
 def _programmed(bound: BoundCall) -> dict[str, int]:
-    """Return the numbers of what is programmed, by the letters of the manual's tables."""
+    """Return the numbers of what is programmed, by the letters of the manual's tables.
+
+    Inputs of numbered channels alone are ``j``: SELECT's are INPUTn and SELECTn, those of WRITE blocks are without
+    STRUCTURE_NAME, COLUMN and ENABLE; ERROR of READ blocks is an output among ``n`` (decision).
+    """
     block = bound.block
     outputs = sum(item.name in bound.arguments for item in block.outputs)
     channels = sum(item.name in bound.arguments and item.name[-1].isdigit() for item in block.inputs)
     pairs = sum(item.name in bound.arguments and item.name.startswith("INPUT") for item in block.inputs)
     order = bound.facts.get("order", 0)
-    return {"n": outputs, "j": channels, "k": pairs, "p": pairs, "m": bound.elements, "o": int(order)}
+    return {"n": outputs, "j": channels, "k": pairs, "p": pairs, "o": int(order)}
 
 
 def _commons(symbols: Iterable[Symbol]) -> dict[str, int]:

@@ -15,12 +15,12 @@ from automax_ros.compile.folding import value_of
 from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.stores import converted, store
 from automax_ros.core.types import DataType
+from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import (
     Assignment,
     Call,
     For,
     Gosub,
-    Goto,
     If,
     OnJump,
     Read,
@@ -138,23 +138,30 @@ def _bounds_of_sum(emitter: Emitter, loop: Loop, present: Lowered) -> tuple[int,
 
 def _only_counts(emitter: Emitter, loop: Loop) -> bool:
     """Return whether nothing but the loop itself can set its variable while it runs."""
-    name = loop.statement.variable.name
-    return emitter.symbol(name).scope is Scope.LOCAL and not _sets(loop.statement.body, name)
+    return counts_alone(emitter.program, loop.statement)
 
 
-def _sets(statements: tuple[Statement, ...], name: str) -> bool:
-    """Return whether statements may set a variable; a subroutine or a jump may lead to anything."""
+def counts_alone(program: Program, loop: For) -> bool:
+    """Return whether nothing but a loop can set its variable while it runs."""
+    name = loop.variable.name
+    return program.symbols[name].scope is Scope.LOCAL and not _sets(program, loop.body, name)
+
+
+def _sets(program: Program, statements: tuple[Statement, ...], name: str) -> bool:
+    """Return whether statements of a loop may set a variable; a subroutine may. No jump leads back into a loop."""
     for statement in statements:
-        if isinstance(statement, (Gosub, Goto, OnJump)):
+        if isinstance(statement, Gosub) or (isinstance(statement, OnJump) and statement.gosub):
             return True
         if isinstance(statement, Assignment) and statement.target.name == name:
             return True
         if isinstance(statement, Read) and any(target.name == name for target in statement.targets):
             return True
-        if isinstance(statement, Call) and Reference(name) in [argument.value for argument in statement.arguments]:
+        if isinstance(statement, Call) and Reference(name) in program.calls[statement.span].targets:
             return True
-        if isinstance(statement, If) and (_sets(statement.then, name) or _sets(statement.otherwise, name)):
+        if isinstance(statement, If) and any(
+            _sets(program, suite, name) for suite in (statement.then, statement.otherwise)
+        ):
             return True
-        if isinstance(statement, For) and (statement.variable.name == name or _sets(statement.body, name)):
+        if isinstance(statement, For) and (statement.variable.name == name or _sets(program, statement.body, name)):
             return True
     return False

@@ -10,7 +10,7 @@ from automax_ros.compile import build
 from automax_ros.compile.calls import BlockInstance, lower_block
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.expressions import lower, of_type
-from automax_ros.compile.flow import PC, STEPS, Flow, count_statements, is_jumping, jump_targets
+from automax_ros.compile.flow import JUMPS, PC, STEPS, Flow, count_statements, is_jumping, jump_targets
 from automax_ros.compile.folding import value_of
 from automax_ros.compile.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
 from automax_ros.compile.layout import Role, StateField
@@ -178,7 +178,8 @@ class StatementLowering:
                 self._lower_straight((statement,))
 
     def _flow_one(self, flow: Flow, statement: Statement) -> None:
-        self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement) if not isinstance(statement, For) else 0)
+        if isinstance(statement, (*JUMPS, If)):  # the others carry their time themselves
+            self.emitter.add_cost(self.emitter.cost_model.statement_ns(statement))
         if isinstance(statement, Goto):
             self._next_block(flow, flow.to_line(statement.line))
         elif isinstance(statement, If):

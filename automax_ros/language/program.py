@@ -101,6 +101,11 @@ class BoundCall:
     elements: int = 0
 
     @property
+    def targets(self) -> list[Expression]:
+        """What the outputs are given: variables and array elements, in the order of the declaration."""
+        return [self.arguments[output.name] for output in self.block.outputs if output.name in self.arguments]
+
+    @property
     def facts(self) -> dict[str, Value]:
         """What the CALL fixes for the block, by lower-case name: literals, defaults, and the ``CALL_FACTS``."""
         facts: dict[str, Value] = {name.lower(): value for name, value in self.defaults.items()}

@@ -1,0 +1,235 @@
+"""The least and the most time that a scan of a task takes, over all ways through it.
+
+Each IF may go either way, each ON any of its ways. A FOR of whole literals takes its turns exactly; of other loops, and
+of those that a jump back makes, no turn counts for the least and one for the most (decision: nothing bounds them).
+A subroutine counts wherever it is called, to the depth that a GOSUB can nest. A scan that STOP ends is none that the
+times tell of, unless there are no others (decision).
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
+
+from automax_ros.compile.cost import CostModel
+from automax_ros.compile.flow import jump_targets
+from automax_ros.compile.loops import counts_alone
+from automax_ros.compile.paths import NOTHING, Span, ways_out
+from automax_ros.compile.statements import GOSUB_DEPTH
+from automax_ros.language.checks.constant_values import constant_value
+from automax_ros.language.program import Program
+from automax_ros.language.syntax.tree import (
+    Call,
+    End,
+    For,
+    Gosub,
+    Goto,
+    If,
+    IntegerLiteral,
+    OnJump,
+    Return,
+    Statement,
+    Stop,
+)
+
+
+@dataclass(frozen=True)
+class ScanTimes:
+    """The least and most time of a scan in ns; ``estimated`` where a time is in the sum that no manual prints."""
+
+    least_ns: int
+    most_ns: int
+    estimated: bool
+
+
+class _Way(enum.Enum):
+    """A way out of some statements other than to a line."""
+
+    NEXT = "to the statement after them"
+    RETURN = "RETURN"
+    END = "END"
+    STOP = "STOP"
+
+
+_Ways = dict[Hashable, Span]
+"""The ways out of some statements, lines as ``("line", number)``, each with its time."""
+
+
+def scan_times(program: Program, model: CostModel) -> ScanTimes:
+    """Return the bounds of a scan's time, SCAN_LOOP and END included."""
+    subroutines: dict[int, _Ways] = {}
+    for _ in range(GOSUB_DEPTH):
+        found = _subroutines(program, model, subroutines)
+        if found == subroutines:
+            break
+        subroutines = found
+    ways = _Suite(program, model, subroutines, inside=False).ways(program.scan)
+    ways = _to_the_end(ways)
+    if _Way.END in ways:
+        times = ways[_Way.END].plus(Span(model.end_ns(program), model.end_ns(program)))
+    else:
+        times = ways.get(_Way.STOP, NOTHING)
+    scan_loop = model.scan_loop_ns(program)
+    return ScanTimes(scan_loop + times.least, scan_loop + times.most, is_estimated(program.scan, model))
+
+
+def is_estimated(statements: tuple[Statement, ...], model: CostModel) -> bool:
+    """Return whether a BASIC statement among these, or inside them, has a time that is an estimate."""
+    return any(model.is_estimate(statement) for statement in _all(statements))
+
+
+def _all(statements: tuple[Statement, ...]) -> Iterator[Statement]:
+    for statement in statements:
+        yield statement
+        if isinstance(statement, If):
+            yield from _all(statement.then)
+            yield from _all(statement.otherwise)
+        elif isinstance(statement, For):
+            yield from _all(statement.body)
+
+
+def _either(ways: _Ways, *names: _Way) -> Span | None:
+    found: Span | None = None
+    for name in names:
+        if name in ways:
+            found = ways[name].joined(found)
+    return found
+
+
+def _subroutines(program: Program, model: CostModel, inner: dict[int, _Ways]) -> dict[int, _Ways]:
+    """Return the ways out of each subroutine, where those that it calls have the ways ``inner``."""
+    called = sorted(_called(program.scan))
+    suite = _Suite(program, model, inner, inside=True)
+    return {line: _to_the_end(suite.ways(program.scan, line)) for line in called}
+
+
+def _to_the_end(ways: _Ways) -> _Ways:
+    """Return the ways out of the scan's statements where the last one leads to END."""
+    end = _either(ways, _Way.NEXT, _Way.END)
+    rest = {way: span for way, span in ways.items() if way not in (_Way.NEXT, _Way.END)}
+    return rest if end is None else {**rest, _Way.END: end}
+
+
+def _called(statements: tuple[Statement, ...]) -> frozenset[int]:
+    gosubs = (Gosub, OnJump)
+    return jump_targets(tuple(item for item in _all(statements) if isinstance(item, gosubs) and _calls(item)))
+
+
+def _calls(statement: Gosub | OnJump) -> bool:
+    return isinstance(statement, Gosub) or statement.gosub
+
+
+@dataclass(frozen=True)
+class _Suite:
+    """Times of statements; ``inside`` a subroutine RETURN is a way out, else it does nothing."""
+
+    program: Program
+    model: CostModel
+    subroutines: dict[int, _Ways]
+    inside: bool
+
+    def ways(self, statements: tuple[Statement, ...], line: int | None = None) -> _Ways:
+        """Return the ways out of statements, from the first on or from a line on; a line that is not there: none."""
+        labels = {statement.number: place for place, statement in reversed(list(enumerate(statements)))}
+        end = len(statements)
+
+        def place_of(way: Hashable, place: int) -> Hashable:
+            if way is _Way.NEXT:
+                return place + 1
+            return labels.get(way[1], way) if isinstance(way, tuple) else way
+
+        edges: list[_Ways] = []
+        for place, statement in enumerate(statements):
+            leading: _Ways = {}
+            for way, span in self._statement(statement).items():
+                to = place_of(way, place)
+                leading[to] = span.joined(leading.get(to))
+            edges.append(leading)
+        edges.append({_Way.NEXT: NOTHING})
+        entry = 0 if line is None else labels.get(line, end)
+        return ways_out(edges, entry)
+
+    def _statement(self, statement: Statement) -> _Ways:
+        own = self.model.statement_ns(statement)
+        if isinstance(statement, Call):
+            least, most = self.model.block_bounds_ns(self.program.calls[statement.span])
+            return {_Way.NEXT: Span(least, most)}
+        if isinstance(statement, If):
+            inner = _joined(self._branch(statement), self.ways(statement.otherwise))
+        elif isinstance(statement, For):
+            inner = self._loop(statement)
+        else:
+            inner = self._jump(statement)
+        return {way: span.plus(Span(own, own)) for way, span in inner.items()}
+
+    def _branch(self, statement: If) -> _Ways:
+        """Return the ways out of THEN; a jump that is all of an IF is in the IF's time (decision)."""
+        first = statement.then[0] if len(statement.then) == 1 and not statement.otherwise else None
+        return self._jump(first) if isinstance(first, Goto) else self.ways(statement.then)
+
+    def _jump(self, statement: Statement) -> _Ways:
+        if isinstance(statement, Goto):
+            return self._to_line(statement.line, gosub=False)
+        if isinstance(statement, Gosub):
+            return self._to_line(statement.line, gosub=True)
+        if isinstance(statement, OnJump):
+            lines = [
+                self._subroutine(line) if statement.gosub else {("line", line): NOTHING} for line in statement.lines
+            ]
+            return _joined({_Way.NEXT: NOTHING}, *lines)
+        if isinstance(statement, Return) and self.inside:
+            return {_Way.RETURN: NOTHING}
+        if isinstance(statement, (End, Stop)):
+            return {_Way.END if isinstance(statement, End) else _Way.STOP: NOTHING}
+        return {_Way.NEXT: NOTHING}
+
+    def _to_line(self, line: int, gosub: bool) -> _Ways:
+        """Return the ways out of a jump or a GOSUB; one that nests too deep is skipped."""
+        if not gosub:
+            return {("line", line): NOTHING}
+        inner = self.subroutines.get(line, {_Way.RETURN: NOTHING})
+        return {_Way.NEXT if way is _Way.RETURN else way: span for way, span in inner.items()}
+
+    def _loop(self, statement: For) -> _Ways:
+        turns = self._turns(statement)
+        if turns == 0:
+            return {_Way.NEXT: NOTHING}
+        body = self.ways(statement.body)
+        turn = body.get(_Way.NEXT)
+        most_before = (turns - 1) * turn.most if turns and turn else 0
+        left: _Ways = {
+            way: Span(span.least, most_before + span.most) for way, span in body.items() if way is not _Way.NEXT
+        }
+        if turns is None:
+            left[_Way.NEXT] = NOTHING if turn is None else Span(0, turn.most)
+        elif turn is not None:
+            left[_Way.NEXT] = Span(turns * turn.least, turns * turn.most)
+        return left
+
+    def _turns(self, statement: For) -> int | None:
+        """Return the turns of a loop of whole literals that nothing else than the loop counts, else None."""
+        first, last = constant_value(statement.start), constant_value(statement.stop)
+        step = constant_value(statement.step or IntegerLiteral(1))
+        if not all(type(value) is int for value in (first, last, step)) or step == 0:
+            return None
+        if not statement.variable.type.is_integer or not counts_alone(self.program, statement):
+            return None
+        low, high = map(int, statement.variable.type.range)
+        return _count(int(first or 0), int(last or 0), int(step or 1), (low, high))
+
+
+def _count(first: int, last: int, step: int, bounds: tuple[int, int]) -> int:
+    """Return the turns from first to last; the loop ends where its variable would leave its range."""
+    low, high = bounds
+    first = min(max(first, low), high)
+    last = min(last, high) if step > 0 else max(last, low)
+    return max(0, (last - first) // step + 1)
+
+
+def _joined(*several: _Ways) -> _Ways:
+    result: _Ways = {}
+    for ways in several:
+        for way, span in ways.items():
+            result[way] = span.joined(result.get(way))
+    return result
