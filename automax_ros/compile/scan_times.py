@@ -174,10 +174,8 @@ class _Suite:
         if isinstance(statement, Gosub):
             return self._to_line(statement.line, gosub=True)
         if isinstance(statement, OnJump):
-            lines = [
-                self._subroutine(line) if statement.gosub else {("line", line): NOTHING} for line in statement.lines
-            ]
-            return _joined({_Way.NEXT: NOTHING}, *lines)
+            past: _Ways = {_Way.NEXT: NOTHING}
+            return _joined(past, *(self._to_line(line, statement.gosub) for line in statement.lines))
         if isinstance(statement, Return) and self.inside:
             return {_Way.RETURN: NOTHING}
         if isinstance(statement, (End, Stop)):

@@ -9,7 +9,7 @@ from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.language.program import Program
 from automax_ros.rack.config import RackConfig, Timing
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.kind import ModuleConfig, cost_model
 from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of
 
 Finding = tuple[SourceText, list[Diagnostic]]
@@ -68,7 +68,8 @@ class Installation:
 
     def _compile(self, task: str, program: Program) -> CompiledTask:
         modeled = self._config.execution is Timing.MODELED
-        return compile_program(program, self._views, CostModel(self._module(task).times if modeled else Model.NONE))
+        costs = cost_model(self._module(task)) if modeled else CostModel(Model.NONE)
+        return compile_program(program, self._views, costs)
 
     def _module(self, task: str) -> ModuleConfig:
         return next(module for module, item in self._config.placed_tasks if item.name == task)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from automax_ros.compile.cost import Model
+from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Span
 from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.findings import Findings
@@ -83,6 +83,11 @@ class ModuleConfig(Protocol):
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""
         ...
+
+
+def cost_model(module: ModuleConfig) -> CostModel:
+    """Return what times the tasks of a module have; a UDC with one task has others than one with two (table 5)."""
+    return CostModel(module.times, alone=len(module.tasks) == 1)
 
 
 @dataclass(frozen=True)
