@@ -8,19 +8,25 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from automax_ros.nodes.common_memory import CommonMemoryNode
-from automax_ros.nodes.digital_io import DigitalIoNode
+from automax_ros.nodes.io_module import IoModuleNode
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
 from automax_ros.rack.modules.kind import Module, ModuleKind
 from automax_ros.rack.modules.processor import PROCESSOR
+from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.registry import SUPPORTED
+from automax_ros.rack.modules.resolver import RESOLVER
 
 NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     PROCESSOR: ProcessorNode,
     COMMON_MEMORY: None,
-    DIGITAL_IO: DigitalIoNode,
+    DIGITAL_IO: IoModuleNode,
+    ANALOG_IO: IoModuleNode,
+    RESOLVER: IoModuleNode,
+    PULSETACH: IoModuleNode,
 }
 """The node of each kind of module; None where the rack's common memory node is enough."""
 

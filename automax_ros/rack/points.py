@@ -14,8 +14,8 @@ from automax_ros.rack.scalars import integer_value
 from automax_ros.rack.sections import Section
 
 KEYS = ("slot", "register", "bit")
-_SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32}
-"""Bits of the types that a point may have (J2-3045 p. 7-1)."""
+_SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32, DataType.REAL: 32}
+"""Bits of the types that a point may have (J2-3045 p. 7-1); a REAL only on the application registers of a UDC."""
 
 
 class PointReader:
@@ -40,7 +40,8 @@ class PointReader:
         module = self._module(slot, section, what) if slot is not None else None
         if slot is None or module is None:
             return None
-        last = module.registers.count - (2 if declared.type is DataType.DOUBLE else 1)
+        words = -(-_SIZES[declared.type] // 16)
+        last = module.registers.count - words
         if last < 0:
             self._findings.add("AMX6421", f"{what} takes two registers; the {module.model} has one", span)
             return None
@@ -48,8 +49,23 @@ class PointReader:
         bit = self._number(section, "bit", what, 0, 15) if "bit" in section else None
         if register is None or (bit is None and "bit" in section):
             return None
+        if not self._suits(declared, module, range(register, register + words), section):
+            return None
         point = Point(slot, register, bit)
         return point if self._is_free(point, declared, span) else None
+
+    def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
+        """Report two registers of which a task may write only one, and a REAL where none can stand."""
+        message, place = "", section.key_span("register")
+        if len({module.registers.direction(register) for register in taken}) > 1:
+            message = f"{declared.name} takes the registers {taken[0]} and {taken[-1]} of the {module.model}"
+            message += f": an {' and an '.join(map(module.registers.direction, taken))}"
+        elif declared.type is DataType.REAL and any(register not in module.registers.reals for register in taken):
+            self._report_impossible(f"{declared.name} cannot be an I/O point: it is REAL", place)
+            return False
+        if message:
+            self._findings.add("AMX6421", message, place)
+        return not message
 
     def _is_possible(self, section: Section, declared: VariableName) -> bool:
         """Report what no point can be: an array, a REAL or a string, non-volatile, a word with a bit."""
@@ -64,9 +80,12 @@ class PointReader:
             message = f"{declared.name} cannot be non-volatile: its module holds it"
             place = section.key_span("non_volatile")
         if message:
-            hint = "an I/O point is a simple BOOLEAN (with slot, register, bit), INTEGER or DOUBLE INTEGER"
-            self._findings.add("AMX6422", message, place, hint)
+            self._report_impossible(message, place)
         return not message
+
+    def _report_impossible(self, message: str, place: Span) -> None:
+        hint = "an I/O point is a simple BOOLEAN (with slot, register, bit), INTEGER or DOUBLE INTEGER"
+        self._findings.add("AMX6422", message, place, hint)
 
     def _number(self, section: Section, key: str, what: str, low: int, high: int) -> int | None:
         node = section.get(key)

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, in_order
+from automax_ros.core.kinds import Direction
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
-from automax_ros.rack.config import RackConfig
+from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.kind import ModuleConfig, Registers
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.task_source import read_task_source
 
@@ -27,7 +28,7 @@ class CheckedTask(NamedTuple):
 
 def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
     """Return the rack's common variables by full name, as the checker compares them with a task's COMMON."""
-    outputs = {module.slot: module.registers.outputs for module in config.modules}
+    registers = {module.slot: module.registers for module in config.modules}
     return {
         variable.name: CommonSpec(
             name=variable.name,
@@ -35,10 +36,18 @@ def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
             place=f"{config.path.name}:{variable.line}",
             dimensions=variable.dimensions,
             length=variable.length,
-            is_input=variable.point is not None and variable.point.register not in outputs[variable.point.slot],
+            is_input=_is_input(variable, registers),
         )
         for variable in config.declared
     }
+
+
+def _is_input(variable: CommonVariable, registers: Mapping[int, Registers]) -> bool:
+    """Return whether a variable shows an input, which no task may write."""
+    if variable.point is None:
+        return False
+    direction = registers[variable.point.slot].direction(variable.point.register)
+    return direction == "input" or (direction == "either" and variable.direction is Direction.IN)
 
 
 def check_tasks(config: RackConfig) -> list[CheckedTask]:

@@ -32,7 +32,7 @@ def backplane_of(config: RackConfig) -> Backplane:
     """Return where the registers of a rack's modules answer."""
     banks = bank_views(config.variables)
     return Backplane(
-        Bank(module.slot, banks[module.slot], module.registers.count, module.registers.outputs)
+        Bank(module.slot, banks[module.slot], module.registers.count, module.registers.writable)
         for module in config.modules
         if module.slot in banks
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 BUS_ERROR = 7031
@@ -16,7 +16,7 @@ class Bank:
     slot: int
     view: int
     registers: int
-    writable: range = range(0)
+    writable: Collection[int] = range(0)
 
 
 class Backplane:

@@ -5,14 +5,18 @@ A word and its bits alias in actual memory; the latch copies views, so that in a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+import math
+import struct
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
+from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
 from automax_ros.running.views import Place, ViewSpec
 
 Entry = tuple[int, int, Value]
 """View, element, value."""
 _WORD = 0xFFFF
+_TWO_WORDS = (DataType.DOUBLE, DataType.REAL)
 
 
 class RegisterMap:
@@ -64,11 +68,10 @@ class RegisterMap:
                 value = _signed(_unsigned(value) & ~mask | _unsigned(read(view, element)) & mask)
         return value
 
-    def apart_from(self, bank: int, outputs: range, registers: int) -> frozenset[tuple[int, int]]:
-        """Return view and element of all that shows registers of a bank that are not outputs: its inputs."""
-        inputs = [register for register in range(registers) if register not in outputs]
-        points = (view for register in inputs for view in self._points.get((bank, register), ()))
-        return frozenset([*((bank, register) for register in inputs), *((view, 0) for view in points)])
+    def showing(self, bank: int, registers: Iterable[int]) -> frozenset[tuple[int, int]]:
+        """Return view and element of all that shows one of the registers of a bank: the words, and their points."""
+        words = [(bank, register) for register in registers]
+        return frozenset([*words, *((view, 0) for word in words for view in self._points.get(word, ()))])
 
     def others(self, view: int) -> list[int]:
         """Return the points that share a bit with a point: a word, and each of its named bits."""
@@ -81,19 +84,20 @@ class RegisterMap:
 
     def _registers(self, view: int) -> range:
         first = self._places[view].register
-        return range(first, first + (2 if self._types[view] is DataType.DOUBLE else 1))
+        return range(first, first + (2 if self._types[view] in _TWO_WORDS else 1))
 
     def _words(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[int, int]:
         """Return the registers that a write touches, as 16-bit words without sign."""
         assert not isinstance(value, str)
-        place, number = self._places.get(view), int(value)
+        place, kind = self._places.get(view), self._types[view]
+        number = _real_bits(value) if place is not None and kind is DataType.REAL else int(value)
         if place is None:
             return {element: number & _WORD}
         first = place.register
         if place.bit is not None:
             before = _unsigned(read(place.bank, first))
             return {first: before & ~(1 << place.bit) | number << place.bit}
-        if self._types[view] is DataType.DOUBLE:
+        if kind in _TWO_WORDS:
             return {first: number >> 16 & _WORD, first + 1: number & _WORD}
         return {first: number & _WORD}
 
@@ -103,6 +107,8 @@ class RegisterMap:
         found = [words.get(number, _unsigned(read(place.bank, number))) for number in self._registers(view)]
         if place.bit is not None:
             return bool(found[0] >> place.bit & 1)
+        if self._types[view] is DataType.REAL:
+            return _real_of(found[0] << 16 | found[1])
         if len(found) == 2:
             return _signed(found[0]) << 16 | found[1]
         return _signed(found[0])
@@ -115,3 +121,14 @@ def _signed(word: int) -> int:
 def _unsigned(value: Value) -> int:
     assert not isinstance(value, str)
     return int(value) & _WORD
+
+
+def _real_bits(value: int | float) -> int:
+    """Return a REAL as the 32 bits that two registers hold: IEEE single precision, high word first (decision)."""
+    return int.from_bytes(struct.pack(">f", value), "big")
+
+
+def _real_of(bits: int) -> float:
+    """Return the REAL that two registers hold; bits that are no number of 2.4.3 show as 0, or as its range (decision)."""
+    value: float = struct.unpack(">f", bits.to_bytes(4, "big"))[0]
+    return 0.0 if math.isnan(value) else stored_real(value)[0]

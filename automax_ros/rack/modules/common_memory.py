@@ -1,4 +1,9 @@
-"""Common memory modules: they hold the rack's common variables; with several Processors one is needed in slot 0."""
+"""Common memory modules: in slot 0 they hold the rack's common variables, in any other even slot plain registers.
+
+With several Processors one is needed in slot 0. Elsewhere a module has 64K registers of user data, whichever it is, and
+no arrays (J-3636 p. 1-1): tasks may write any of them, a variable with ``ros: in`` is an input. STOP ALL and a power
+cycle clear them, as volatile common memory (decision). They do not arbitrate the bus.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +16,13 @@ from automax_ros.rack.task_config import TaskConfig
 COMMON_REGISTERS = {"57C413": 65536, "57C423": 131072}
 """16-bit registers for common variables in slot 0 (J-3636 p. 1-1)."""
 NODE = "common_memory"
+_USER_REGISTERS = Registers(65536, either=range(65536))
+"""What a module in an even slot other than 0 has (J-3636 p. 1-1)."""
 
 
 @dataclass(frozen=True)
 class CommonMemoryConfig:
-    """The common memory module in slot 0."""
+    """A common memory module."""
 
     slot: int
     model: str
@@ -24,12 +31,11 @@ class CommonMemoryConfig:
     tick_ns = 0
     times = Model.NONE
     has_battery = True
-    registers: Registers = NO_REGISTERS
 
     @property
     def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
-        return NODE
+        """The module's name in the rack; in slot 0 it is that of the node of all common variables."""
+        return f"{NODE}_{self.slot}" if self.slot else NODE
 
     @property
     def tasks(self) -> tuple[TaskConfig, ...]:
@@ -37,9 +43,14 @@ class CommonMemoryConfig:
         return ()
 
     @property
+    def registers(self) -> Registers:
+        """Registers of user data, but not in slot 0."""
+        return _USER_REGISTERS if self.slot else NO_REGISTERS
+
+    @property
     def common_registers(self) -> int:
-        """16-bit registers that common variables may take."""
-        return COMMON_REGISTERS[self.model]
+        """16-bit registers that common variables may take, in slot 0 alone."""
+        return 0 if self.slot else COMMON_REGISTERS[self.model]
 
     def build(self, _: Parts) -> Module:
         """Return the module of a running rack."""
@@ -58,12 +69,12 @@ class CommonMemoryKind:
         return CommonMemoryConfig(found.slot, found.model, found.span.line)
 
     def check_places(self, rack: Arrangement) -> None:
-        """Report common memory outside slot 0 (J2-3106-1 p. 10-2)."""
+        """Report common memory in an odd slot (J-3636 p. 1-1)."""
         for item in rack.of(self):
-            if item.slot != 0:
-                reason = "plain registers, which are not supported yet" if item.slot % 2 == 0 else "not possible"
-                message = f"the {item.model} in slot {item.slot} is {reason}"
-                rack.findings.add("AMX6208", message, item.span, "common memory stands in slot 0")
+            if item.slot % 2:
+                message = f"the {item.model} cannot stand in slot {item.slot}"
+                hint = "common memory stands in slot 0, or with registers of user data in another even slot"
+                rack.findings.add("AMX6208", message, item.span, hint)
 
 
 COMMON_MEMORY = CommonMemoryKind()

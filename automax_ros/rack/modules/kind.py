@@ -5,7 +5,7 @@ A kind reads its section of a rack file into a configuration; a configuration bu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -30,12 +30,56 @@ ModuleState = Mapping[str, Any]
 """What a module keeps next to common memory, as numbers, texts, lists and mappings: ``{}`` where that is nothing."""
 
 
+CLOCK_ENABLE = 6
+"""The bit of an interrupt status and control register by which a module drives the common clock (57C411 p. 4-1)."""
+
+
+@dataclass(frozen=True)
+class Interrupt:
+    """An interrupt that a module raises while the rack has a common clock.
+
+    ``status`` is its interrupt status and control register (ISCR), which an EVENT names. ``period`` is the register with
+    the time between two, less one, in 0.5 ms; None where the module counts in a way of its own. ``inputs`` are the
+    registers that freeze at the interrupt. ``enable`` is a bit of ``status`` that must be set besides, None where the
+    EVENT is enough.
+    """
+
+    status: int
+    period: int | None = None
+    inputs: range = range(0)
+    enable: int | None = None
+
+
 @dataclass(frozen=True)
 class Registers:
-    """The registers of a module: how many, and which of them are outputs; the others are inputs."""
+    """The registers of a module: how many, and who writes them.
+
+    Tasks write ``outputs``. Of ``either`` a variable with ``ros: in`` is an input, any other what its task makes of it.
+    The rest are inputs. ``reals`` are those on which REAL variables may stand. ``copies`` are pairs of a register and
+    the input that shows the same; ``clock_status`` pairs of an input and the bits that are set while there is a common
+    clock.
+    """
 
     count: int = 0
-    outputs: range = range(0)
+    outputs: Collection[int] = range(0)
+    either: Collection[int] = range(0)
+    reals: Collection[int] = range(0)
+    interrupts: tuple[Interrupt, ...] = ()
+    copies: tuple[tuple[int, int], ...] = ()
+    clock_status: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def writable(self) -> Collection[int]:
+        """The registers that a task may write."""
+        if not self.either:
+            return self.outputs
+        return frozenset({*self.outputs, *self.either}) if self.outputs else self.either
+
+    def direction(self, register: int) -> str:
+        """Return in a word what a register is: ``input``, ``output`` or ``either``."""
+        if register in self.either:
+            return "either"
+        return "output" if register in self.outputs else "input"
 
 
 NO_REGISTERS = Registers()

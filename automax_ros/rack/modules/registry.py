@@ -8,12 +8,22 @@ from __future__ import annotations
 
 import re
 
+from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
 from automax_ros.rack.modules.kind import ModuleKind
 from automax_ros.rack.modules.processor import PROCESSOR
+from automax_ros.rack.modules.pulsetach import PULSETACH
+from automax_ros.rack.modules.resolver import RESOLVER
 
-KINDS: tuple[ModuleKind, ...] = (PROCESSOR, COMMON_MEMORY, DIGITAL_IO)
+KINDS: tuple[ModuleKind, ...] = (
+    PROCESSOR,
+    COMMON_MEMORY,
+    DIGITAL_IO,
+    ANALOG_IO,
+    RESOLVER,
+    PULSETACH,
+)
 """All kinds of modules: whoever wants a module finds it here."""
 SUPPORTED: dict[str, ModuleKind] = {model: kind for kind in KINDS for model in kind.models}
 """The kind of each number that a rack file may name."""
@@ -23,14 +33,10 @@ NOT_YET = {
     "57C404": "DCS-NET network module",
     "57C405": "drive analog I/O module",
     "57C406": "DC drive controller",
-    "57C409": "2-channel analog input module",
-    "57C410": "analog output module",
-    "57C411": "resolver input module",
     "57C414": "Modbus interface module",
     "57C416": "remote I/O module",
     "57C417": "R-Net module",
     "57C418": "A-B interface module",
-    "57C421": "pulsetach input module",
     "57C560": "AutoMax PC3000",
     "57C565": "AutoMax PC3000",
     "57C570": "AutoMax PC3000",

@@ -1,4 +1,4 @@
-"""The node ``digital_io_SLOT``: a digital input or output module.
+"""The node of an I/O module: ``digital_io_SLOT``, ``analog_io_SLOT``, ``resolver_SLOT``, ``pulsetach_SLOT``.
 
 Publishes: ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second with its registers. Its points are common
 variables, which have topics of their own (``common_memory``).
@@ -12,8 +12,8 @@ from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.rack.modules.kind import Module
 
 
-class DigitalIoNode(ModuleNode):
-    """Serves one digital module."""
+class IoModuleNode(ModuleNode):
+    """Serves one I/O module."""
 
     def __init__(self, site: Site, module: Module) -> None:
         """Create the publisher."""

@@ -1,0 +1,31 @@
+"""Analog modules: two inputs (57C409) or four outputs (57C410), 4095 counts at full scale (57C409 manual p. 3-3).
+
+A 57C409 has its two inputs in the registers 0 and 1, their status in 4 and a control register for each in 5 and 6; that
+2 and 3 are their update periods is ours (decision). Each channel has an interrupt, at which its input freezes; the
+module drives the common clock while bit 6 is set in both control registers (p. 3-3). The registers of a 57C410 are ours
+too (decision): four outputs in 0 to 3.
+"""
+
+from __future__ import annotations
+
+from automax_ros.rack.modules.io_config import IoKind, IoModel
+from automax_ros.rack.modules.kind import Interrupt, Registers
+
+_INPUTS = Registers(
+    7,
+    outputs=frozenset({2, 3, 5, 6}),
+    interrupts=(
+        Interrupt(status=5, period=2, inputs=range(1)),
+        Interrupt(status=6, period=3, inputs=range(1, 2)),
+    ),
+    clock_status=((4, 0x0500),),
+)
+
+ANALOG_IO = IoKind(
+    "analog I/O",
+    "analog_io",
+    {
+        "57C409": IoModel("2-channel analog input module", _INPUTS),
+        "57C410": IoModel("analog output module", Registers(4, outputs=range(4))),
+    },
+)

@@ -1,0 +1,80 @@
+"""What all plain I/O modules have in common: registers that stand in a table, no keys of their own, no tasks, any slot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from automax_ros.compile.cost import Model
+from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, QuietModule, Registers
+from automax_ros.rack.task_config import TaskConfig
+
+
+@dataclass(frozen=True)
+class IoConfig:
+    """An I/O module in any slot; ``node`` begins its name."""
+
+    slot: int
+    model: str
+    node: str
+    registers: Registers
+    line: int = 0
+
+    tick_ns = 0
+    times = Model.NONE
+    has_battery = False
+    common_registers = 0
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"{self.node}_{self.slot}"
+
+    @property
+    def tasks(self) -> tuple[TaskConfig, ...]:
+        """No tasks."""
+        return ()
+
+    def build(self, parts: Parts) -> Module:
+        """Return the module of a running rack."""
+        return QuietModule(self, inputs_of(self, parts))
+
+
+def inputs_of(config: IoConfig, parts: Parts) -> frozenset[tuple[int, int]]:
+    """Return what shows a module's inputs: STOP ALL clears its outputs, its inputs go on (J2-3106-1 p. 10-6)."""
+    bank = parts.backplane.bank(config.slot)
+    assert bank is not None
+    inputs = (number for number in range(bank.registers) if config.registers.direction(number) == "input")
+    return parts.memory.registers.showing(bank.view, inputs)
+
+
+@dataclass(frozen=True)
+class IoModel:
+    """One catalogue number: what the module is, and its registers."""
+
+    title: str
+    registers: Registers
+
+
+@dataclass(frozen=True, eq=False)
+class IoKind:
+    """A kind of module of which a rack file says nothing but its number and its slot."""
+
+    word: str
+    node: str
+    table: Mapping[str, IoModel]
+    models: Mapping[str, str] = field(init=False)
+    options: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Derive what the other kinds say for themselves."""
+        titles = {number: model.title for number, model in self.table.items()}
+        object.__setattr__(self, "models", MappingProxyType(titles))
+
+    def read(self, found: FoundModule) -> IoConfig:
+        """Read the section, which has no keys of its own."""
+        return IoConfig(found.slot, found.model, self.node, self.table[found.model].registers, found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Find nothing wrong: no source tells of a slot where these modules may not stand."""
