@@ -27,7 +27,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6205", "more than one Processor without common memory"),
     Problem("AMX6206", "Processor in a slot where none can stand"),
     Problem("AMX6207", "too many Processors"),
-    Problem("AMX6208", "common memory outside slot 0"),
+    Problem("AMX6208", "common memory in an odd slot"),
     Problem("AMX6209", "no Processor"),
     Problem("AMX6210", "tick rate"),
     # rack files: tasks

@@ -1,4 +1,4 @@
-"""What all plain I/O modules have in common: registers that stand in a table, no keys of their own, no tasks, any slot."""
+"""What all I/O modules have in common: registers that stand in a table, no keys of their own, no tasks, any slot."""
 
 from __future__ import annotations
 

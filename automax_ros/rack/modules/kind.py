@@ -38,9 +38,9 @@ CLOCK_ENABLE = 6
 class Interrupt:
     """An interrupt that a module raises while the rack has a common clock.
 
-    ``status`` is its interrupt status and control register (ISCR), which an EVENT names. ``period`` is the register with
-    the time between two, less one, in 0.5 ms; None where the module counts in a way of its own. ``inputs`` are the
-    registers that freeze at the interrupt. ``enable`` is a bit of ``status`` that must be set besides, None where the
+    ``status`` is its interrupt status and control register (ISCR), which an EVENT names. ``period`` is the register
+    with the time between two, less one, in 0.5 ms; None where the module counts in a way of its own. ``inputs`` are
+    the registers that freeze at the interrupt. ``enable`` is a bit of ``status`` that must be set too, None where the
     EVENT is enough.
     """
 

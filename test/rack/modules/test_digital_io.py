@@ -145,5 +145,5 @@ def test_only_a_word_and_its_bits_may_share(tmp_path, one, other):
 def test_registers_have_no_topic_and_cannot_be_declared(tmp_path):
     rack = built(tmp_path, POINTS, PANEL)
     banks = [variable for variable in rack.config.variables if variable.bank is not None]
-    assert [(item.name, item.dimensions) for item in banks] == [("SLOT:5%", (2,)), ("SLOT:6%", (1,)), ("SLOT:7%", (2,))]
+    assert [(item.name, item.dimensions) for item in banks] == [("SLOT:5%", (4,)), ("SLOT:6%", (1,)), ("SLOT:7%", (2,))]
     assert codes(tmp_path, "  SLOT:5%(1): {}\n") != []
