@@ -129,6 +129,6 @@ def _real_bits(value: int | float) -> int:
 
 
 def _real_of(bits: int) -> float:
-    """Return the REAL that two registers hold; bits that are no REAL show as 0 or as its largest (decision)."""
+    """Return the REAL that two registers hold; bits that make none show as 0 or as its largest (decision)."""
     value: float = struct.unpack(">f", bits.to_bytes(4, "big"))[0]
     return 0.0 if math.isnan(value) else stored_real(value)[0]

@@ -2,7 +2,7 @@
 
 The counter is in the registers 0 and 1, high word first with its sign extended, to be read as a DOUBLE INTEGER; the
 update period in 2, (value + 1) x 0.5 ms; the comparator in 3 and 4, like the counter; the interrupt status and control
-register is 5, with the timer interrupt enable in bit 5, 6 defines the mode, 7 is the module's status. No source tells
+register is 5, with the timer interrupt enable in bit 5, 6 defines the mode, 7 is the module's status. No source says
 what 6 and 7 hold, nor what the comparator does when it is reached: 6 can be written and does nothing, 7 stays 0, and
 the comparator is a place for a number (decision). The counter comes from outside and keeps its low 24 bits, as a
 counter that runs over does (decision).
