@@ -22,6 +22,7 @@ SUBCOMMANDS: dict[str, str] = {
     "compile": "print the function that a task becomes",
     "tune-info": "coefficients and limits of dynamic blocks in a task",
     "response": "step response and Bode diagram of a dynamic block",
+    "load": "CPU load of each module by the manual's execution times",
     "new": "make a rack file from a folder of tasks",
     "run": "run a rack",
     "record": "record a rack that runs",

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from automax_ros.blocks.declaration import Time, Times
 from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES, SCAN_LOOP
-from automax_ros.core.ticks import NS_PER_US
+from automax_ros.core.ticks import NS_PER_US, UDC_MAX_TICKS
 from automax_ros.core.types import DataType
 from automax_ros.language.program import BoundCall, Program, Symbol
 from automax_ros.language.syntax.tree import Remark, Statement
@@ -28,6 +28,9 @@ class Model(enum.Enum):
     UDC = "udc"
     PC3000 = "pc3000"
 
+
+MOST_SHARED_TICKS = {Model.UDC: UDC_MAX_TICKS}
+"""The most TICKS of modules whose tasks run one after the other in one scan (53.2)."""
 
 STATEMENT_ESTIMATES_US = {
     "Assignment": 6.0,
