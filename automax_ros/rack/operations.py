@@ -1,4 +1,4 @@
-"""What an operator does to a rack: RUN, STOP, reload, STOP ALL, clear, power. Each any number of times.
+"""What an operator does to a rack: RUN, STOP, reload, delete, STOP ALL, clear, power. Each any number of times.
 
 Stimuli, services, commands and lifecycle transitions all call these; observers see each, refused ones too.
 """
@@ -6,7 +6,6 @@ Stimuli, services, commands and lifecycle transitions all call these; observers 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NoReturn
 
 from automax_ros.core.diagnostics import SourceText
@@ -17,31 +16,28 @@ from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.names import AUTO_RUN
 from automax_ros.rack.observers import Observers, Operation
 from automax_ros.rack.scheduled_task import ScheduledTask
+from automax_ros.rack.standing import OperationsState, PowerReturn, StopCause
 from automax_ros.rack.writers import PRESET_WRITER
+from automax_ros.running.carry_over import carry_over
 from automax_ros.running.events import Events
 from automax_ros.running.memory import CommonMemory
-from automax_ros.running.scheduler import Scheduler
+from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 from automax_ros.running.task import Status
+
+KEEP_STATE = "keep_state"
+"""The ``detail`` of a reload that carries values over."""
+_POWER = EventKey(EventClass.OUTSIDE, 0, "power")
 
 
 class OperationRefused(Exception):
     """An operation cannot be carried out now; the text says why and what to do."""
 
 
-@dataclass(frozen=True)
-class StopCause:
-    """What stopped all tasks: ``code`` is the hardware's, None where none is known, ``task`` who caused it, or ""."""
-
-    time_ns: int
-    reason: str
-    code: str | None = None
-    task: str = ""
-
-
 class Operations:
     """Operates one rack. ``stopped`` is what stopped all tasks, None while the rack runs.
 
-    ``ran_at_power_off`` are the tasks that AUTO RUN starts again; ``battery_good`` is what BATTERYSTATUSn@ show.
+    ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that cannot run until
+    they are reloaded; ``battery_good`` is what BATTERYSTATUSn@ show.
     """
 
     def __init__(
@@ -62,6 +58,9 @@ class Operations:
         self._ticks = {item.task.name: module.config.tick_ns for module in modules for item in module.tasks}
         self._critical = {task.name for _, task in config.placed_tasks if task.critical}
         self.ran_at_power_off: frozenset[str] = frozenset()
+        self.deleted: frozenset[str] = frozenset()
+        self._power_return: PowerReturn | None = None
+        self._power_event: ScheduledEvent | None = None
         self.powered = self.battery_good = True
         self.stopped: StopCause | None = None
 
@@ -81,25 +80,28 @@ class Operations:
         """Put a task into RUN: its start-up part now, its first scan at the next tick of its Processor (decision).
 
         Raises:
-            OperationRefused: there is no such task, it runs already, or the power is off.
+            OperationRefused: there is no such task, it runs already, it has faulted and its error log was not cleared
+                since (J2-3106-1 p. 12-4), it was deleted, or the power is off.
         """
-        task = self._task("run", name)
-        if not self.powered:
-            self._refuse("run", name, "the power is off: switch it on first")
+        task = self.find("run", name)
         if task.task.status is Status.RUNNING:
             self._refuse("run", name, f"task {name} runs already")
+        if name in self.deleted:
+            self._refuse("run", name, f"task {name} was deleted: reload it first")
+        self._refuse_faulted("run", [task])
         self._run_together([task], self._next_tick)
         self._tell("run", name)
 
     def run_all(self) -> None:
-        """Put all tasks that do not run into RUN, in the order of priority and name.
+        """Put all tasks that do not run into RUN, in the order of priority and name; those that were deleted stay out.
 
         Raises:
-            OperationRefused: the power is off.
+            OperationRefused: the error log of a task that has faulted was not cleared since, or the power is off.
         """
-        if not self.powered:
-            self._refuse("run_all", "", "the power is off: switch it on first")
+        self._need_power("run_all")
         resting = [item for item in self._in_starting_order() if item.task.status is not Status.RUNNING]
+        resting = [item for item in resting if item.name not in self.deleted]
+        self._refuse_faulted("run_all", resting)
         self._run_together(resting, self._next_tick)
         self._tell("run_all")
 
@@ -107,13 +109,10 @@ class Operations:
         """Stop a task between two scans; its locals keep their values. One that does not run stays as it is.
 
         Raises:
-            OperationRefused: there is no such task, or it is critical (J2-3106-1 p. 8-2).
+            OperationRefused: there is no such task, it is critical (J2-3106-1 p. 8-2), or the power is off.
         """
-        item = self._task("stop", name)
-        if name in self._critical:
-            self._refuse(
-                "stop", name, f"task {name} is critical, it does not stop alone: STOP ALL stops it with all others"
-            )
+        item = self.find("stop", name)
+        self._refuse_critical("stop", item)
         item.stop()
         self._tell("stop", name)
 
@@ -127,48 +126,88 @@ class Operations:
 
         Volatile commons and outputs become 0; inputs, forced and non-volatile variables, locals and error logs stay.
         ``code`` is the hardware's for the fault, ``task`` the one that caused it.
+
+        Raises:
+            OperationRefused: the power is off.
         """
+        self._need_power("stop_all")
         self.stopped = StopCause(self._scheduler.now_ns, reason, code, task)
         self.stop_tasks()
         self._events.clear()
         self._clear_memory(keep_non_volatile=True)
         for module in self._modules:
             module.stopped_all()
-        self._tell("stop_all", task, reason=reason)
+        self._tell("stop_all", task, reason=reason, detail=code or "")
 
     def clear_errors(self, name: str | None = None) -> None:
         """Clear the error log of a task or of all; a faulted task is a stopped one then, and can be put into RUN.
 
         Raises:
-            OperationRefused: there is no such task.
+            OperationRefused: there is no such task, or the power is off.
         """
-        cleared = list(self._tasks.values()) if name is None else [self._task("clear_errors", name)]
+        self._need_power("clear_errors")
+        cleared = list(self._tasks.values()) if name is None else [self.find("clear_errors", name)]
         for item in cleared:
             item.task.errors.clear()
             if item.task.status is Status.FAULTED:
                 item.task.status = Status.STOPPED
         self._tell("clear_errors", name or "")
 
-    def reload(self, name: str, source: SourceText) -> None:
+    def reload(self, name: str, source: SourceText, *, keep_state: bool = False) -> None:
         """Replace a task's source while the others run: an installation, so locals are 0, tunables as the source says.
 
-        A task that ran is put into RUN again. With errors in the source the old task goes on.
+        With ``keep_state`` locals and tunables keep their values by name, as far as they fit (``carry_over``). A task
+        that ran is put into RUN again. With errors in the source the old task goes on. One that was deleted is there
+        again.
 
         Raises:
-            OperationRefused: there is no such task.
+            OperationRefused: there is no such task, it runs and is critical (decision: it would stop alone), or the
+                power is off.
             RackError: the source has errors.
         """
-        item = self._task("reload", name)
+        item = self.find("reload", name)
+        self._refuse_critical("reload", item)
         try:
             compiled = self._installation.compile(name, source)
         except RackError as error:
             self._tell("reload", name, ok=False, reason=str(error))
             raise
         ran = item.task.status is Status.RUNNING
+        before, values = item.task.layout, item.task.snapshot()
         item.install(compiled, source)
-        self._tell("reload", name)
+        if keep_state:
+            carry_over(before, values, item.task)
+        self.deleted -= {name}
+        self._tell("reload", name, detail=KEEP_STATE if keep_state else "")
         if ran:
             self._run_together([item], self._next_tick)
+
+    def delete(self, name: str) -> None:
+        """Take a resting task out of the rack: it holds nothing and cannot run until it is reloaded (decision).
+
+        Raises:
+            OperationRefused: there is no such task, it runs, it was deleted already, or the power is off.
+        """
+        item = self.find("delete", name)
+        if item.task.status is Status.RUNNING:
+            self._refuse("delete", name, f"task {name} runs: stop it first")
+        if name in self.deleted:
+            self._refuse("delete", name, f"task {name} was deleted already")
+        item.install(item.task.compiled, item.source)
+        self.deleted |= {name}
+        self._tell("delete", name)
+
+    def power(self, off_for_ns: int, *, battery: bool = True) -> None:
+        """Switch the power off, and let it come back after a time, at the latest with ``power_on``.
+
+        Raises:
+            OperationRefused: it is off already.
+            ValueError: the time is negative.
+        """
+        if off_for_ns < 0:
+            raise ValueError(f"the power cannot be off for {off_for_ns} ns")
+        self.power_off()
+        self._expect_power(PowerReturn(self._scheduler.now_ns + off_for_ns, battery))
 
     def power_off(self) -> None:
         """Switch the power off: everything stops, and volatile memory and outputs are lost (2.4.5).
@@ -187,30 +226,44 @@ class Operations:
         self._clear_memory(keep_non_volatile=True)
         self._tell("power_off")
 
-    def power_on(self, *, battery: bool = True, auto_run: bool = False) -> None:
+    def power_on(self, *, battery: bool = True, auto_run: bool | None = None) -> None:
         """Switch the power on again.
 
-        Without a good ``battery`` non-volatile commons, locals, tunables and error logs are as at installation. With
-        ``auto_run`` the tasks that ran when the power went are put into RUN (J2-3106-1 p. 12-4).
+        Without a good ``battery`` non-volatile commons, locals, tunables, error logs and forces are as at installation.
+        With ``auto_run`` (else as the rack file says) the tasks that ran when the power went are put into RUN
+        (J2-3106-1 p. 12-4); a task that was stopped, or that a fault has stopped, was not running then.
 
         Raises:
             OperationRefused: it is on.
         """
         if self.powered:
             self._refuse("power_on", "", "the power is on")
+        self._expect_power(None)
         self.powered, self.battery_good = True, battery
+        if not battery:
+            self._release_forces()
         self._clear_memory(keep_non_volatile=battery)
-        for item in self._tasks.values():
-            if not battery:
-                item.task.install(item.task.compiled)
-            elif item.task.status is Status.FAULTED:
-                item.task.status = Status.STOPPED
+        if not battery:
+            for item in self._tasks.values():
+                item.install(item.task.compiled, item.source)
         for module in self._modules:
             module.power_on()
         self._tell("power_on")
-        if auto_run:
+        if self._config.auto_run if auto_run is None else auto_run:
             again = [item for item in self._in_starting_order() if item.task.name in self.ran_at_power_off]
             self._run_together(again, self._next_tick)
+
+    def state(self) -> OperationsState:
+        """Return how the rack stands."""
+        return OperationsState(
+            self.powered, self.battery_good, self.stopped, self.ran_at_power_off, self.deleted, self._power_return
+        )
+
+    def load(self, state: OperationsState) -> None:
+        """Take over how the rack stands."""
+        self.powered, self.battery_good, self.stopped = state.powered, state.battery_good, state.stopped
+        self.ran_at_power_off, self.deleted = state.ran_at_power_off, state.deleted
+        self._expect_power(state.power_return)
 
     def write_status(self) -> None:
         """Set AUTORUNSTATUS@, and BATTERYSTATUSn@ of the slots that hold a module with a battery (2.4.6)."""
@@ -245,15 +298,50 @@ class Operations:
         self._memory.clear(PRESET_WRITER, keep_non_volatile=keep_non_volatile, kept=kept)
         self.write_status()
 
-    def _task(self, what: str, name: str) -> ScheduledTask:
+    def _expect_power(self, expected: PowerReturn | None) -> None:
+        if self._power_event is not None:
+            self._power_event.cancel()
+        self._power_return, self._power_event = expected, None
+        if expected is not None:
+            self._power_event = self._scheduler.at(
+                expected.at_ns, _POWER, lambda _: self.power_on(battery=expected.battery)
+            )
+
+    def _release_forces(self) -> None:
+        self._memory.now_ns = self._scheduler.now_ns
+        for view, element in sorted(self._memory.forced):
+            self._memory.release(view, element, PRESET_WRITER)
+
+    def _need_power(self, what: str, task: str = "") -> None:
+        if not self.powered:
+            self._refuse(what, task, "the power is off: switch it on first")
+
+    def _refuse_critical(self, what: str, item: ScheduledTask) -> None:
+        if item.name in self._critical and item.task.status is Status.RUNNING:
+            reason = f"task {item.name} is critical, it does not stop alone: STOP ALL stops it with all others"
+            self._refuse(what, item.name, reason)
+
+    def _refuse_faulted(self, what: str, tasks: Sequence[ScheduledTask]) -> None:
+        faulted = [item.name for item in tasks if item.task.status is Status.FAULTED]
+        if faulted:
+            reason = f"a fault has stopped {' '.join(faulted)}: clear the error log first"
+            self._refuse(what, faulted[0], reason)
+
+    def find(self, what: str, name: str) -> ScheduledTask:
+        """Return a task that an operation concerns.
+
+        Raises:
+            OperationRefused: there is no such task, or the power is off.
+        """
+        self._need_power(what, name)
         item = self._tasks.get(name)
         if item is None:
             hint = did_you_mean(name, self._tasks) or f"it has {', '.join(self._tasks)}"
             self._refuse(what, name, f"the rack has no task {quoted(name)}: {hint}")
         return item
 
-    def _tell(self, what: str, task: str = "", *, ok: bool = True, reason: str = "") -> None:
-        self._observers.operated(Operation(self._scheduler.now_ns, what, task, ok, reason))
+    def _tell(self, what: str, task: str = "", *, ok: bool = True, reason: str = "", detail: str = "") -> None:
+        self._observers.operated(Operation(self._scheduler.now_ns, what, task, ok, reason, detail))
 
     def _refuse(self, what: str, task: str, reason: str) -> NoReturn:
         self._tell(what, task, ok=False, reason=reason)

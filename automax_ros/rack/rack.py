@@ -18,14 +18,16 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
+from automax_ros.rack.adjusting import Adjustments
 from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.forcing import Force, Forcing
 from automax_ros.rack.installation import Finding, Installation
 from automax_ros.rack.modules.kind import Module, ModuleState, Parts
 from automax_ros.rack.observers import Observers, RackObserver
-from automax_ros.rack.operations import Operations, StopCause
+from automax_ros.rack.operations import Operations
 from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
 from automax_ros.rack.settings import common_named
+from automax_ros.rack.standing import OperationsState
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.triggers import MakeTrigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
@@ -52,10 +54,7 @@ class RackState:
     image: tuple[tuple[int, int, Value], ...]
     forced: frozenset[tuple[int, int]]
     events: tuple[str, ...]
-    powered: bool
-    battery_good: bool
-    stopped: StopCause | None
-    ran_at_power_off: frozenset[str]
+    operations: OperationsState
     clock_since_ns: int | None
     modules: Mapping[int, ModuleState]
 
@@ -95,6 +94,9 @@ class Rack:
         self.modules: list[Module] = [module.build(parts) for module in config.modules]
         self.operations = Operations(
             config, self.modules, self._installation, self.memory, self.scheduler, self.events, self.observers
+        )
+        self.adjust = Adjustments(
+            config, self.operations, self.memory, self._forcing, self.scheduler, self.observers, self.tune
         )
 
     @property
@@ -262,10 +264,7 @@ class Rack:
             image=tuple(self.memory.image()),
             forced=self.memory.forced,
             events=self.events.pending,
-            powered=self.operations.powered,
-            battery_good=self.operations.battery_good,
-            stopped=self.operations.stopped,
-            ran_at_power_off=self.operations.ran_at_power_off,
+            operations=self.operations.state(),
             clock_since_ns=self._clock.since_ns,
             modules={module.config.slot: module.state() for module in self.modules},
         )
@@ -283,9 +282,7 @@ class Rack:
         self.scheduler.run_until(state.now_ns)
         self.memory.load_image(state.image)
         self.memory.hold(state.forced)
-        self.operations.powered, self.operations.battery_good = state.powered, state.battery_good
-        self.operations.stopped = state.stopped
-        self.operations.ran_at_power_off = state.ran_at_power_off
+        self.operations.load(state.operations)
         self._clock.resume(state.clock_since_ns)
         for module in self.modules:
             module.load(state.modules[module.config.slot])

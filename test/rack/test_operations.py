@@ -75,10 +75,10 @@ class Notes:
         self.order.append(operation.what)
 
 
-def build(folder: Path, **sources: str) -> tuple[Rack, Notes]:
+def build(folder: Path, *, yaml: str = YAML, **sources: str) -> tuple[Rack, Notes]:
     for name, text in {**SOURCES, **sources}.items():
         (folder / f"{name}.BLK").write_text(text)
-    (folder / "rack.yaml").write_text(YAML)
+    (folder / "rack.yaml").write_text(yaml)
     result = load(folder / "rack.yaml")
     assert result.config is not None, result.diagnostics
     rack, notes = Rack(result.config), Notes()
@@ -245,9 +245,153 @@ def test_a_faulted_task_runs_again_after_its_log_is_cleared(tmp_path):
     assert rack.stop_reason is None
 
 
+def test_a_task_that_has_faulted_needs_its_log_cleared_also_after_power(tmp_path):
+    endless = "10 LOCAL I%\n20 CALL SCAN_LOOP(TICKS=2)\n30 FOR I% = 0 TO 1 STEP 1\n40 I% = 0\n50 NEXT I%\n60 END\n"
+    rack, notes = build(tmp_path, SLOW=endless)
+    rack.start()
+    rack.run(0.02)
+    for attempt in (lambda: rack.operations.run("SLOW"), rack.operations.run_all):
+        with pytest.raises(OperationRefused, match="a fault has stopped SLOW: clear the error log first"):
+            attempt()
+    rack.operations.power_off()
+    rack.operations.power_on(auto_run=True)
+    begun = len(notes.scans)
+    rack.run(0.02)
+    assert len(notes.scans) == begun, "AUTO RUN starts nothing that a fault has stopped (J2-3106-1 p. 12-4)"
+    with pytest.raises(OperationRefused, match="clear the error log first"):
+        rack.operations.run("SLOW")
+    rack.operations.run("OTHER")
+    rack.operations.clear_errors()
+    rack.operations.run("FAST")
+    assert {task.name: task.status for task in rack.tasks} == {
+        "FAST": Status.RUNNING,
+        "SLOW": Status.STOPPED,
+        "OTHER": Status.RUNNING,
+    }
+
+
+def test_power_comes_back_after_its_time_and_auto_run_follows_the_rack_file(tmp_path):
+    for number, auto_run in enumerate((False, True)):
+        (tmp_path / str(number)).mkdir()
+        rack, notes = build(tmp_path / str(number), yaml=f"auto_run: {str(auto_run).lower()}\n{YAML}")
+        rack.start()
+        rack.operations.stop("SLOW")
+        rack.run(0.0123)
+        rack.operations.power(5_000_000)
+        assert (rack.operations.powered, rack.value("KEPT!")) == (False, 3)
+        rack.run(0.004)
+        assert not rack.operations.powered
+        rack.run(0.0157)
+        assert rack.operations.powered
+        assert notes.operations == [("stop", "SLOW", True), ("power_off", "", True), ("power_on", "", True)]
+        after = [(name, scan, time / 1e6) for name, scan, time in notes.scans if time > 12_300_000]
+        assert after == (
+            [("FAST", 0, 17.3), ("OTHER", 0, 17.3), ("OTHER", 1, 18), ("FAST", 1, 22), ("OTHER", 2, 24),
+             ("FAST", 2, 27.5), ("OTHER", 3, 30)]
+            if auto_run
+            else []
+        )  # fmt: skip
+
+
+def test_power_that_is_switched_on_earlier_does_not_come_twice(made):
+    rack, notes = made
+    rack.operations.power(5_000_000)
+    rack.operations.power_on()
+    rack.operations.run_all()
+    rack.run(0.02)
+    assert [what for what, _, _ in notes.operations] == ["power_off", "power_on", "run_all"]
+    with pytest.raises(ValueError, match="-1 ns"):
+        rack.operations.power(-1)
+    assert rack.operations.powered
+
+
+def test_without_a_battery_forces_go_too(made):
+    rack, _ = made
+    rack.force("COUNT%", 77)
+    rack.operations.power_off()
+    rack.operations.power_on()
+    assert [(item.name, item.value) for item in rack.forces()] == [("COUNT%", 77)]
+    rack.operations.power(0, battery=False)
+    rack.run(0.001)
+    assert (rack.forces(), rack.value("COUNT%"), rack.value("FORCINGSTATUS@")) == ([], 0, False)
+
+
+def test_a_deleted_task_is_gone_until_it_is_reloaded(made):
+    rack, notes = made
+    rack.run(0.012)
+    with pytest.raises(OperationRefused, match="task FAST runs: stop it first"):
+        rack.operations.delete("FAST")
+    rack.operations.stop("FAST")
+    rack.operations.delete("FAST")
+    assert rack.task("FAST").value("OWN%") == 0, "its memory is free"
+    for refused in (rack.operations.run, rack.operations.delete):
+        with pytest.raises(OperationRefused, match="task FAST was deleted"):
+            refused("FAST")
+    rack.operations.run_all()
+    scans = len(times(notes, "FAST"))
+    rack.run(0.02)
+    assert len(times(notes, "FAST")) == scans
+    rack.operations.reload("FAST", SourceText("FAST.BLK", FAST))
+    rack.operations.run("FAST")
+    rack.run(0.012)
+    assert len(times(notes, "FAST")) > scans
+
+
+def test_a_critical_task_is_not_reloaded_while_it_runs(tmp_path):
+    rack, _ = build(tmp_path, yaml=YAML.replace("FAST: {priority: 4}", "FAST: {priority: 4, critical: true}"))
+    rack.start()
+    with pytest.raises(OperationRefused, match="FAST is critical"):
+        rack.operations.reload("FAST", SourceText("FAST.BLK", FAST))
+    rack.operations.stop_all("operator")
+    rack.operations.reload("FAST", SourceText("FAST.BLK", FAST))
+
+
+KEEPING = """\
+10 LOCAL OWN%, GAIN% [CURRENT=2, HIGH=9, LOW=0], LIST%(2), NOTE$:6, SAME!, AVERAGE%, BEGUN%
+20 BEGUN% = BEGUN% + 1
+30 OWN% = OWN% + 100
+40 NOTE$ = "ABCDEF"
+50 SAME! = 70000
+60 LIST%(1) = 5
+100 CALL SCAN_LOOP(TICKS=1)
+110 CALL RUNNING_AVERAGE(INPUT=GAIN%, REQUIRED_SAMPLES=4, OUTPUT=AVERAGE%)
+150 END
+"""
+EDITED = """\
+10 LOCAL NEW%, OWN%, GAIN% [CURRENT=1, HIGH=9, LOW=0], LIST%(3), NOTE$:5, SAME%, AVERAGE%, BEGUN%
+20 BEGUN% = BEGUN% + 1
+100 CALL SCAN_LOOP(TICKS=1)
+110 CALL RUNNING_AVERAGE(INPUT=GAIN%, REQUIRED_SAMPLES=4, OUTPUT=AVERAGE%)
+150 END
+"""
+
+
+def test_a_reload_carries_over_what_fits_by_name(tmp_path):
+    """Another dimension, a text too long, another type begin as installed, and blocks as after each RUN."""
+    rack, notes = build(tmp_path, FAST=KEEPING)
+    rack.start()
+    rack.tune(rack.task("FAST"), "GAIN%", 8)
+    rack.run(0.025)
+    fast = rack.task("FAST")
+    assert (fast.value("AVERAGE%"), fast.value("LIST%")) == (8, [0, 5, 0])
+    rack.operations.reload("FAST", SourceText("FAST.BLK", EDITED), keep_state=True)
+    names = ("NEW%", "OWN%", "GAIN%", "LIST%", "NOTE$", "SAME%", "AVERAGE%", "BEGUN%")
+    assert [fast.value(name) for name in names] == [0, 100, 8, [0, 0, 0, 0], "", 0, 8, 2]
+    rack.run(0.006)
+    assert fast.value("AVERAGE%") == 2, "one sample of 8, of four"
+    lower = EDITED.replace("HIGH=9", "HIGH=7")
+    rack.operations.reload("FAST", SourceText("FAST.BLK", lower), keep_state=True)
+    assert (fast.value("GAIN%"), fast.value("OWN%")) == (1, 100), "8 lies outside the limits now"
+    rack.operations.reload("FAST", SourceText("FAST.BLK", EDITED))
+    assert (fast.value("OWN%"), fast.value("BEGUN%")) == (0, 1), "an installation"
+    assert [what for what, _, ok in notes.operations if ok] == ["reload"] * 3
+
+
 OPERATIONS = st.lists(
     st.tuples(
-        st.sampled_from(["run", "stop", "reload", "run_all", "stop_all", "clear", "off", "on", "auto", "wait"]),
+        st.sampled_from(
+            ["run", "stop", "reload", "delete", "run_all", "stop_all", "clear", "off", "on", "auto", "power", "wait"]
+        ),
         st.sampled_from(sorted(SOURCES)),
         st.integers(0, 30),
     ),
@@ -267,6 +411,8 @@ def operate(rack: Rack, what: str, task: str) -> None:
         "off": operations.power_off,
         "on": operations.power_on,
         "auto": lambda: operations.power_on(auto_run=True),
+        "power": lambda: operations.power(7_300_000),
+        "delete": lambda: operations.delete(task),
         "wait": lambda: None,
     }
     with contextlib.suppress(OperationRefused):

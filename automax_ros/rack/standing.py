@@ -1,0 +1,38 @@
+"""How a rack stands after what was done to it: powered, stopped by what, which tasks ran."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StopCause:
+    """What stopped all tasks: ``code`` is the hardware's, None where none is known, ``task`` who caused it, or ""."""
+
+    time_ns: int
+    reason: str
+    code: str | None = None
+    task: str = ""
+
+
+@dataclass(frozen=True)
+class PowerReturn:
+    """When the power comes back by itself (ns), and whether the battery was good meanwhile."""
+
+    at_ns: int
+    battery: bool = True
+
+
+@dataclass(frozen=True)
+class OperationsState:
+    """How a rack stands: all that its operations leave, apart from what tasks and memory hold.
+
+    ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that were taken out.
+    """
+
+    powered: bool = True
+    battery_good: bool = True
+    stopped: StopCause | None = None
+    ran_at_power_off: frozenset[str] = frozenset()
+    deleted: frozenset[str] = frozenset()
+    power_return: PowerReturn | None = None
