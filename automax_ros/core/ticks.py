@@ -16,6 +16,8 @@ MIN_TICK_NS = NS_PER_MS // 2
 MAX_TICK_NS = 10 * NS_PER_MS
 DEFAULT_TICK_NS = 5_500_000
 """Tick of a Processor unless the rack says otherwise (section 4)."""
+MOST_SECONDS = 1_000_000_000
+"""Longest time in a file (decision: 31 years, far from the 63 bits of a count of ns)."""
 UDC_TICK_NS = NS_PER_MS // 2
 """Tick of a UDC module (2.3)."""
 UDC_MAX_TICKS = 20
@@ -44,6 +46,22 @@ def seconds_ns(seconds: float | str) -> int:
     if exact < 0:
         raise ValueError(f"{seconds} s is negative")
     return round(exact * NS_PER_S)
+
+
+def exact_ns(seconds: str) -> int:
+    """Return a time that a text gives in seconds as whole ns, exactly.
+
+    Raises:
+        ValueError: not a number, negative, above ``MOST_SECONDS``, or finer than 1 ns.
+    """
+    exact = _exact(seconds, "time in seconds")
+    if exact < 0:
+        raise ValueError(f"{seconds} s is negative")
+    if exact > MOST_SECONDS:
+        raise ValueError(f"{seconds} s is too long: at most {MOST_SECONDS} s")
+    if (exact * NS_PER_S).denominator != 1 or (not exact and float(seconds)):
+        raise ValueError(f"{seconds} s is finer than 1 ns")
+    return int(exact * NS_PER_S)
 
 
 def seconds_text(time_ns: int) -> str:

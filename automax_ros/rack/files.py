@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from io import BufferedReader
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 
 MAX_BYTES = 1_000_000
 """Largest rack file and largest task source, in bytes (decision: a bound on untrusted files)."""
@@ -73,3 +73,12 @@ def lies_next_to(path: Path, other: Path) -> bool:
         return path.resolve().is_relative_to(other.resolve().parent)
     except (OSError, ValueError, RuntimeError):
         return False
+
+
+def stays_next_to(text: str, other: Path) -> bool:
+    """Whether a path that a file names leads to its own folder or below: relative, without .., links followed."""
+    windows = PureWindowsPath(text)
+    if PurePosixPath(text).is_absolute() or windows.drive or windows.root or ".." in windows.parts:
+        return False
+    path = other.parent / text
+    return is_inside(path, other.parent) or lies_next_to(path, other)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path, PurePosixPath
 from typing import TypeGuard
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rack.files import FileFault, is_inside, lies_next_to, read_bytes
+from automax_ros.rack.files import FileFault, read_bytes, stays_next_to
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import DeclarationFault, check_task_name
 from automax_ros.rack.scalars import boolean_value, integer_value, text_value
@@ -105,7 +105,7 @@ class TaskReader:
             return None
         assert self.rack_file is not None
         path = self.rack_file.parent / text
-        if not self.allow_outside and not _stays_inside(text, path, self.rack_file):
+        if not self.allow_outside and not stays_next_to(text, self.rack_file):
             message = f"{quoted(text)} lies outside the rack file's folder"
             hint = "put the source next to the rack file, or allow it with --allow-outside"
             self.findings.add("AMX6305", message, span, hint)
@@ -121,14 +121,6 @@ class TaskReader:
             self.findings.add(code, f"{quoted(text)} {fault}", span, hint)
             return False
         return True
-
-
-def _stays_inside(text: str, path: Path, rack_file: Path) -> bool:
-    windows = PureWindowsPath(text)
-    absolute = PurePosixPath(text).is_absolute() or bool(windows.drive or windows.root)
-    if absolute or ".." in windows.parts:
-        return False
-    return is_inside(path, rack_file.parent) or lies_next_to(path, rack_file)
 
 
 def _is_file_name(node: Node) -> TypeGuard[Scalar]:

@@ -7,7 +7,7 @@ Each code has a page in ``core/pages``, which ``automax explain`` prints.
 
 from __future__ import annotations
 
-from automax_ros.core.problems import config, plant, runtime, semantics, syntax, types
+from automax_ros.core.problems import config, plant, runtime, semantics, stimuli, syntax, types
 from automax_ros.core.problems.problem import Problem, Severity
 
 __all__ = ["PROBLEMS", "Problem", "Severity"]
@@ -15,7 +15,7 @@ __all__ = ["PROBLEMS", "Problem", "Severity"]
 
 def _table() -> dict[str, Problem]:
     table: dict[str, Problem] = {}
-    for band in (syntax, types, semantics, config, plant, runtime):
+    for band in (syntax, types, semantics, config, plant, stimuli, runtime):
         for problem in band.PROBLEMS:
             if problem.code in table:
                 raise ValueError(f"problem code {problem.code} is defined twice")

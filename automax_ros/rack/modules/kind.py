@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Span
@@ -272,6 +272,22 @@ class Module(Protocol):
 
         Raises:
             ValueError: the state does not fit.
+        """
+        ...
+
+
+@runtime_checkable
+class Operable(Protocol):
+    """A module with controls that a person moves: ``controls`` are their names, such as ``test_switch``."""
+
+    @property
+    def controls(self) -> tuple[str, ...]: ...  # noqa: D102
+
+    def operate(self, verb: str, value: str) -> None:
+        """Move a control of ``controls`` to a position, as stimuli files write it: ``A``, ``B``, ``centre``, ``true``.
+
+        Raises:
+            OperationRefused: it cannot be moved now (rack/operations.py).
         """
         ...
 

@@ -1,0 +1,97 @@
+"""The verbs on what stands in and around a rack: controls of modules, faults of plants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.rack.findings import Findings
+from automax_ros.rack.modules.kind import Operable
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.scalars import integer_value, kind_of
+from automax_ros.rack.sections import Entry, entries_of
+from automax_ros.rack.stimuli.operating import Control
+from automax_ros.rack.stimuli.reading import Verb, named
+from automax_ros.rack.stimuli.stage import Action
+
+MODULE_CONTROLS = {"test_switch": ("A", "B", "centre"), "fault_reset_switch": ("true",)}
+"""The controls of modules with their positions."""
+_ANY_NUMBER: tuple[str, ...] = ()
+_SCRS = tuple(str(number) for bridge in (1, 11) for number in range(bridge, bridge + 6))
+PLANT_CONTROLS = {
+    "short_scr": _SCRS,
+    "open_gate": _SCRS,
+    "blow_fuse": _SCRS,
+    "lose_phase": ("A", "B", "C"),
+    "lose_tach": ("true",),
+    "lose_field": ("true",),
+    "line_sag": _ANY_NUMBER,
+    "line_hz": _ANY_NUMBER,
+    "load_torque_nm": _ANY_NUMBER,
+    "repair": ("all",),
+}
+"""What can be done to a plant, with the values that it takes; the drive's own checks come with the drive."""
+
+
+def control_verbs(rack: Rack) -> Mapping[str, Verb]:
+    """Return the verbs ``module`` and ``plant``."""
+    return {"module": Verb(partial(_module, rack)), "plant": Verb(_plant)}
+
+
+def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+    by_slot = {module.config.slot: module for module in rack.modules}
+    found: list[Action] = []
+    for key, item in named(node, what, findings):
+        slot = integer_value(key, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
+        if slot is not None and slot not in by_slot:
+            findings.add("AMX6742", f"the rack has no module in slot {slot}", key.span)
+        for control in _controls(item, f"{what} {key.text}", MODULE_CONTROLS, findings):
+            module = by_slot.get(slot) if slot is not None else None
+            if module is None:
+                continue
+            if isinstance(module, Operable) and control.verb in module.controls:
+                found.append(Control(key.text, module, control.verb, control.value))
+            else:
+                message = f"the {module.config.model} in slot {slot} has no {control.verb}"
+                findings.add("AMX6742", message, control.key.span)
+    return found
+
+
+def _plant(node: Node, what: str, findings: Findings) -> list[Action]:
+    """Check the form; a rack of this version has no plant that can be operated (decision: the drives bring them)."""
+    for key, item in named(node, what, findings):
+        list(_controls(item, f"{what} {key.text}", PLANT_CONTROLS, findings))
+        findings.add("AMX6742", f"the rack has no plant {quoted(key.text)} that can be operated", key.span)
+    return []
+
+
+@dataclass(frozen=True)
+class _Given:
+    """A control of the file with the value that it is moved to."""
+
+    key: Scalar
+    verb: str
+    value: str
+
+
+def _controls(node: Node, what: str, known: Mapping[str, tuple[str, ...]], findings: Findings) -> list[_Given]:
+    entries = entries_of(node, what, findings)
+    found = (_control(entry, what, known, findings) for entry in entries or ())
+    return [item for item in found if item is not None]
+
+
+def _control(entry: Entry, what: str, known: Mapping[str, tuple[str, ...]], findings: Findings) -> _Given | None:
+    key, node = entry
+    if key.text not in known:
+        message = f"{what} has no control {quoted(key.text)}"
+        findings.add("AMX6742", message, key.span, near_or_listed(key.text, known))
+        return None
+    positions = known[key.text]
+    if not isinstance(node, Scalar) or node.is_null or (positions and node.text not in positions):
+        takes = ", ".join(positions) if positions else "a number"
+        findings.add("AMX6736", f"{key.text} of {what} cannot be {kind_of(node)}: it takes {takes}", node.span)
+        return None
+    return _Given(key, key.text, node.text)

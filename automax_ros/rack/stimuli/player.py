@@ -1,0 +1,69 @@
+"""Lets the entries of a stimuli file happen at their times."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.stimuli.stage import ENTRIES, Action, Happened, Stage, Stimulus, in_time
+from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+
+_KEY = EventKey(EventClass.OUTSIDE, ENTRIES, "stimuli")
+
+
+class Stimulation:
+    """Posts one event at a time: that of the next instant with entries.
+
+    ``happened`` are the operations so far, refused ones too, and values that were refused; ``refused`` counts those.
+    """
+
+    def __init__(self, stimuli: Sequence[Stimulus], scheduler: Scheduler) -> None:
+        """Take entries in any order; nothing is posted yet."""
+        self._waiting = deque(in_time(stimuli))
+        self._stage = Stage(scheduler)
+        self.happened: list[Happened] = []
+        self.refused = 0
+        self._told = 0
+
+    def begin(self) -> None:
+        """Begin; entries of times that have passed happen at the present, in their order."""
+        self._post()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is still to come: no entry, no sample, no power that was announced."""
+        return not self._waiting and not self._stage.is_busy
+
+    def news(self) -> list[str]:
+        """Return a line for each refusal since the last call."""
+        told, self._told = self._told, len(self.happened)
+        return [_line(item) for item in self.happened[told:] if not item.ok]
+
+    def _post(self) -> None:
+        if self._waiting:
+            scheduler = self._stage.scheduler
+            scheduler.at(max(self._waiting[0].at_ns, scheduler.now_ns), _KEY, self._happen)
+
+    def _happen(self, now_ns: int) -> None:
+        while self._waiting and self._waiting[0].at_ns <= now_ns:
+            entry = self._waiting.popleft()
+            for action in entry.actions:
+                self._do(entry, action)
+        self._post()
+
+    def _do(self, entry: Stimulus, action: Action) -> None:
+        now_ns = self._stage.scheduler.now_ns
+        try:
+            action.do(self._stage)
+        except OperationRefused as refused:
+            self.refused += 1
+            self.happened.append(Happened(now_ns, entry.verb, action.of, ok=False, why=str(refused)))
+        else:
+            if not entry.is_value:
+                self.happened.append(Happened(now_ns, entry.verb, action.of))
+
+
+def _line(item: Happened) -> str:
+    of = f" {item.of}" if item.of else ""
+    return f"stimuli: {item.what}{of} was refused: {item.why}"

@@ -1,0 +1,99 @@
+"""The shapes that stimuli give a signal over time: ramp, sine, square. Pure functions of the time since their start.
+
+All are sampled at their start and each ms after it (decision: the contract says 1 ms for ramps). A ramp also has a
+sample at its end; a sine and a square end before theirs, so that a square of whole periods leaves its low value.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Protocol
+
+from automax_ros.core.numbers import stored_real
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.types import DataType, Value
+
+SAMPLE_NS = NS_PER_MS
+"""Time between two samples."""
+MOST_HZ = 500
+"""Highest frequency: two samples per period (decision)."""
+
+
+class Wave(Protocol):
+    """A shape. ``for_ns`` is how long it lasts, None where it has no end."""
+
+    @property
+    def for_ns(self) -> int | None: ...  # noqa: D102
+
+    def value(self, elapsed_ns: int, start: Value, /) -> Value:
+        """Return the value some time after the start, where the signal had the value ``start``."""
+        ...
+
+    def last(self) -> Value | None:
+        """Return the value at the very end, None where the last sample stays."""
+        ...
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """A straight line from the present value to ``to``; whole numbers are rounded to the nearest (decision)."""
+
+    type: DataType
+    to: float
+    for_ns: int
+
+    def value(self, elapsed_ns: int, start: Value) -> Value:
+        """Return the point of the line; whole numbers are computed as such."""
+        assert not isinstance(start, str)
+        if elapsed_ns >= self.for_ns:
+            return self.last()
+        if self.type.is_integer:
+            moved = (int(self.to) - int(start)) * elapsed_ns
+            return int(start) + (2 * moved + self.for_ns) // (2 * self.for_ns)
+        return stored_real(start + (self.to - start) * (elapsed_ns / self.for_ns))[0]
+
+    def last(self) -> Value:
+        """Return the end of the line."""
+        return int(self.to) if self.type.is_integer else self.to
+
+
+@dataclass(frozen=True)
+class Sine:
+    """``mean + amplitude * sin(2 pi hz t)``; whole numbers are rounded to the nearest (decision)."""
+
+    type: DataType
+    mean: float
+    amplitude: float
+    hz: Fraction
+    for_ns: int | None
+
+    def value(self, elapsed_ns: int, _: Value) -> Value:
+        """Return the sample; the phase is exact however long the wave lasts."""
+        phase = self.hz * elapsed_ns / NS_PER_S % 1
+        exact = self.mean + self.amplitude * math.sin(2.0 * math.pi * float(phase))
+        return math.floor(exact + 0.5) if self.type.is_integer else stored_real(exact)[0]
+
+    def last(self) -> Value | None:
+        """Leave the last sample."""
+        return None
+
+
+@dataclass(frozen=True)
+class Square:
+    """Half a period ``high``, half a period ``low``, beginning with ``high``."""
+
+    low: Value
+    high: Value
+    hz: Fraction
+    for_ns: int | None
+
+    def value(self, elapsed_ns: int, _: Value) -> Value:
+        """Return the level of this half period."""
+        half_periods = int(2 * self.hz * elapsed_ns / NS_PER_S)
+        return self.low if half_periods % 2 else self.high
+
+    def last(self) -> Value | None:
+        """Leave the last sample."""
+        return None
