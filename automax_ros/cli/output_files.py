@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from automax_ros.cli.usage import UsageError
 
@@ -29,6 +30,36 @@ def opened_for_writing(path: Path | None) -> Iterator[TextIO]:
         yield stream
 
 
+def require_writable(path: Path) -> None:
+    """Refuse a file that could not be written, before the work for it begins.
+
+    Raises:
+        UsageError: it is a folder, or there is no such folder for it.
+    """
+    if not path.parent.is_dir():
+        raise UsageError(f"{path} cannot be written: there is no folder {path.parent}")
+    if path.is_dir():
+        raise UsageError(f"{path} cannot be written: it is a folder")
+
+
+def write_report(path: Path, report: Mapping[str, Any]) -> None:
+    """Write data as JSON, as a whole or not at all where the file is a regular one.
+
+    Raises:
+        UsageError: it cannot be written.
+    """
+    text = json.dumps(report, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    try:
+        if path.exists() and not path.is_file():
+            path.write_text(text, encoding="utf-8")
+            return
+        partial = path.with_name(f"{path.name}.part")
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
+
+
 PICTURE_FORMATS = (".png", ".svg", ".pdf")
 
 
@@ -40,10 +71,7 @@ def require_picture_file(path: Path) -> None:
     """
     if path.suffix.lower() not in PICTURE_FORMATS:
         raise UsageError(f"{path} names no format of pictures", f"end it with {', '.join(PICTURE_FORMATS)}")
-    if not path.parent.is_dir():
-        raise UsageError(f"{path} cannot be written: there is no folder {path.parent}")
-    if path.is_dir():
-        raise UsageError(f"{path} cannot be written: it is a folder")
+    require_writable(path)
 
 
 def require_different_files(read: Mapping[str, Path], written: Mapping[str, Path | None]) -> None:

@@ -12,12 +12,14 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.output_files import require_different_files, require_writable
 from automax_ros.cli.rack_file import is_text, load_rack_file
 from automax_ros.cli.record_options import add_record_arguments, recording_options
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.run_plan import RunPlan
 from automax_ros.cli.run_simulated import run_simulated
 from automax_ros.cli.signals import stop_signals
+from automax_ros.cli.stimuli_file import StimuliRefused
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
@@ -62,6 +64,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ".automax/RACK next to the rack file; simulated: nowhere)",
     )
     parser.add_argument(
+        "--stimuli",
+        type=Path,
+        metavar="FILE",
+        help="let happen what this YAML file says, by rack time (docs/stimuli.md)",
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE.json", help="write how the run ended: tasks, commons, forces, operations"
+    )
+    parser.add_argument(
         "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
     )
 
@@ -71,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     duration_ns = arguments.duration
     if arguments.simulated and arguments.record is not None and duration_ns is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
+    _check_files(arguments)
     with stop_signals() as stop:
         if not arguments.simulated:
             prepare_ros(WITHOUT_ROS)
@@ -85,6 +97,9 @@ def run(arguments: argparse.Namespace) -> int:
             tuple(_settings(config, arguments.settings)),
             tuple(_watched(config, arguments.watch)),
             arguments.state,
+            arguments.stimuli,
+            arguments.report,
+            arguments.allow_outside,
         )
         try:
             if arguments.simulated:
@@ -94,9 +109,20 @@ def run(arguments: argparse.Namespace) -> int:
             return run_live(plan, stop)
         except RackError as error:
             return _refused(error)
+        except StimuliRefused:
+            return 1
         except (BagError, RetentionFault) as error:
             print(error, file=sys.stderr)
             return 2
+
+
+def _check_files(arguments: argparse.Namespace) -> None:
+    """Refuse a report that cannot be written, or that would be written over what is read."""
+    if arguments.report is not None:
+        require_writable(arguments.report)
+        read = {"CONFIG": arguments.config, "--stimuli": arguments.stimuli}
+        given = {key: path for key, path in read.items() if path is not None}
+        require_different_files(given, {"--report": arguments.report})
 
 
 def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:

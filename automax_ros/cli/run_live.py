@@ -6,10 +6,11 @@ import time
 
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import DiskSync, RecordingWatch, live_options
-from automax_ros.cli.run_plan import RunPlan, report_end, warn
+from automax_ros.cli.run_plan import RunPlan, conclude, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
+from automax_ros.cli.stimuli_file import stimulation as stimulation_of
 from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import RackLock, domain_id
 from automax_ros.rack.rack import Rack
@@ -26,6 +27,7 @@ def run_live(plan: RunPlan, stop: StopRequest) -> int:
 def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     rack = Rack(plan.config, stopwatch=time.perf_counter_ns)
     warn(rack)
+    stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     state = StateKeeping(rack, plan.state or default_folder(plan.config))
     live = LiveRack(rack)
     recorder: Recorder | None = None
@@ -42,7 +44,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
             told = True
             display.message(f"STOP ALL: {rack.stop_reason}")
         state.update(now_ns)
-        for text in state.news():
+        for text in [*state.news(), *stimulation.news()]:
             display.message(text)
         recording.flush(now_ns)
         recording.tell()
@@ -54,6 +56,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
             sync = DiskSync(recorder.sync)
         display.message(_opening(rack, domain))
         live.start([*state.settings, *plan.settings])
+        stimulation.begin()
         live.run(plan.duration_ns, on_idle)
     finally:
         try:
@@ -69,7 +72,8 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         display.message(text)
     recording.tell()
     display.finish(plan.record, complete=not recording.failed)
-    return report_end(rack, failed=recording.failed or (state.failed and plan.state is not None))
+    failed = recording.failed or (state.failed and plan.state is not None)
+    return conclude(rack, plan, stimulation, failed=failed)
 
 
 def _opening(rack: Rack, domain: int) -> str:

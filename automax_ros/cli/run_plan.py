@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.bags.recorder import RecordingOptions
+from automax_ros.cli.output_files import write_report
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.report import report_of
 from automax_ros.rack.settings import CommonElement
+from automax_ros.rack.stimuli.player import Stimulation
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,8 @@ class RunPlan:
     """A run.
 
     ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the one that was
-    named for values that outlive the run, if any.
+    named for values that outlive the run, if any. ``stimuli`` is the file of what happens to the rack, ``report`` that
+    in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders.
     """
 
     config: RackConfig
@@ -29,6 +33,9 @@ class RunPlan:
     settings: tuple[tuple[str, Value], ...]
     watch: tuple[CommonElement, ...]
     state: Path | None = None
+    stimuli: Path | None = None
+    report: Path | None = None
+    allow_outside: bool = False
 
 
 def warn(rack: Rack) -> None:
@@ -37,9 +44,16 @@ def warn(rack: Rack) -> None:
         print_diagnostics(diagnostics, source, sys.stderr)
 
 
-def report_end(rack: Rack, *, failed: bool) -> int:
-    """Print what stopped the rack and return the exit code: 1 after a fault or a recording that ``failed``."""
-    if rack.stop_reason is not None:
-        print(f"automax run: STOP ALL: {rack.stop_reason}", file=sys.stderr)
-        return 1
-    return 1 if failed else 0
+def conclude(rack: Rack, plan: RunPlan, stimulation: Stimulation, *, failed: bool) -> int:
+    """Write the report, print what stopped the rack, and return the exit code.
+
+    It is 1 after a fault, a refused operation, or where something else has ``failed``; a STOP ALL that was commanded is
+    as good an end as any.
+    """
+    if plan.report is not None:
+        write_report(plan.report, report_of(rack, stimulation.happened))
+    stopped = rack.operations.stopped
+    if stopped is not None:
+        print(f"automax run: STOP ALL: {stopped.reason}", file=sys.stderr)
+    fault = stopped is not None and stopped.is_fault
+    return 1 if fault or failed or stimulation.refused else 0

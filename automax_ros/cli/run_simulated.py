@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import RecordingWatch
-from automax_ros.cli.run_plan import RunPlan, report_end, warn
+from automax_ros.cli.run_plan import RunPlan, conclude, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
+from automax_ros.cli.stimuli_file import stimulation as stimulation_of
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.wire.stream import RackStream
 
 SLICE_NS = 100 * NS_PER_MS
@@ -19,9 +21,10 @@ _NO_END = "simulated time without an end: Ctrl-C ends the run (or give --duratio
 
 
 def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
-    """Run until the duration has passed, a fault stops all tasks, or a stop is requested; return the exit code."""
+    """Run until the duration has passed, nothing can happen any more, or a stop is requested; return the exit code."""
     rack = Rack(plan.config)
     warn(rack)
+    stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, plan.record, plan.recording) if plan.record is not None else None
     display = StatusDisplay(rack, plan.watch, live=False)
@@ -34,9 +37,10 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
         if plan.duration_ns is None:
             display.message(_NO_END)
         rack.start([*state.settings, *plan.settings])
-        while not stop.requested and rack.stop_reason is None and rack.now_ns < end_ns:
+        stimulation.begin()
+        while not stop.requested and rack.now_ns < end_ns and _goes_on(rack, plan, stimulation):
             rack.scheduler.run_until(min(rack.now_ns + SLICE_NS, end_ns))
-            for text in state.news():
+            for text in [*state.news(), *stimulation.news()]:
                 display.message(text)
             display.printed()
             display.update(rack.now_ns)
@@ -50,4 +54,14 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
         display.message(text)
     recording.tell()
     display.finish(plan.record, complete=not recording.failed)
-    return report_end(rack, failed=recording.failed or state.failed)
+    return conclude(rack, plan, stimulation, failed=recording.failed or state.failed)
+
+
+def _goes_on(rack: Rack, plan: RunPlan, stimulation: Stimulation) -> bool:
+    """Whether something can still happen: with stimuli a run lasts its duration, or until the last of them.
+
+    So a rack that is stopped can be put into RUN again; without stimuli nobody would (decision).
+    """
+    if rack.stop_reason is None or not stimulation.is_over:
+        return True
+    return plan.stimuli is not None and plan.duration_ns is not None

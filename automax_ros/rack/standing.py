@@ -14,6 +14,11 @@ class StopCause:
     code: str | None = None
     task: str = ""
 
+    @property
+    def is_fault(self) -> bool:
+        """Whether a fault stopped the rack: it has a code or a task, a command has neither."""
+        return self.code is not None or bool(self.task)
+
 
 @dataclass(frozen=True)
 class PowerReturn:
