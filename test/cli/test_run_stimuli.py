@@ -138,7 +138,7 @@ def test_errors_are_told_before_the_run_with_file_line_and_key(automax, run):
     lines = [line for line in result.err.splitlines() if "error[" in line]
     assert lines == [
         "stimuli.yaml:1:25: error[AMX6736]: REF% cannot be '40000': it takes a whole number from -32768 to 32767",
-        "stimuli.yaml:2:19: error[AMX6739]: the rack has no task 'SPEDE'",
+        "stimuli.yaml:2:20: error[AMX6739]: the rack has no task 'SPEDE'",
     ]
     assert not (automax.folder / "bag").exists()
 
