@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.problems import Severity
@@ -40,43 +41,16 @@ class OnRack:
 
 
 @dataclass(frozen=True)
-class Force:
-    """Holds a common at a value."""
+class OnValue:
+    """A value that the operator gives something: a force, a tunable."""
 
     of: str
     value: Value
-    rack: Rack
+    operation: Callable[[str, Any], None]
 
     def do(self, _: Stage) -> None:
-        """Force it."""
-        try:
-            self.rack.force(self.of, self.value)
-        except ValueError as error:
-            raise OperationRefused(str(error)) from error
-
-
-@dataclass(frozen=True)
-class Tune:
-    """Sets a tunable of a task."""
-
-    task: str
-    name: str
-    value: Value
-    rack: Rack
-
-    @property
-    def of(self) -> str:
-        """The task and the tunable."""
-        return f"{self.task}.{self.name}"
-
-    def do(self, _: Stage) -> None:
-        """Tune it, if the task still has it: a reload may have changed the task."""
-        try:
-            self.rack.tune(self.rack.task(self.task), self.name, self.value)
-        except KeyError as error:
-            raise OperationRefused(f"task {self.task} has no tunable {self.name}") from error
-        except ValueError as error:
-            raise OperationRefused(str(error)) from error
+        """Give it."""
+        self.operation(self.of, self.value)
 
 
 @dataclass(frozen=True)
@@ -91,27 +65,9 @@ class Reload:
     def do(self, _: Stage) -> None:
         """Install it; one that has errors leaves the old one running."""
         try:
-            self.rack.operations.reload(self.of, self.source)
+            self.rack.operations.reload(self.of, self.source, keep_state=self.keep_state)
         except RackError as error:
             raise OperationRefused(f"{error}{_first_error(error)}") from error
-
-
-@dataclass(frozen=True)
-class Power:
-    """Switches the power off and, after a time, on again."""
-
-    off_ns: int
-    battery: bool
-    rack: Rack
-    of: str = ""
-
-    def do(self, stage: Stage) -> None:
-        """Switch it off now."""
-        self.rack.operations.power_off()
-        stage.later(self.off_ns, self._on)
-
-    def _on(self) -> None:
-        self.rack.operations.power_on(battery=self.battery)
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,8 @@ class Stimulation:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing is still to come: no entry, no sample, no power that was announced."""
-        return not self._waiting and not self._stage.is_busy
+        """Whether nothing is still to come: no entry and no sample."""
+        return not self._waiting and not self._stage.is_driving
 
     def news(self) -> list[str]:
         """Return a line for each refusal since the last call."""

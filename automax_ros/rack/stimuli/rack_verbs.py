@@ -16,12 +16,13 @@ from automax_ros.core.yaml_text import Mapping as Keys
 from automax_ros.core.yaml_text import Node, Scalar, Sequence
 from automax_ros.rack.files import FileFault, stays_next_to
 from automax_ros.rack.findings import Findings
+from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.scalars import boolean_value, is_plain_word, kind_of, text_value, wrong_kind
 from automax_ros.rack.sections import Section, entries_of
 from automax_ros.rack.settings import CommonElement, common_named
 from automax_ros.rack.stimuli.controls import control_verbs
-from automax_ros.rack.stimuli.operating import Force, OnRack, OnTask, Power, Reload, Tune
+from automax_ros.rack.stimuli.operating import OnRack, OnTask, OnValue, Reload
 from automax_ros.rack.stimuli.reading import Read, Verb, cut_short, named, time_of, value_for
 from automax_ros.rack.stimuli.signals import RackSignals
 from automax_ros.rack.stimuli.stage import Action
@@ -45,6 +46,7 @@ def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mappin
         "tune": Verb(tasks.tune),
         "run": Verb(tasks.each(operations.run)),
         "stop": Verb(tasks.each(operations.stop)),
+        "delete": Verb(tasks.each(operations.delete)),
         "reload": Verb(sources.reload),
         "run_all": Verb(_switch(operations.run_all)),
         "stop_all": Verb(_switch(partial(operations.stop_all, "STOP ALL of the stimuli"))),
@@ -105,7 +107,7 @@ class _Tasks:
         found = (self._tuned(key, value, findings) for key, value in named(node, what, findings))
         return [item for item in found if item is not None]
 
-    def _tuned(self, key: Scalar, node: Node, findings: Findings) -> Tune | None:
+    def _tuned(self, key: Scalar, node: Node, findings: Findings) -> OnValue | None:
         owner, dot, name = key.text.partition(".")
         if not dot:
             hint = "write TASK.NAME, such as SPEED.KP"
@@ -114,7 +116,7 @@ class _Tasks:
         task = self.task(Scalar(owner.strip(), key.plain, key.span), findings)
         return self._of_task(task, name, key, node, findings) if task is not None else None
 
-    def _of_task(self, task: Task, name: str, key: Scalar, node: Node, findings: Findings) -> Tune | None:
+    def _of_task(self, task: Task, name: str, key: Scalar, node: Node, findings: Findings) -> OnValue | None:
         tunables = {item.name: item for item in task.compiled.program.symbols.values() if item.tuning is not None}
         try:
             symbol = element(name, tunables, f"task {task.name} has no tunable").variable
@@ -131,7 +133,7 @@ class _Tasks:
         except ValueError as error:
             findings.add("AMX6741", f"task {task.name}: {error}", node.span)
             return None
-        return Tune(task.name, symbol.name, value, self.rack)
+        return OnValue(f"{task.name}.{symbol.name}", value, self.rack.adjust.tune)
 
 
 def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None:
@@ -144,6 +146,9 @@ def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None
         meant = common_named(rack.config, key.text)
     except NameFault as fault:
         findings.add("AMX6735", fault.message, key.span, cut_short(key.text) or fault.hint)
+        return None
+    if meant.name in PREDEFINED:
+        findings.add("AMX6737", f"{meant.name} cannot be forced: the rack itself writes it", key.span)
         return None
     if meant.variable.is_array or meant.variable.type is DataType.STRING:
         kind = "an element of an array" if meant.variable.is_array else "a STRING"
@@ -159,20 +164,19 @@ def _force(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action
         meant = _common(rack, key, findings)
         value = value_for(item, signals.signal(meant), findings) if meant is not None else None
         if meant is not None and value is not None:
-            found.append(Force(meant.name, value, rack))
+            found.append(OnValue(meant.name, value, rack.adjust.force))
     return found
 
 
 def _unforce(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
     if isinstance(node, Scalar) and node.text == ALL:
-        return [OnRack(partial(_unforce_all, rack))]
+        return [OnRack(rack.adjust.unforce)]
     commons = [_common(rack, name, findings) for name in names_of(node, what, findings)]
-    return [OnTask(item.name, rack.unforce) for item in commons if item is not None]
+    return [OnTask(item.name, partial(_release, rack)) for item in commons if item is not None]
 
 
-def _unforce_all(rack: Rack) -> None:
-    for view, _ in sorted(rack.memory.forced):
-        rack.unforce(rack.memory.specs[view].name)
+def _release(rack: Rack, name: str) -> None:
+    rack.adjust.unforce([name])
 
 
 @dataclass(frozen=True)
@@ -239,4 +243,6 @@ def _power(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action
     off_for, battery = section.get("off_for"), section.get("battery")
     off_ns = time_of(off_for, f"off_for of {what}", findings) if off_for is not None else None
     good = boolean_value(battery, f"battery of {what}", findings) if battery is not None else True
-    return [Power(off_ns, good, rack)] if off_ns is not None and good is not None else []
+    if off_ns is None or good is None:
+        return []
+    return [OnRack(partial(rack.operations.power, off_ns, battery=good))]

@@ -32,8 +32,8 @@ _MOST_NODES = 1_000_000
 _START = Span(1, 1, 2)
 _FORM = "write {at: 0.5, set: {REF%: 1500}}: a time in seconds and one verb"
 RACK_ONLY = (
-    "force", "unforce", "tune", "run", "stop", "reload", "run_all", "stop_all", "clear_errors", "power", "plant",
-    "module",
+    "force", "unforce", "tune", "run", "stop", "delete", "reload", "run_all", "stop_all", "clear_errors", "power",
+    "plant", "module",
 )  # fmt: skip
 """Verbs that a task alone does not have: it has no operator and no modules."""
 

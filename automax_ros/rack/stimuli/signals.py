@@ -21,8 +21,8 @@ class Signal:
     """A simple variable or an element of an array, with how to read and how to write it.
 
     ``label`` is its full name; ``length`` is the most characters of a STRING; ``low`` and ``high`` are the limits of a
-    number. ``write`` takes a value of its type within them, and raises ValueError or ``OperationRefused`` where the
-    value cannot be written now.
+    number. ``set`` and ``write`` take a value of its type within them. ``set`` is what a person does: it raises
+    OperationRefused where it cannot be done now. ``write`` is what an instrument does: a force makes it do nothing.
     """
 
     label: str
@@ -31,6 +31,7 @@ class Signal:
     low: float
     high: float
     read: Callable[[], Value]
+    set: Callable[[Value], None]
     write: Callable[[Value], None]
 
 
@@ -73,6 +74,7 @@ class RackSignals:
             variable.length,
             *variable.type.range,
             partial(self.rack.memory.read_now, view, meant.index),
+            partial(self.rack.adjust.set, meant.label),
             partial(self._write, view, meant.index),
         )
 
@@ -94,4 +96,4 @@ class LoneSignals:
         low, high = symbol.type.range
         if symbol.tuning is not None:
             low, high = float(symbol.tuning.low), float(symbol.tuning.high)
-        return Signal(found.label, symbol.type, symbol.length, low, high, found.read, found.write)
+        return Signal(found.label, symbol.type, symbol.length, low, high, found.read, found.write, found.write)

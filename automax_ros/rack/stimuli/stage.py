@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from automax_ros.core.types import Value
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.stimuli.signals import Signal
 from automax_ros.rack.stimuli.waves import SAMPLE_NS, Wave
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
@@ -50,46 +48,31 @@ class Stage:
         """Take whose time it is."""
         self.scheduler = scheduler
         self._driven: dict[str, list[ScheduledEvent]] = {}
-        self._announced = 0
         self._count = 0
 
     @property
-    def is_busy(self) -> bool:
-        """Whether a wave still runs, or something was announced."""
-        return bool(self._driven) or self._announced > 0
+    def is_driving(self) -> bool:
+        """Whether a wave still runs."""
+        return bool(self._driven)
 
-    def later(self, delay_ns: int, call: Callable[[], None]) -> None:
-        """Do something after a time; what it refuses by then is passed over."""
-
-        def happen(_: int) -> None:
-            self._announced -= 1
-            with suppress(OperationRefused):
-                call()
-
-        self._announced += 1
-        self.scheduler.at(self.scheduler.now_ns + delay_ns, self._key(), happen)
-
-    def write(self, signal: Signal, value: Value) -> None:
+    def set(self, signal: Signal, value: Value) -> None:
         """Write a value; a wave that drove the signal ends.
 
         Raises:
             OperationRefused: it cannot be written now.
         """
         self.rest(signal)
-        _write(signal, value)
+        signal.set(value)
 
     def drive(self, signal: Signal, wave: Wave) -> None:
         """Let a wave drive a signal from now on, in place of one that does.
 
         A sample is written where it differs from what is there, so a task that writes the signal does not keep it.
-
-        Raises:
-            OperationRefused: it cannot be written now.
         """
         self.rest(signal)
         scheduler = self.scheduler
         began, start = scheduler.now_ns, signal.read()
-        _write_if_other(signal, wave.value(0, start))
+        _sample(signal, wave.value(0, start))
         if wave.for_ns == 0:
             return
         key = self._key()
@@ -98,10 +81,10 @@ class Stage:
             self.rest(signal)
             last = wave.last()
             if last is not None:
-                _try(signal, last)
+                _sample(signal, last)
 
         def sample(now_ns: int, _: int) -> None:
-            _try(signal, wave.value(now_ns - began, start))
+            _sample(signal, wave.value(now_ns - began, start))
 
         events = [] if wave.for_ns is None else [scheduler.at(began + wave.for_ns, key, end)]
         events.append(scheduler.every(SAMPLE_NS, began + SAMPLE_NS, key, sample))
@@ -124,22 +107,9 @@ ENTRIES = 1
 """Priority of entries: after what earlier entries began (decision), before all else."""
 
 
-def _try(signal: Signal, value: Value) -> None:
-    """Write a sample; a signal that refuses it now is written by a later one."""
-    with suppress(OperationRefused):
-        _write_if_other(signal, value)
-
-
-def _write_if_other(signal: Signal, value: Value) -> None:
+def _sample(signal: Signal, value: Value) -> None:
     if signal.read() != value:
-        _write(signal, value)
-
-
-def _write(signal: Signal, value: Value) -> None:
-    try:
         signal.write(value)
-    except ValueError as error:
-        raise OperationRefused(str(error)) from error
 
 
 @dataclass(frozen=True)

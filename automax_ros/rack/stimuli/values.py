@@ -36,7 +36,7 @@ class SetValue:
 
     def do(self, stage: Stage) -> None:
         """Write it."""
-        stage.write(self.signal, self.value)
+        stage.set(self.signal, self.value)
 
 
 @dataclass(frozen=True)

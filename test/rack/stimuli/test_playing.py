@@ -168,6 +168,38 @@ def test_forces_and_releases(tmp_path):
     assert (rack.memory.forced, rack.value("FORCINGSTATUS@")) == (frozenset(), False)
 
 
+def test_a_forced_common_cannot_be_set_and_a_wave_goes_on_under_the_force(tmp_path):
+    text = (
+        "- {at: 0, ramp: {REF%: {to: 100, over: 0.01}}}\n- {at: 0.0025, force: {REF%: 7}}\n"
+        "- {at: 0.005, unforce: REF%}\n- {at: 0.02, force: {REF%: 8}}\n- {at: 0.03, set: {REF%: 9}}\n"
+    )
+    rack, log, stimulation = played(tmp_path, text, 0.04)
+    # the sample of 5 ms comes before the release, and the force holds it off
+    assert [value for time, value in log.of("REF%") if time <= 6 * MS] == [10, 20, 7, 7, 60]
+    assert rack.value("REF%") == 8
+    (refused,) = [item for item in stimulation.happened if not item.ok]
+    assert (refused.what, refused.of) == ("set", "REF%")
+    assert "forced at 8" in refused.why
+
+
+def test_a_task_is_deleted_and_reloaded_with_its_values(tmp_path):
+    text = (
+        "- {at: 0.0005, tune: {SPEED.KP: 5}}\n- {at: 0.0105, reload: {SPEED: {file: SPEED.BLK, keep_state: true}}}\n"
+        "- {at: 0.0105, stop: SPEED}\n- {at: 0.0105, delete: SPEED}\n- {at: 0.0115, run: SPEED}\n"
+    )
+    rack, _, stimulation = played(tmp_path, text, 0.0106)
+    assert [item.ok for item in stimulation.happened] == [True] * 4
+    assert rack.task("SPEED").value("KP") == 1.0
+    rack.run(0.01)
+    assert [item.ok for item in stimulation.happened] == [True] * 4 + [False]
+
+
+def test_values_are_kept_over_a_reload(tmp_path):
+    text = "- {at: 0.0005, tune: {SPEED.KP: 5}}\n- {at: 0.0105, reload: {SPEED: {file: SPEED.BLK, keep_state: true}}}\n"
+    rack, _, _ = played(tmp_path, text, 0.02)
+    assert rack.task("SPEED").value("KP") == 5.0
+
+
 def test_tunables_are_set(tmp_path):
     rack, _, _ = played(tmp_path, "- {at: 0.001, tune: {SPEED.KP: 1.2, speed.count%: 5}}\n", 0.01)
     assert rack.task("SPEED").value("KP") == pytest.approx(1.2, rel=1e-7)
@@ -197,10 +229,9 @@ def test_power_goes_and_comes_back(tmp_path):
     stimulation = playing(rack, tmp_path, text)
     rack.run(0.01)
     assert (rack.operations.powered, rack.value("REF%"), rack.value("KEPT%")) == (False, 0, 8)
-    assert not stimulation.is_over
     rack.run(0.01)
     assert rack.operations.powered
-    assert stimulation.is_over
+    assert [(item.what, item.at_ns) for item in stimulation.happened] == [("power", 5_500_000)]
     assert rack.task("SPEED").status is Status.STOPPED
 
 
