@@ -42,8 +42,10 @@ def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
         for task in processor.tasks:
             source = info.texts.get(f"{task.name}.BLK")
             name = f"{task.name}.BLK"
-            checked = check_source(SourceText(name, source), task.name, processor.tick_ns, commons) if source else None
-            program = checked.program if checked else None
+            program = None
+            if source:
+                text_of = SourceText(name, source)
+                program = check_source(text_of, task.name, processor.tick_ns, commons, processor.times).program
             facts[task.name] = TaskFacts(
                 processor.slot,
                 processor.model,

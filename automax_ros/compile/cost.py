@@ -10,7 +10,7 @@ import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from automax_ros.blocks.declaration import Time, Times
+from automax_ros.blocks.declaration import Platform, Time, Times
 from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES, SCAN_LOOP
 from automax_ros.core.ticks import NS_PER_US, UDC_MAX_TICKS
 from automax_ros.core.types import DataType
@@ -29,6 +29,8 @@ class Model(enum.Enum):
     PC3000 = "pc3000"
 
 
+PLATFORMS = {Model.UDC: Platform.UDC, Model.PC3000: Platform.PC3000}
+"""What other modules than AutoMax Processors are to a task: which blocks and statements they have."""
 MOST_SHARED_TICKS = {Model.UDC: UDC_MAX_TICKS}
 """The most TICKS of modules whose tasks run one after the other in one scan (53.2)."""
 

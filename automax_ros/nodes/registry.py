@@ -15,6 +15,7 @@ from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
 from automax_ros.rack.modules.kind import Module, ModuleKind
+from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.registry import SUPPORTED
@@ -22,6 +23,7 @@ from automax_ros.rack.modules.resolver import RESOLVER
 
 NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     PROCESSOR: ProcessorNode,
+    PC3000: ProcessorNode,
     COMMON_MEMORY: None,
     DIGITAL_IO: IoModuleNode,
     ANALOG_IO: IoModuleNode,

@@ -61,7 +61,8 @@ class Installation:
         Raises:
             RackError: the source has errors.
         """
-        result = check_source(source, task, self._module(task).tick_ns, commons_of(self._config))
+        module = self._module(task)
+        result = check_source(source, task, module.tick_ns, commons_of(self._config), module.times)
         if result.program is None or has_errors(result.diagnostics):
             raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
         return self._compile(task, result.program)

@@ -7,6 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Platform
+from automax_ros.compile.cost import PLATFORMS, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, in_order
 from automax_ros.core.kinds import Direction
 from automax_ros.language.checks.checker import CheckResult, check
@@ -68,12 +70,21 @@ def _checked(
         place = SourceText(str(config.path), config.text)
         gone = Diagnostic("AMX6306", f"the source {task.file.name} of task {task.name} {fault}", Span(task.line, 1, 2))
         return CheckedTask(task, place, CheckResult(None, [gone]))
-    return CheckedTask(task, source, check_source(source, task.name, module.tick_ns, commons))
+    return CheckedTask(task, source, check_source(source, task.name, module.tick_ns, commons, module.times))
 
 
-def check_source(source: SourceText, name: str, tick_ns: int, commons: Mapping[str, CommonSpec]) -> CheckResult:
-    """Check the text of one task against a rack's commons and the tick of the Processor that runs it."""
-    return _with_events_checked(check(source, name=name, catalogue=CATALOGUE, tick_ns=tick_ns, commons=commons))
+def check_source(
+    source: SourceText,
+    name: str,
+    tick_ns: int,
+    commons: Mapping[str, CommonSpec],
+    model: Model = Model.NONE,
+) -> CheckResult:
+    """Check the text of one task against a rack's commons and the tick and model of the module that runs it."""
+    target = PLATFORMS.get(model, Platform.AUTOMAX)
+    return _with_events_checked(
+        check(source, name=name, catalogue=CATALOGUE, target=target, tick_ns=tick_ns, commons=commons)
+    )
 
 
 def _with_events_checked(result: CheckResult) -> CheckResult:

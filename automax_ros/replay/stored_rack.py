@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from mcap.records import Attachment
@@ -19,12 +20,14 @@ from automax_ros.bags.run_facts import sent_files
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.text import did_you_mean
-from automax_ros.language.program import Program
+from automax_ros.language.checks.checker import CheckResult
+from automax_ros.language.program import CommonSpec, Program
 from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Reference, Scope
 from automax_ros.language.syntax.walk import statements_in_order
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.loader import load_stored
+from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.modules.processor import MAX_PROCESSORS
 from automax_ros.rack.task_config import MAX_TASKS
 from automax_ros.rack.tasks_check import check_source, commons_of
@@ -97,8 +100,7 @@ class StoredRack:
             SourceRefused: a source has errors.
         """
         self.require_tasks([*names, *new])
-        commons = commons_of(self.config)
-        ticks = {task.name: module.tick_ns for module, task in self.config.placed_tasks}
+        modules = {task.name: module for module, task in self.config.placed_tasks}
         views = {variable.name: view for view, variable in enumerate(self.config.variables)}
         made: list[ReplaySource] = []
         refused: list[tuple[SourceText, list[Diagnostic]]] = []
@@ -108,7 +110,7 @@ class StoredRack:
             if source is None:
                 hint = f"give it with --task {name}=FILE, or leave the task out with --only"
                 raise BagError("AMX6830", self.bag, f"lacks the source of task {name}", hint)
-            result = check_source(source, name, ticks[name], commons)
+            result = self._checked(source, modules[name], name)
             if result.program is None or has_errors(result.diagnostics):
                 refused.append((source, result.diagnostics))
                 continue
@@ -116,12 +118,19 @@ class StoredRack:
             edited = stored is None or source.text != stored.text
             recorded: CompiledTask | None = compiled
             if edited:
-                before = check_source(stored, name, ticks[name], commons).program if stored else None
+                before = self._checked(stored, modules[name], name).program if stored else None
                 recorded = compile_program(before, views) if before else None
             made.append(ReplaySource(name, source, compiled, recorded, edited, tuple(result.diagnostics)))
         if refused:
             raise SourceRefused(refused)
         return made
+
+    @cached_property
+    def _commons(self) -> Mapping[str, CommonSpec]:
+        return commons_of(self.config)
+
+    def _checked(self, source: SourceText, module: ModuleConfig, name: str) -> CheckResult:
+        return check_source(source, name, module.tick_ns, self._commons, module.times)
 
     def check_table(self, table: VariableTable) -> None:
         """Make sure that the recording numbers its variables as its own rack file does.

@@ -8,5 +8,6 @@ PROBLEMS: tuple[Problem, ...] = (
     # `automax load`
     Problem("AMX6770", "tasks take more than all of a module's time", Severity.WARNING, hardware="14"),
     Problem("AMX6771", "tasks of a UDC fit in no TICKS", hardware="14"),
+    Problem("AMX6773", "PC3000 that is not alone"),
     Problem("AMX6772", "Executive older than the tables of execution times", Severity.WARNING),
 )

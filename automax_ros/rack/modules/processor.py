@@ -110,7 +110,7 @@ class ProcessorKind:
         if not rack.complete:
             return
         has_memory = any(item.slot == 0 for item in rack.of(COMMON_MEMORY))
-        if not own:
+        if not any(isinstance(item.kind, ProcessorKind) for item in rack.standing):
             hint = f"Processors are {', '.join(self.models)}"
             rack.findings.add("AMX6209", "the rack has no Processor", rack.span, hint)
         elif len(own) > MAX_PROCESSORS:

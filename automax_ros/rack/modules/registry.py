@@ -12,12 +12,14 @@ from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
 from automax_ros.rack.modules.kind import ModuleKind
+from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.resolver import RESOLVER
 
 KINDS: tuple[ModuleKind, ...] = (
     PROCESSOR,
+    PC3000,
     COMMON_MEMORY,
     DIGITAL_IO,
     ANALOG_IO,
@@ -37,9 +39,6 @@ NOT_YET = {
     "57C416": "remote I/O module",
     "57C417": "R-Net module",
     "57C418": "A-B interface module",
-    "57C560": "AutoMax PC3000",
-    "57C565": "AutoMax PC3000",
-    "57C570": "AutoMax PC3000",
 }
 """Modules that exist but that the emulator cannot be yet."""
 
