@@ -88,6 +88,12 @@ class Recorder(Recording):
                 self._split_posted = True
                 self._rack.scheduler.at(self._rack.now_ns + 1, _FIRST, self._split)
 
+        def take_and_store(stamp: int, payload: bytes) -> None:
+            take_and_measure(stamp, payload)
+            self.store(files_of(self._rack))  # what was done may have been a reload
+
+        if topic == self._stream.operations_topic:
+            return take_and_store
         return take_and_measure if self._splits_by_size else take
 
     def _split(self, now_ns: int) -> None:  # noqa: ARG002

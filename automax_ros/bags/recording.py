@@ -27,6 +27,12 @@ class Recording:
         self._stored: dict[str, RackFile] = {}
         self._store(files)
 
+    def store(self, files: Iterable[RackFile]) -> None:
+        """Store files that are not stored as they are now, such as the source of a task that was reloaded."""
+        if self.failure is None:
+            with self._enduring():
+                self._store(files)
+
     def sync(self) -> None:
         """Wait until the disk itself has what was flushed. May take long: to be called from another thread."""
         self._writer.sync()

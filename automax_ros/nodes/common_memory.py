@@ -26,7 +26,7 @@ from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.writers import ROS_WRITER
 from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED, QosProfile
-from automax_ros.wire.rack_files import files_of, files_text
+from automax_ros.wire.rack_files import RackFile, files_of, files_text
 from automax_ros.wire.stream import Take, Topic
 
 REFUSAL_INTERVAL_S = 1.0
@@ -49,12 +49,30 @@ class CommonMemoryNode(ModuleNode):
                 # The image that waits for a late joiner may be as old as the run.
                 outlets[own] = self.outlet(own, stream.send_image if joined else None)
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
-        self._config.publish(String(data=files_text(rack.config.name, files_of(rack))))
+        self._files: list[RackFile] = []
+        outlets[stream.operations_topic] = self._with_files(outlets[stream.operations_topic])
+        self._offer_files()
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
                 _Inlet(self, view, variable, topic)
         stream.add_sink(outlets.get)
+
+    def _with_files(self, publish: Take) -> Take:
+        """Return what publishes an operation and, where it was a reload, the files that the rack runs from now."""
+
+        def take(stamp: int, payload: bytes) -> None:
+            self._offer_files()
+            publish(stamp, payload)
+
+        return take
+
+    def _offer_files(self) -> None:
+        rack = self.site.rack
+        files = files_of(rack)
+        if files != self._files:
+            self._files = files
+            self._config.publish(String(data=files_text(rack.config.name, files)))
 
 
 class _Inlet:

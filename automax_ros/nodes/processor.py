@@ -89,7 +89,7 @@ class ProcessorNode(ModuleNode):
         """Report a STOP ALL, and the health of the tasks after each operation on one of them."""
         if operation.what == "stop_all":
             self.get_logger().error(f"STOP ALL: {operation.reason}")
-        concerned = [task for task in self._tasks if operation.task in ("", task.name)]
+        concerned = [task for task in self._tasks if operation.concerns(task.name)]
         if operation.ok and operation.what in ("reload", "power_on"):
             self._declare(concerned)
         if concerned:

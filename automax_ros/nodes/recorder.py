@@ -27,6 +27,7 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.environment import RosUnavailable
 from automax_ros.nodes.topics import message_class
 from automax_ros.wire.cdr import CdrError, decode
+from automax_ros.wire.heads import table_of
 from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.qos import LATCHED
 from automax_ros.wire.rack_files import RackFile, RackFilesError, files_from_text
@@ -42,6 +43,7 @@ FILES_WAIT_NS = 3 * NS_PER_S
 _KNOCK_NS = NS_PER_S
 _MOST_KNOCKS = 5
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
+_FILES = TopicKind("std_msgs/msg/String", LATCHED)
 _NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 
 
@@ -123,6 +125,7 @@ class LiveRecorder:
         self._table = b""
         self._order: ArrivalOrder[tuple[str, bytes]] = ArrivalOrder(HOLD_NS)
         self._subscriptions: list[RawSubscription] = []
+        self._files: RawSubscription | None = None
         self._numbers: dict[str, int] = {}
         self._last_due = 0
         self._knocks: list[RawSubscription] = []
@@ -150,7 +153,7 @@ class LiveRecorder:
             self._table = _last(source, wait_ns, stopping)
         finally:
             source.close()
-        return _table(self._table) if self._table else None
+        return table_of(self._table) if self._table else None
 
     def files(self, stopping: Callable[[], bool]) -> list[RackFile]:
         """Return the files that the rack runs from; none if it does not offer them.
@@ -158,17 +161,12 @@ class LiveRecorder:
         Raises:
             RackFilesError: what it sends are none.
         """
-        source = RawSubscription(self._node, self._topics.config, TopicKind("std_msgs/msg/String", LATCHED))
+        source = RawSubscription(self._node, self._topics.config, _FILES)
         try:
             payload = _last(source, FILES_WAIT_NS, stopping)
         finally:
             source.close()
-        if not payload:
-            return []
-        try:
-            return files_from_text(str(decode("std_msgs/msg/String", payload)[0]))
-        except CdrError as error:
-            raise RackFilesError(str(error)) from error
+        return _files(payload) if payload else []
 
     def open(
         self,
@@ -183,12 +181,14 @@ class LiveRecorder:
         Raises:
             RecordingError: the folder exists already or cannot be written.
         """
-        self._topics = topics = LiveTopics(self._space, _table(self._table))
+        self._topics = topics = LiveTopics(self._space, table_of(self._table))
         self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
         kinds = topics.all
         # The rack answers each new reader of these: an image first, then states and full scans that follow it.
-        first = [topics.variables, topics.backplane, *topics.values, topics.snapshot, topics.scans, topics.states]
+        first = [topics.variables, topics.backplane, *topics.values, topics.operations]
+        first += [topics.snapshot, topics.scans, topics.states]
         self._subscriptions = [RawSubscription(self._node, name, kinds[name]) for name in first]
+        self._files = RawSubscription(self._node, topics.config, _FILES)
         return self.recording
 
     def step(self) -> None:
@@ -196,6 +196,7 @@ class LiveRecorder:
         assert self.recording is not None
         now = time.monotonic_ns()
         self._look()
+        self._look_at_files()
         due = self._order.due(now)
         for sent_ns, (topic, payload) in due:
             self.recording.take(topic, sent_ns, payload)
@@ -212,6 +213,7 @@ class LiveRecorder:
         if self.recording is None:
             return
         self._look()
+        self._look_at_files()
         for sent_ns, (topic, payload) in self._order.rest():
             self.recording.take(topic, sent_ns, payload)
         self.recording.close()
@@ -228,6 +230,16 @@ class LiveRecorder:
                 if topic in self._topics.values:
                     self._count_lost(topic, number)
                 self._order.add(sent_ns, (topic, payload))
+
+    def _look_at_files(self) -> None:
+        """Store the source of a task that was reloaded meanwhile: the rack tells its files again then."""
+        assert self._files is not None
+        assert self.recording is not None
+        for _, _, payload in self._files.taken():
+            try:
+                self.recording.store(_files(payload))
+            except RackFilesError as error:
+                self.recording.notes.append(f"left out what {self._topics.config} told: {error}")
 
     def _count_lost(self, topic: str, number: int) -> None:
         """Count values of a common that did not come: the sender keeps one of them only."""
@@ -265,10 +277,16 @@ def _last(source: RawSubscription, wait_ns: int, stopping: Callable[[], bool]) -
     return b""
 
 
-def _table(payload: bytes) -> VariableTable:
-    table = decode(_TABLE_TYPE, payload)
-    assert isinstance(table, VariableTable)
-    return table
+def _files(payload: bytes) -> list[RackFile]:
+    """Return the files that a rack offers.
+
+    Raises:
+        RackFilesError: it is not what a rack sends.
+    """
+    try:
+        return files_from_text(str(decode("std_msgs/msg/String", payload)[0]))
+    except CdrError as error:
+        raise RackFilesError(str(error)) from error
 
 
 def _nothing(_: Any) -> None:

@@ -25,6 +25,10 @@ class Operation:
     reason: str = ""
     detail: str = ""
 
+    def concerns(self, task: str) -> bool:
+        """Return whether a task may be another after it; ``task`` of a STOP ALL is only the one that caused it."""
+        return self.task in ("", task) or self.what == "stop_all"
+
 
 class RackObserver(Protocol):
     """Somebody who is told what happens in a rack, in order."""

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from automax_ros.wire.cdr import head_reader
+from automax_ros.wire.cdr import decode, head_reader
+from automax_ros.wire.messages import VariableTable
 
 
 class WriteHead(NamedTuple):
@@ -25,6 +26,34 @@ class ScanHead(NamedTuple):
     task: str
     scan: int
     full: bool
+
+
+class OperationHead(NamedTuple):
+    """Where an Operation stands: its stamp in ns, its run."""
+
+    stamp: int
+    run_id: int
+
+
+def table_of(payload: bytes) -> VariableTable:
+    """Return a VariableTable.
+
+    Raises:
+        CdrError: the bytes are none.
+    """
+    table = decode("automax_msgs/msg/VariableTable", payload)
+    assert isinstance(table, VariableTable)
+    return table
+
+
+def operation_head(payload: bytes) -> OperationHead:
+    """Return the head of an Operation.
+
+    Raises:
+        CdrError: the bytes are none.
+    """
+    head: OperationHead = head_reader("automax_msgs/msg/Operation", OperationHead)(payload)
+    return head
 
 
 def write_head(payload: bytes) -> WriteHead:

@@ -36,5 +36,7 @@ LATCHED = QosProfile("reliable", "transient_local", "keep_last", 1)
 """The last message waits for late joiners."""
 VALUE = LATCHED
 """The value of a common variable."""
+OPERATION = QosProfile("reliable", "transient_local", "keep_last", 100)
+"""What was done last waits for late joiners, oldest first (decision: 100 operations)."""
 SCAN = QosProfile("reliable", "volatile", "keep_last", 1000)
 """A stream of which every message counts."""

@@ -11,6 +11,7 @@ from typing import Any
 from automax_ros.core.kinds import Direction, WriteKind
 from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.rack.config import CommonVariable
+from automax_ros.rack.observers import Operation as Done
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
 from automax_ros.rack.writers import PRESET_WRITER
@@ -31,6 +32,7 @@ from automax_ros.wire.messages import (
     Int32MultiArray,
     MultiArrayDimension,
     MultiArrayLayout,
+    Operation,
     Scan,
     ScanError,
     String,
@@ -256,6 +258,18 @@ class RackMessages:
             [ScanError(line, code) for line, code in errors] if errors else (),
         )
         return _new(Scan, fields)
+
+    def operation(self, operation: Done) -> Operation:
+        """Return what was done to the rack."""
+        return Operation(
+            self.stamp(operation.at_ns),
+            self._run_id,
+            operation.what,
+            operation.task,
+            operation.ok,
+            operation.reason,
+            operation.detail,
+        )
 
     def state(self, task: Task, now_ns: int) -> TaskState:
         """Return a snapshot of a task's state."""

@@ -21,7 +21,7 @@ from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import Write
 from automax_ros.wire.cdr import Message, encode, encoder
 from automax_ros.wire.messages import NAMES, CommonWrite, Scan
-from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
+from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE, QosProfile
 from automax_ros.wire.rack_messages import RackMessages, message_maker, value_type_name
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
@@ -85,6 +85,7 @@ class RackStream:
         self._messages = RackMessages(rack, run_id)
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
+        self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
         slots = [module.config.slot for module in rack.task_modules]
         self.scans_topics = {slot: Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN, slot) for slot in slots}
@@ -95,6 +96,7 @@ class RackStream:
         self._tables: list[Take] = []
         self._images: list[Take] = []
         self._writes: list[Take] = []
+        self._operations: list[Take] = []
         self._tasks = {task: _TaskStream() for task in rack.tasks}
         self._encode_scan, self._encode_write = encoder(NAMES[Scan]), encoder(NAMES[CommonWrite])
         self._next_image_ns = SNAPSHOT_PERIOD_NS
@@ -103,8 +105,8 @@ class RackStream:
     @property
     def topics(self) -> list[Topic]:
         """All topics of the stream."""
-        fixed = [self.variables_topic, self.snapshot_topic, self.backplane_topic, *self.module_topics]
-        return [*fixed, *(value.topic for value in self._values.values())]
+        rack = [self.variables_topic, self.snapshot_topic, self.backplane_topic, self.operations_topic]
+        return [*rack, *self.module_topics, *(value.topic for value in self._values.values())]
 
     @property
     def module_topics(self) -> list[Topic]:
@@ -130,6 +132,7 @@ class RackStream:
         route(self._tables, self.variables_topic)
         route(self._images, self.snapshot_topic)
         route(self._writes, self.backplane_topic)
+        route(self._operations, self.operations_topic)
         for value in self._values.values():
             route(value.takes, value.topic)
         for task, stream in self._tasks.items():
@@ -230,9 +233,10 @@ class RackStream:
         self._send_state(task, now_ns)
 
     def operated(self, operation: Operation) -> None:
-        """Send the states in which an operation has left the tasks that it concerns."""
+        """Send an operation, and the states in which it has left the tasks that it concerns."""
+        _send(self._messages.operation(operation), self._operations)
         for task in self._rack.tasks:
-            if operation.ok and operation.task in ("", task.name):
+            if operation.ok and operation.concerns(task.name):
                 self._messages.reinstalled(task)
                 self._send_state(task, operation.at_ns)
 

@@ -22,7 +22,7 @@ from automax_ros.bags.write_log import WriteLog
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
 from automax_ros.core.kinds import WriterKind
 from automax_ros.wire.cdr import CdrError, decode
-from automax_ros.wire.heads import WriteHead, image_head, scan_head, write_head
+from automax_ros.wire.heads import WriteHead, image_head, operation_head, scan_head, table_of, write_head
 from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.rack_files import RACK_FILE, RackFile
 
@@ -61,7 +61,7 @@ class LiveRecording(Recording):
             RecordingError: the folder exists already or cannot be written.
             CdrError: the table is malformed.
         """
-        self._facts: VariableTable = _decoded(table)
+        self._facts: VariableTable = table_of(table)
         super().__init__(BagWriter(folder, options=storage), files)
         self.ended: str | None = None
         self.notes: list[str] = []
@@ -90,11 +90,12 @@ class LiveRecording(Recording):
             topics.variables: self._take_table,
             topics.snapshot: self._take_image,
             topics.backplane: self._take_write,
-            **dict.fromkeys((topics.scans, topics.states, *topics.values), self._keep),
+            **dict.fromkeys((topics.scans, topics.states, topics.operations, *topics.values), self._keep),
         }
         self._recorders: dict[str, Callable[[str, int, bytes], None]] = {
             topics.scans: self._record_scan,
             topics.states: self._record_state,
+            topics.operations: self._record_operation,
             **dict.fromkeys(topics.values, self._record_value),
         }
         self._channels: dict[str, Channel] = {
@@ -162,7 +163,7 @@ class LiveRecording(Recording):
             self._finish()
 
     def _take_table(self, topic: str, sent_ns: int, payload: bytes) -> None:  # noqa: ARG002
-        self._check_run(_decoded(payload).run_id)
+        self._check_run(table_of(payload).run_id)
 
     def _take_image(self, topic: str, sent_ns: int, payload: bytes) -> None:
         head = image_head(payload)
@@ -239,6 +240,11 @@ class LiveRecording(Recording):
         track.take_state(state.scan)
         self._write(topic, sent_ns, state.stamp, payload)
         self._look_whether_replayable(state.stamp)
+
+    def _record_operation(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        stamp, run_id = operation_head(payload)
+        if run_id == self._log.run_id and stamp >= (self.first_stamp or 0):  # older ones wait for late joiners too
+            self._write(topic, sent_ns, stamp, payload)
 
     def _record_value(self, topic: str, sent_ns: int, payload: bytes) -> None:
         self.values += 1
@@ -391,9 +397,3 @@ class LiveRecording(Recording):
             self._last_sent = sent_ns
             self.last_stamp = stamp
         self._writer.write(self._channels[topic], stamp, payload)
-
-
-def _decoded(payload: bytes) -> VariableTable:
-    table = decode("automax_msgs/msg/VariableTable", payload)
-    assert isinstance(table, VariableTable)
-    return table

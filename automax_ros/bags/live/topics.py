@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
 from automax_ros.wire.messages import Variable, VariableTable
-from automax_ros.wire.qos import LATCHED, SCAN, VALUE, QosProfile
+from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE, QosProfile
 from automax_ros.wire.rack_messages import value_type_name
 
 MAX_VALUE_TOPICS = 2000
@@ -35,6 +35,7 @@ class LiveTopics:
         self.backplane = f"{space}/backplane"
         self.scans = f"{space}/scans"
         self.states = f"{space}/states"
+        self.operations = f"{space}/operations"
         self.config = f"{space}/config"
         found = _values(space, table) if table else {}
         self.values = dict(list(found.items())[:MAX_VALUE_TOPICS])
@@ -49,6 +50,7 @@ class LiveTopics:
             self.backplane: TopicKind("automax_msgs/msg/CommonWrite", SCAN),
             self.scans: TopicKind("automax_msgs/msg/Scan", SCAN),
             self.states: TopicKind("automax_msgs/msg/TaskState", SCAN),
+            self.operations: TopicKind("automax_msgs/msg/Operation", OPERATION),
             **self.values,
         }
 
