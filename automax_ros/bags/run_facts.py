@@ -53,6 +53,8 @@ def run_facts(bag: BagReader) -> RunFacts:
 def sent_files(bag: BagReader) -> list[RackFile]:
     """Return the rack's file and its tasks' sources as the rack itself has sent them, nothing where it has not.
 
+    After a reload it has sent them again: then a name comes with several texts, the first one first.
+
     Raises:
         BagError: the message is not one that a rack sends, or the recording cannot be read so far.
     """
@@ -62,16 +64,21 @@ def sent_files(bag: BagReader) -> list[RackFile]:
         if error.code == _NO_TABLE:
             return []
         raise
+    files: dict[RackFile, None] = {}
     for entry in bag.again().messages(topics={f"{space}/config"}, types=frozenset({_STRING})):
         assert isinstance(entry.message, String)
         try:
-            return files_from_text(entry.message.data)
+            files.update(dict.fromkeys(files_from_text(entry.message.data)))
         except RackFilesError as error:
             raise BagError("AMX6813", bag.path, f"{entry.topic} is not what a rack sends: {error}") from error
-    return []
+        if len(files) > _MOST_FILES:
+            break
+    return list(files)
 
 
 _NO_TABLE = "AMX6820"
 _STRING = "std_msgs/msg/String"
+_MOST_FILES = 1000
+"""Most files that are taken from the messages of a recording."""
 _MOST_RUNS = 1000
 """Most runs whose first write is remembered until the table says which of them it is."""

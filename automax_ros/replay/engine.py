@@ -24,13 +24,12 @@ from automax_ros.replay.compare import Tallies
 from automax_ros.replay.report import ReplayReport
 from automax_ros.replay.stored_rack import ReplaySource, StoredRack, stored_rack
 from automax_ros.replay.task import TaskReplay
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable
+from automax_ros.wire.messages import NAMES, CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable
 
 DEFAULT_MAX_DIFFERENCES = 50
 """Most differences that a replay's report tells in full, unless said otherwise (decision)."""
-_TYPES = frozenset(
-    f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "Scan", "TaskState", "VariableTable")
-)
+_KINDS = (CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable)
+_TYPES = frozenset(NAMES[kind] for kind in _KINDS)
 _STATES = frozenset({"automax_msgs/msg/TaskState"})
 
 Watcher = Callable[[TaskReplay, Scan], None]
@@ -182,6 +181,9 @@ class _Run:
             return self._take_scan(message)
         if isinstance(message, CommonWrite):
             self._take_write(message)
+        elif isinstance(message, Operation):
+            for replayed in self._tasks.values():
+                replayed.take_operation(message)
         elif isinstance(message, VariableTable):
             self._commons.check_table(message)
         elif isinstance(message, CommonImage):

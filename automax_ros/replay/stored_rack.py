@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -34,8 +34,10 @@ from automax_ros.rack.tasks_check import check_source, commons_of
 from automax_ros.wire.messages import VariableTable
 
 _RACK_FILE = "rack.yaml"
-_SOURCE = re.compile(r"([A-Z][A-Z0-9_]{0,7})\.BLK")
+_SOURCE = re.compile(r"([A-Z][A-Z0-9_]{0,7})\.(?:BLK|BAS)")
 _MOST_SOURCES = MAX_PROCESSORS * MAX_TASKS
+MOST_RELOADS = 100
+"""Most further sources of reloaded tasks that are read from a recording (decision: a bound on its compilation)."""
 
 
 class SourceRefused(Exception):
@@ -51,7 +53,8 @@ class ReplaySource:
     """A task that is executed again.
 
     ``compiled`` is what runs; ``recorded`` is what ran when the recording was made, None if that cannot be told;
-    ``edited`` says whether their sources differ.
+    ``edited`` says whether their sources differ. ``versions`` are all sources that ran, by their hash: a task may have
+    been reloaded. An edited source runs in place of each of them (decision).
     """
 
     name: str
@@ -60,6 +63,14 @@ class ReplaySource:
     recorded: CompiledTask | None
     edited: bool
     warnings: tuple[Diagnostic, ...] = ()
+    versions: Mapping[str, CompiledTask] = field(default_factory=dict)
+
+    def reloaded(self, source_hash: str) -> ReplaySource | None:
+        """Return what is executed after a reload with a source of this hash, None if it is not stored inside."""
+        recorded = self.versions.get(source_hash)
+        if recorded is None:
+            return None
+        return replace(self, recorded=recorded, compiled=self.compiled if self.edited else recorded)
 
     @property
     def written_at(self) -> Mapping[str, tuple[int, ...]]:
@@ -69,11 +80,12 @@ class ReplaySource:
 
 @dataclass(frozen=True)
 class StoredRack:
-    """What a recording stores with its messages."""
+    """What a recording stores with its messages; ``sources`` are those that ran when it began, ``later`` the others."""
 
     bag: Path
     config: RackConfig
     sources: Mapping[str, SourceText]
+    later: Mapping[str, tuple[SourceText, ...]] = field(default_factory=dict)
 
     @property
     def task_names(self) -> list[str]:
@@ -120,7 +132,10 @@ class StoredRack:
             if edited:
                 before = self._checked(stored, modules[name], name).program if stored else None
                 recorded = compile_program(before, views) if before else None
-            made.append(ReplaySource(name, source, compiled, recorded, edited, tuple(result.diagnostics)))
+            later = [self._checked(text, modules[name], name).program for text in self.later.get(name, ())]
+            ran = [*([recorded] if recorded else ()), *(compile_program(item, views) for item in later if item)]
+            versions = {item.program.source_hash: item for item in ran}
+            made.append(ReplaySource(name, source, compiled, recorded, edited, tuple(result.diagnostics), versions))
         if refused:
             raise SourceRefused(refused)
         return made
@@ -155,39 +170,53 @@ def stored_rack(reader: BagReader) -> StoredRack:
         SourceRefused: the rack file has errors.
     """
     bag = reader.path
-    texts: dict[str, str] = {}
+    stored = _StoredFiles(bag)
     for path in reader.files:
         for record in McapFile(path).records(messages=False):
             if isinstance(record, Attachment):
-                _keep(bag, texts, record.name, record.data)
-        if _RACK_FILE in texts:
-            break
-    if _RACK_FILE not in texts:
+                stored.keep(record.name, record.data)
+    if not stored.rack_file:
         for file in sent_files(reader):
-            _keep(bag, texts, file.name, file.data)
-    if _RACK_FILE not in texts:
+            stored.keep(file.name, file.data)
+    if not stored.rack_file:
         hint = (
             "`automax run --record` and `automax record` store rack file and sources; for `ros2 bag record` name the "
             "topic /<rack>/config too"
         )
         raise BagError("AMX6830", bag, "has no rack.yaml inside, so its tasks cannot be executed again", hint)
-    source = SourceText(f"{bag.name}:{_RACK_FILE}", texts.pop(_RACK_FILE))
+    source = SourceText(f"{bag.name}:{_RACK_FILE}", stored.rack_file)
     result = load_stored(source, Path(_RACK_FILE))
     if result.config is None:
         raise SourceRefused([(source, result.diagnostics)])
-    sources = {name: SourceText(f"{bag.name}:{name}.BLK", text) for name, text in texts.items()}
-    return StoredRack(bag, result.config, sources)
+    first = {name: texts[0] for name, texts in stored.sources.items()}
+    later = {name: tuple(texts[1:]) for name, texts in stored.sources.items()}
+    return StoredRack(bag, result.config, first, later)
 
 
-def _keep(bag: Path, texts: dict[str, str], name: str, data: bytes) -> None:
-    """Keep the rack file or a task's source; the first of a name counts."""
-    match = _SOURCE.fullmatch(name)
-    key = _RACK_FILE if name == _RACK_FILE else match[1] if match else None
-    if key is None or key in texts or len(texts) > _MOST_SOURCES:
-        return
-    if len(data) > MAX_BYTES:
-        raise BagError("AMX6814", bag, f"{name} inside has more than {MAX_BYTES} bytes")
-    texts[key] = data.decode("utf-8", "replace")
+class _StoredFiles:
+    """The rack file of a recording, empty until it comes, and the sources of its tasks, each text once."""
+
+    def __init__(self, bag: Path) -> None:
+        self.rack_file = ""
+        self.sources: dict[str, list[SourceText]] = {}
+        self._bag, self._count = bag, 0
+
+    def keep(self, name: str, data: bytes) -> None:
+        """Keep the first rack file, or a task's source; a further one of a name ran after a reload."""
+        match = _SOURCE.fullmatch(name)
+        if match is None and (name != _RACK_FILE or self.rack_file):
+            return
+        if len(data) > MAX_BYTES:
+            raise BagError("AMX6814", self._bag, f"{name} inside has more than {MAX_BYTES} bytes")
+        text = data.decode("utf-8", "replace")
+        if match is None:
+            self.rack_file = text
+            return
+        source = SourceText(f"{self._bag.name}:{name}", text)
+        known = self.sources.setdefault(match[1], [])
+        if source not in known and self._count < _MOST_SOURCES + MOST_RELOADS:
+            self._count += 1
+            known.append(source)
 
 
 def lines_that_write(program: Program) -> dict[str, tuple[int, ...]]:

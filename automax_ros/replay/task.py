@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
 from pathlib import Path
-from typing import cast
 
-from automax_ros.bags.common_log import Entry, Key
+from automax_ros.bags.common_log import Key
 from automax_ros.bags.errors import BagError
-from automax_ros.core.names import element_name
 from automax_ros.core.ticks import seconds_text
-from automax_ros.core.types import Value
-from automax_ros.core.values import source_text
 from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.commons import RecordedCommons, UnknownValue
-from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
-from automax_ros.replay.inputs import ScanMemory, same_bits
-from automax_ros.replay.report import Kind, NamedValue, TaskReport, errors_text
+from automax_ros.replay.compare import Found, Tallies
+from automax_ros.replay.comparison import ScanComparison
+from automax_ros.replay.inputs import ScanMemory
+from automax_ros.replay.report import Kind, TaskReport
 from automax_ros.replay.state import fitting_state, log_is_empty, state_differences, whole_state
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.task import ScanRecord, Status, Task, snapshot_layout
-from automax_ros.wire.messages import Scan, TaskState
+from automax_ros.wire.messages import Operation, Scan, TaskState
 
 _MOST_NOTES = 20
 """Notes that a report has about one task."""
@@ -51,29 +47,22 @@ class TaskReplay:
     ) -> None:
         self.name = source.name
         self.memory = ScanMemory(commons, edited=source.edited)
-        self._bag, self._source, self._commons, self._tallies = bag, source, commons, tallies
+        self._bag, self._commons, self._tallies = bag, commons, tallies
+        self._comparison = ScanComparison(source, commons, self.memory, tallies, tolerance)
         self._tolerance = tolerance
         self._starts_at = starts_at
         self._task = Task(source.compiled, self.memory, backplane=commons.backplane)
         self._task.record_scans()
-        self._layout = self._task.layout
-        self._layout_hash = self._layout.hash
-        self._recorded_layout = snapshot_layout(source.recorded) if source.recorded else None
-        self._written_at = source.written_at
-        program = (source.recorded or source.compiled).program
-        self._period_ns: float = math.inf if program.event is not None else program.period_ns
         self._last: int | None = None
         self._last_stamp = 0
         self._recorded_ended = False
         self._synchronous = False
         self._stored_ran: bool | None = None
         self._stopped_in: int | None = None
-        self._record: ScanRecord | None = None
+        self._installed_again = False
         self._compared = self._different = self._states = self._left_out = 0
         self._notes: dict[str, None] = {}
-        if source.edited:
-            self._note_edit()
-        self._tunables = Tunables(bag, source, self._recorded_layout or self._layout, self._note, self._when)
+        self._take_up(source)
 
     def report(self) -> TaskReport:
         """Return what became of the task."""
@@ -117,7 +106,7 @@ class TaskReplay:
         replayed = "runs" if own_in is None else self._end_text()
         found = [Found(Kind.STATUS, _STOPPED_KEY, recorded, replayed)]
         scan = (own_in if recorded_in is None else recorded_in) or self._last
-        self._different += self._tallies.scan(self.name, scan, self._last_stamp, found, self._label, self._seen)
+        self._different += self._comparison.tally(scan, self._last_stamp, found)
         self._stopped_in = None
 
     def time_s(self, stamp: int) -> float:
@@ -150,10 +139,9 @@ class TaskReplay:
             if counted:
                 self._count_stopped(scan)
             return False
-        self._record = record
         if counted:
             self._compared += 1
-            self._compare(scan, record, changes)
+            self._different += self._comparison.scan(scan, record, changes)
         return True
 
     def take_state(self, state: TaskState, log_time: int, *, counted: bool) -> None:
@@ -174,9 +162,9 @@ class TaskReplay:
         last, between = self._last, state.stamp > self._last_stamp
         if not stored_ran or (last is not None and state.scan < last and not between):
             return
-        if last is not None and state.scan < last:
+        if last is not None and (state.scan < last or self._installed_again):
             self._note(f"installed again at {self._when(state.stamp)} s")
-            self._synchronous = False
+            self._synchronous = self._installed_again = False
         if state.scan == last and state.stamp - self._last_stamp > _QUIET_SCANS * self._period_ns:
             self._recorded_ended = True
         if self._synchronous and last is not None and state.scan > last:
@@ -191,6 +179,11 @@ class TaskReplay:
             self._task.errors.clear()
         if counted and not self._source.edited and not self._tolerance and state.layout_hash == self._layout_hash:
             self._compare_state(state)
+
+    def take_operation(self, operation: Operation) -> None:
+        """Remember that the task was installed again: its next state is then no work of its scans."""
+        installs = operation.what in ("reload", "delete") or (operation.what == "power_on" and not self._last)
+        self._installed_again |= operation.ok and operation.task in ("", self.name) and installs
 
     def _follow(self, scan: Scan) -> None:
         """Keep up with the numbers of scans and with what is latched."""
@@ -234,47 +227,12 @@ class TaskReplay:
             self._stopped_in = scan.scan
         return record
 
-    def _compare(self, scan: Scan, record: ScanRecord, changes: Sequence[tuple[Key, Value, Value]]) -> None:
-        found = [
-            Found(Kind.VARIABLE, key, recorded, own, not within(recorded, own, self._tolerance))
-            for key, recorded, own in changes
-        ]
-        if not self._source.edited and not self.memory.writes_agree and not any(item.counts for item in found):
-            found += self._other_writes(record.writes)
-        if record.errors or scan.errors:
-            found += self._other_errors(scan, record)
-        self._different += self._tallies.scan(self.name, scan.scan, scan.stamp, found, self._label, self._seen)
-
-    def _other_writes(self, writes: Sequence[Entry]) -> list[Found]:
-        """What differs in the order of writes, although every variable ends up the same."""
-        recorded = self.memory.recorded_writes
-        for number in range(max(len(writes), len(recorded))):
-            one = recorded[number] if number < len(recorded) else None
-            other = writes[number] if number < len(writes) else None
-            if one and other and one[:2] == other[:2] and self._same(one[2], other[2]):
-                continue
-            return [Found(Kind.WRITES, "writes", self._write_text(one), self._write_text(other))]
-        return []
-
-    def _same(self, recorded: Value, own: Value) -> bool:
-        return same_bits(recorded, own) or within(recorded, own, self._tolerance)
-
-    def _other_errors(self, scan: Scan, record: ScanRecord) -> list[Found]:
-        """Run-time errors that differ; in an edited task lines do not count."""
-        recorded = [(error.line, error.code) for error in scan.errors]
-        own = list(record.errors)
-        if self._source.edited:
-            recorded, own = sorted((0, code) for _, code in recorded), sorted((0, code) for _, code in own)
-        if recorded == own:
-            return []
-        return [Found(Kind.ERRORS, "errors", errors_text(recorded), errors_text(own))]
-
     def _compare_state(self, state: TaskState) -> None:
         self._states += 1
         found = [
             Found(Kind.STATE, name, one, other) for name, one, other in state_differences(self._bag, self._task, state)
         ]
-        self._tallies.states(self.name, state.scan, state.stamp, found, self._label, self._seen)
+        self._tallies.states(self.name, state.scan, state.stamp, found, self._comparison.label, self._comparison.seen)
         self._different += bool(found)
 
     def _count_stopped(self, scan: Scan) -> None:
@@ -285,7 +243,7 @@ class TaskReplay:
         self._note(f"stopped in scan {self._stopped_in}, {reason}; the scans after it are not compared")
         self._stopped_in = None
         found = [Found(Kind.STATUS, _STOPPED_KEY, "runs", reason)]
-        self._different += self._tallies.scan(self.name, scan.scan, scan.stamp, found, self._label, self._seen)
+        self._different += self._comparison.tally(scan.scan, scan.stamp, found)
 
     def _end_text(self) -> str:
         log = self._task.errors
@@ -317,10 +275,30 @@ class TaskReplay:
         self.memory.apart.clear()
         self._synchronous = True
 
+    def _take_up(self, source: ReplaySource) -> None:
+        """Execute a source from now on; its states are those of what ran when it was recorded."""
+        self._source = source
+        self._comparison.take_up(source)
+        self._layout = self._task.layout
+        self._layout_hash = self._layout.hash
+        self._recorded_layout = snapshot_layout(source.recorded) if source.recorded else None
+        program = (source.recorded or source.compiled).program
+        self._period_ns: float = math.inf if program.event is not None else program.period_ns
+        if source.edited:
+            self._note_edit()
+        self._tunables = Tunables(self._bag, source, self._recorded_layout or self._layout, self._note, self._when)
+
     def _follow_source(self, state: TaskState) -> bool:
-        """Return whether the source that is stored inside ran; after a reload it may be another. BagError: never."""
+        """Go on with the source that a state tells of; return whether it is stored inside. BagError: none ever was."""
         recorded = self._source.recorded
         ran = recorded is None or state.source_hash == recorded.program.source_hash
+        reloaded = None if ran else self._source.reloaded(state.source_hash)
+        if reloaded is not None:
+            self._note(f"reloaded at {self._when(state.stamp)} s")
+            self._task.install(reloaded.compiled)
+            self._take_up(reloaded)
+            self._synchronous, self._installed_again, ran = False, False, True
+            self.memory.apart.clear()
         if not ran and self._stored_ran is None:
             raise BagError(
                 "AMX6831", self._bag, f"task {self.name} ran with another source than the {self.name}.BLK stored inside"
@@ -362,31 +340,6 @@ class TaskReplay:
                 f"its scan period was {before / 1e6:g} ms and is {after / 1e6:g} ms now; "
                 "it is executed at the recorded scans all the same"
             )
-
-    def _label(self, kind: Kind, key: Hashable) -> Label:
-        if kind is Kind.VARIABLE:
-            variable = self._variable(cast(Key, key))
-            lines = self._written_at.get(variable.name, ())
-            return Label(element_name(variable, cast(Key, key)[1]), variable.unit, lines)
-        words = {Kind.WRITES: "order of writes", Kind.ERRORS: "run-time errors", Kind.STATUS: "running"}
-        return Label(words.get(kind) or f"state {key}")
-
-    def _seen(self) -> Seen:
-        record = self._record
-        if record is None:
-            return Seen()
-        names = self._source.compiled.latched
-        latched = [NamedValue(name, value) for name, value in zip(names, record.latched, strict=False)]
-        reads = [
-            NamedValue(element_name(self._variable((view, element)), element), value)
-            for view, element, value in record.reads[:1000]
-        ]
-        return Seen(tuple(latched), tuple(reads))
-
-    def _write_text(self, entry: Entry | None) -> str:
-        if entry is None:
-            return "no write"
-        return f"{element_name(self._variable(entry[:2]), entry[1])} = {source_text(entry[2])}"
 
     def _variable(self, key: Key) -> CommonVariable:
         return self._commons.rack[key[0]]

@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any
 
 from automax_ros.rack.rack import Rack
@@ -19,7 +20,7 @@ RACK_FILE = "rack.yaml"
 MAX_TEXT = 16 << 20
 """Longest text of the topic ``config`` that is read (decision: a bound on memory for untrusted senders)."""
 _MAX_FILES = 200
-_NAME = re.compile(r"rack\.yaml|[A-Z][A-Z0-9_]{0,63}\.BLK")
+_NAME = re.compile(r"rack\.yaml|[A-Z][A-Z0-9_]{0,63}\.(?:BLK|BAS)")
 
 
 class RackFilesError(ValueError):
@@ -28,7 +29,7 @@ class RackFilesError(ValueError):
 
 @dataclass(frozen=True)
 class RackFile:
-    """One file of a rack as a recording stores it: ``rack.yaml``, or a task's name with ``.BLK``."""
+    """One file of a rack as a recording stores it: ``rack.yaml``, or a task's name with ``.BLK`` or ``.BAS``."""
 
     name: str
     text: str
@@ -51,8 +52,13 @@ class RackFile:
 
 def files_of(rack: Rack) -> list[RackFile]:
     """Return the files that a rack runs from."""
-    sources = [RackFile(f"{name}.BLK", source.text) for name, source in rack.sources.items()]
+    sources = [RackFile(source_name(name, source.name), source.text) for name, source in rack.sources.items()]
     return [RackFile(RACK_FILE, rack.config.text), *sources]
+
+
+def source_name(task: str, file: str) -> str:
+    """Return what the source of a task is stored as: its suffix tells a BASIC task from a control-block task."""
+    return f"{task}.BAS" if file.upper().endswith(".BAS") else f"{task}.BLK"
 
 
 def files_text(rack_name: str, files: Sequence[RackFile]) -> str:
@@ -86,8 +92,8 @@ def fingerprint(files: Sequence[RackFile]) -> int:
     """Return ``Rack.fingerprint`` of the rack that runs from these files."""
     texts: Mapping[str, str] = {item.name: item.text for item in files}
     digest = hashlib.sha256(texts.get(RACK_FILE, "").encode("utf-8", "surrogatepass"))
-    for name in sorted(name.removesuffix(".BLK") for name in texts if name != RACK_FILE):
-        digest.update(name.encode() + b"\0" + texts[f"{name}.BLK"].encode("utf-8", "surrogatepass") + b"\0")
+    for name in sorted(texts.keys() - {RACK_FILE}):
+        digest.update(PurePath(name).stem.encode() + b"\0" + texts[name].encode("utf-8", "surrogatepass") + b"\0")
     return int.from_bytes(digest.digest()[:8], "big") >> 1
 
 

@@ -11,12 +11,12 @@ import pytest
 from compile.programs import DECLARATIONS
 
 from automax_ros.bags.errors import BagError
+from automax_ros.core.names import element_name
 from automax_ros.core.types import Value
 from automax_ros.rack.loader import load
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.report import Kind
-from automax_ros.replay.task import element_name
 from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import Write
 

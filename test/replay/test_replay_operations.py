@@ -10,7 +10,7 @@ from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 
-from .replays import SPEED, WORK, busy, edited, recorded, replayed
+from .replays import SPEED, WORK, busy, edited, recorded, replayed, rewritten
 
 OTHER_SPEED = edited(SPEED, ("CURRENT=1", "CURRENT=2"))
 
@@ -65,20 +65,46 @@ def test_an_edited_task_is_installed_again_where_the_recorded_one_was(tmp_path):
     assert speed.different
 
 
-def test_what_ran_after_a_reload_with_another_source_is_left_out_and_the_rest_is_compared(tmp_path):
+def test_each_scan_is_executed_with_the_source_that_ran_also_after_a_reload(tmp_path):
     bag = operated(tmp_path, lambda rack: reload(rack, "SPEED", OTHER_SPEED), lambda rack: reload(rack, "SPEED", SPEED))
     report = replayed(bag)
     speed, work = report.tasks
     assert report.identical
-    assert speed.notes[:2] == (
-        "tunable TRIM% set to 5 at 0.2 s",
-        "reloaded at 0.9 s with a source that is not stored inside",
+    assert speed.notes[:2] == ("tunable TRIM% set to 5 at 0.2 s", "reloaded at 0.9 s")
+    assert "reloaded at 1.2 s" in speed.notes
+    plain = replayed(recorded(tmp_path / "plain"))
+    assert (speed.scans, work.scans) == (plain.tasks[0].scans + 2, plain.tasks[1].scans), "and two start-up parts"
+    for from_ms in (1000, 1300):
+        later = replayed(bag, from_ns=from_ms * 10**6)
+        assert later.identical
+        assert later.tasks[0].scans == sum(1 for number in range(364) if number * 5.5 >= from_ms) + (from_ms < 1200)
+
+
+def test_scans_under_a_source_that_is_not_stored_are_left_out(tmp_path):
+    bag = operated(tmp_path, lambda rack: reload(rack, "SPEED", OTHER_SPEED), lambda rack: reload(rack, "SPEED", SPEED))
+    stored = iter(range(9))
+    lacking = rewritten(
+        bag,
+        tmp_path / "lacking",
+        attachments=lambda name, data: None if name == "SPEED.BLK" and next(stored) else data,
     )
-    assert work.scans == replayed(recorded(tmp_path / "plain")).tasks[1].scans
+    report = replayed(lacking)
+    speed = report.tasks[0]
+    assert report.identical
+    assert "reloaded at 0.9 s with a source that is not stored inside" in speed.notes
     assert 300 < speed.scans < 320, "all but those from 0.9 to 1.2 s"
-    later = replayed(bag, from_ns=10**9)
-    assert later.identical
-    assert later.tasks[0].scans > 140, "from 1.2 s on the stored source runs again"
+
+
+def test_an_edited_source_runs_in_place_of_each_that_ran(tmp_path):
+    doubled = edited(SPEED, ("INPUT2=100,", "INPUT2=200,"))
+    bag = operated(tmp_path, lambda rack: reload(rack, "SPEED", doubled), lambda rack: rack.operations.run_all())
+    report = replayed(bag, {"SPEED": doubled})
+    speed = report.tasks[0]
+    assert speed.different
+    times = {difference.first.time_s for difference in report.differences}
+    assert max(times) < 0.9, "from the reload on both are the same program"
+    last = max(item.settled.time_s for item in report.differences if item.settled)
+    assert last == pytest.approx(0.9, abs=0.02)
 
 
 def test_each_file_of_a_recording_has_the_source_that_ran_when_it_began(tmp_path):
