@@ -12,10 +12,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.kinds import WriteKind
+from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.adjusting import Adjustments
@@ -29,13 +28,15 @@ from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
 from automax_ros.rack.settings import common_named
 from automax_ros.rack.standing import OperationsState
 from automax_ros.rack.task_config import TaskConfig
-from automax_ros.rack.triggers import MakeTrigger, usual_trigger
+from automax_ros.rack.triggers import MakeTrigger, Trigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
 from automax_ros.running.common_clock import CommonClock
 from automax_ros.running.events import Events
 from automax_ros.running.execution import IDEAL, Execution
+from automax_ros.running.interrupts import Interrupts
 from automax_ros.running.memory import CommonMemory
+from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.processor_time import ProcessorTime
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import ScanRecord, Status, Task
@@ -80,6 +81,8 @@ class Rack:
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
         self.events = Events()
+        self._interrupts = Interrupts(self.memory, self.events)
+        self._inputs = ProcessInputs(self.memory, self.scheduler)
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
         parts = Parts(
             memory=self.memory,
@@ -87,9 +90,12 @@ class Rack:
             backplane=self.backplane,
             events=self.events,
             clock=self._clock,
+            interrupts=self._interrupts,
+            inputs=self._inputs,
             install=self._install,
             execution=self._execution,
             tell_writes=self.observers.tell_writes,
+            writer={item.name: item.id for item in self.writers if item.kind is WriterKind.IO}.__getitem__,
         )
         self.modules: list[Module] = [module.build(parts) for module in config.modules]
         self.operations = Operations(
@@ -198,7 +204,7 @@ class Rack:
         accepted = [(element, memory.accepted(view, value, element)) for element, value in values]
         memory.now_ns = self.now_ns
         for element, value in accepted:
-            memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
+            self._inputs.write(view, element, value, writer)
         self.observers.tell_writes()
 
     def force(self, name: str, value: Value, writer: int = OPERATOR_WRITER) -> None:
@@ -311,11 +317,16 @@ class Rack:
             installed,
             self._installation.sources[task.name],
             scheduler=self.scheduler,
-            trigger=trigger or partial(usual_trigger, events=self.events, scheduler=self.scheduler),
+            trigger=trigger or self._usual_trigger,
             execution=execution,
             after=self._after,
             stopwatch=self._stopwatch,
         )
+
+    def _usual_trigger(self, task: Task) -> Trigger:
+        """Return the trigger of a task as it is installed; the interrupts that it waits for are connected."""
+        self._interrupts.bind(task)
+        return usual_trigger(task, self.events, self.scheduler)
 
     def _clock_fault(self, reason: str, code: str) -> None:
         self.operations.stop_all(reason, code)
@@ -323,6 +334,8 @@ class Rack:
     def _after(self, task: Task, record: ScanRecord | None) -> None:
         if record is not None:
             self.observers.scanned(task, record)
+        if self._inputs.any_frozen and self._inputs.scanned(task.name):
+            self.observers.tell_writes()
         if task.status is Status.FAULTED:
             last = task.errors.last
             reason = f"task {task.name}: {last.describe() if last else 'fault'}"

@@ -28,7 +28,10 @@ _FIRST_TASK = 3
 
 
 def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
-    """Return all writers of a rack, in the order of their ids: outside sources, then tasks by slot and name."""
+    """Return all writers of a rack, in the order of their ids: outside sources, tasks by slot and name, modules.
+
+    A module that interrupts writes registers by itself; no other does.
+    """
     home = config.home_slot
     outside = [
         WriterSpec(PRESET_WRITER, "rack", WriterKind.PRESET, home),
@@ -40,7 +43,10 @@ def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
         for module in config.modules
         for task in sorted(module.tasks, key=lambda task: task.name)
     ]
+    modules = [(module.slot, module.name) for module in config.modules if module.registers.interrupts]
+    first = _FIRST_TASK + len(tasks)
     return (
         *outside,
         *(WriterSpec(number, name, WriterKind.TASK, slot) for number, (slot, name) in enumerate(tasks, _FIRST_TASK)),
+        *(WriterSpec(number, name, WriterKind.IO, slot) for number, (slot, name) in enumerate(modules, first)),
     )

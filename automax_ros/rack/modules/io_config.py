@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from automax_ros.compile.cost import Model
-from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, QuietModule, Registers
+from automax_ros.rack.modules.io_module import IoModule
+from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.task_config import TaskConfig
 
 
@@ -38,15 +39,7 @@ class IoConfig:
 
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""
-        return QuietModule(self, inputs_of(self, parts))
-
-
-def inputs_of(config: IoConfig, parts: Parts) -> frozenset[tuple[int, int]]:
-    """Return what shows a module's inputs: STOP ALL clears its outputs, its inputs go on (J2-3106-1 p. 10-6)."""
-    bank = parts.backplane.bank(config.slot)
-    assert bank is not None
-    inputs = (number for number in range(bank.registers) if config.registers.direction(number) == "input")
-    return parts.memory.registers.showing(bank.view, inputs)
+        return IoModule(self, parts)
 
 
 @dataclass(frozen=True)

@@ -22,16 +22,14 @@ from automax_ros.running.backplane import Backplane
 from automax_ros.running.common_clock import CommonClock
 from automax_ros.running.events import Events
 from automax_ros.running.execution import Execution
+from automax_ros.running.interrupts import Interrupts
 from automax_ros.running.memory import CommonMemory
+from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.views import Memory
 
 ModuleState = Mapping[str, Any]
 """What a module keeps next to common memory, as numbers, texts, lists and mappings: ``{}`` where that is nothing."""
-
-
-CLOCK_ENABLE = 6
-"""The bit of an interrupt status and control register by which a module drives the common clock (57C411 p. 4-1)."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class Registers:
     Tasks write ``outputs``. Of ``either`` a variable with ``ros: in`` is an input, any other what its task makes of it.
     The rest are inputs. ``reals`` are those on which REAL variables may stand. ``copies`` are pairs of a register and
     the input that shows the same; ``clock_status`` pairs of an input and the bits that are set while there is a common
-    clock.
+    clock; ``counters`` are the first of two registers that count 24 bits.
     """
 
     count: int = 0
@@ -67,6 +65,7 @@ class Registers:
     interrupts: tuple[Interrupt, ...] = ()
     copies: tuple[tuple[int, int], ...] = ()
     clock_status: tuple[tuple[int, int], ...] = ()
+    counters: tuple[int, ...] = ()
 
     @property
     def writable(self) -> Collection[int]:
@@ -224,7 +223,7 @@ class Parts:
     """What a rack gives to its modules.
 
     ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells
-    observers of writes that no scan has made.
+    observers of writes that no scan has made. ``writer`` returns the id under which a module with interrupts writes.
     """
 
     memory: CommonMemory
@@ -232,9 +231,12 @@ class Parts:
     backplane: Backplane
     events: Events
     clock: CommonClock
+    interrupts: Interrupts
+    inputs: ProcessInputs
     install: Install
     execution: Callable[[str], Execution]
     tell_writes: Callable[[], None]
+    writer: Callable[[str], int]
 
 
 class Module(Protocol):

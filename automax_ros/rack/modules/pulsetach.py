@@ -19,6 +19,7 @@ _REGISTERS = Registers(
     8,
     outputs=range(2, 7),
     interrupts=(Interrupt(status=5, period=2, inputs=range(2), enable=TIMER_ENABLE),),
+    counters=(0,),
 )
 
 PULSETACH = IoKind("pulsetach input", "pulsetach", {"57C421": IoModel("pulsetach input module", _REGISTERS)})
