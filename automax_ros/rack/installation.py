@@ -9,8 +9,9 @@ from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.language.program import Program
 from automax_ros.rack.config import RackConfig, Timing
+from automax_ros.rack.interrupt_check import interrupt_findings
 from automax_ros.rack.modules.kind import ModuleConfig, cost_model
-from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of
+from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of, with_findings
 
 Finding = tuple[SourceText, list[Diagnostic]]
 """What is wrong in which text."""
@@ -63,6 +64,9 @@ class Installation:
         """
         module = self._module(task)
         result = check_source(source, task, module.tick_ns, commons_of(self._config), module.times)
+        if result.program is not None:
+            programs = {name: compiled.program for name, compiled in self._compiled.items()} | {task: result.program}
+            result = with_findings(result, interrupt_findings(self._config, programs)[task])
         if result.program is None or has_errors(result.diagnostics):
             raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
         return self._compile(task, result.program)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Platform
 from automax_ros.compile.cost import PLATFORMS, Model
-from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, in_order
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
 from automax_ros.core.kinds import Direction
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault
+from automax_ros.rack.interrupt_check import interrupt_findings
 from automax_ros.rack.modules.kind import ModuleConfig, Registers
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.task_source import read_task_source
@@ -58,7 +59,10 @@ def check_tasks(config: RackConfig) -> list[CheckedTask]:
     A source that could be read when the rack file was loaded but cannot be any more is an error of its task (AMX6306).
     """
     commons = commons_of(config)
-    return [_checked(module, task, commons, config) for module, task in config.placed_tasks]
+    checked = [_checked(module, task, commons, config) for module, task in config.placed_tasks]
+    programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
+    found = interrupt_findings(config, programs)
+    return [item._replace(result=with_findings(item.result, found.get(item.task.name, ()))) for item in checked]
 
 
 def _checked(
@@ -82,18 +86,12 @@ def check_source(
 ) -> CheckResult:
     """Check the text of one task against a rack's commons and the tick and model of the module that runs it."""
     target = PLATFORMS.get(model, Platform.AUTOMAX)
-    return _with_events_checked(
-        check(source, name=name, catalogue=CATALOGUE, target=target, tick_ns=tick_ns, commons=commons)
-    )
+    return check(source, name=name, catalogue=CATALOGUE, target=target, tick_ns=tick_ns, commons=commons)
 
 
-def _with_events_checked(result: CheckResult) -> CheckResult:
-    """Return a check's result, with an error if the scan waits for an event: no module of a rack raises one."""
-    program = result.program
-    if program is None or program.event is None:
+def with_findings(result: CheckResult, findings: Sequence[Diagnostic]) -> CheckResult:
+    """Return a check's result with what the rack has against the task: no program where that is an error."""
+    if not findings:
         return result
-    event = next(event for event in program.events if event.name == program.event)
-    message = f"the scan waits for the event {event.name}, but no module of this rack raises one"
-    hint = "leave EVENT= out of SCAN_LOOP: the clock starts the scans then"
-    found = Diagnostic("AMX6700", message, event.span, event.number, hint)
-    return replace(result, program=None, diagnostics=in_order([*result.diagnostics, found]))
+    diagnostics = in_order([*result.diagnostics, *findings])
+    return replace(result, program=None if has_errors(findings) else result.program, diagnostics=diagnostics)

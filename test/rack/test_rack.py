@@ -275,13 +275,13 @@ def test_errors_of_all_tasks_are_found_before_any_starts(build):
     assert [source.name.rpartition("/")[2] for source, _ in caught.value.findings] == ["FIRST.BLK", "ALPHA.BLK"]
 
 
-def test_task_that_waits_for_an_event_is_refused(build):
+def test_task_that_waits_for_an_event_that_no_module_sets_is_refused(build):
     waiting = "10 COMMON REF%\n20 EVENT NAME=GO, INTERRUPT_STATUS=REF%, TIMEOUT=6\n"
     waiting += "100 CALL SCAN_LOOP(TICKS=2, EVENT=GO)\n120 END\n"
     with pytest.raises(RackError) as caught:
         build(ALPHA=waiting)
     ((_, (found,)),) = caught.value.findings
-    assert (found.code, found.span.line) == ("AMX6700", 2)
+    assert (found.code, found.span.line) == ("AMX6440", 2)
 
 
 # Measuring and identity

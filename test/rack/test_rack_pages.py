@@ -9,6 +9,7 @@ import automax_ros.core
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.loader import LoadResult, load
+from automax_ros.rack.tasks_check import check_tasks
 
 from .helpers import write
 
@@ -16,11 +17,24 @@ PAGES = Path(automax_ros.core.__file__).parent / "pages"
 CODES = [code for code in PROBLEMS if "AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710"]
 
 
-def part(code: str, heading: str) -> str:
+def section(code: str, heading: str) -> str:
     text = (PAGES / f"{code}.md").read_text(encoding="utf-8")
-    match = re.search(rf"^## {heading}\n\n```yaml\n(.*?)```$", text, re.M | re.S)
+    match = re.search(rf"^## {heading}\n(.*?)(?=^## |\Z)", text, re.M | re.S)
     assert match, f"{code} has no {heading}"
     return match[1]
+
+
+def part(code: str, heading: str) -> str:
+    match = re.search(r"^```yaml\n(.*?)^```$", section(code, heading), re.M | re.S)
+    assert match, f"{code}: {heading} has no rack file"
+    return match[1]
+
+
+def write_tasks(code: str, heading: str, folder: Path) -> None:
+    """Write the tasks of the page over those that every rack of these tests has."""
+    tasks = re.findall(r"^```basic\n(.*?)^```$", section(code, heading), re.M | re.S)
+    for name, text in zip(("LINE", "DRAW"), tasks, strict=False):
+        (folder / f"{name}.BLK").write_text(text)
 
 
 def example_file(code: str, folder: Path) -> Path:
@@ -29,6 +43,7 @@ def example_file(code: str, folder: Path) -> Path:
     if code == "AMX6412":
         text = text.replace("# and so on\n", "\n  ".join(f"V{number}%:" for number in range(2, 201)) + "\n")
     path = write(folder, text)
+    write_tasks(code, "Example", folder)
     if code == "AMX6000":
         return folder / "other.yaml"
     if code == "AMX6001":
@@ -43,15 +58,23 @@ def read(path: Path) -> LoadResult:
     return load(path)
 
 
+def codes_of(result: LoadResult) -> set[str]:
+    """All that is found in a rack file and, if it is right, in its tasks."""
+    tasks = check_tasks(result.config) if result.config is not None else []
+    return {item.code for found in (result.diagnostics, *(task.result.diagnostics for task in tasks)) for item in found}
+
+
 @pytest.mark.parametrize("code", CODES)
 def test_example_has_exactly_the_problem_of_its_page(code, tmp_path):
-    assert {item.code for item in read(example_file(code, tmp_path)).diagnostics} == {code}
+    assert codes_of(read(example_file(code, tmp_path))) == {code}
 
 
 @pytest.mark.parametrize("code", CODES)
 def test_cure_is_a_rack_without_problems(code, tmp_path):
-    result = read(write(tmp_path, part(code, "Cure")))
-    assert result.diagnostics == []
+    path = write(tmp_path, part(code, "Cure"))
+    write_tasks(code, "Cure", tmp_path)
+    result = read(path)
+    assert codes_of(result) == set()
     assert result.config is not None
 
 

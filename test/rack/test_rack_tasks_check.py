@@ -63,4 +63,4 @@ def test_task_that_waits_for_an_event_of_no_module(tmp_path):
     ((_, _, result),) = check_tasks(config)
     assert result.program is None
     (found,) = result.diagnostics
-    assert (found.code, found.statement, found.span.line) == ("AMX6700", 7, 2)
+    assert (found.code, found.statement, found.span.line) == ("AMX6440", 7, 2)

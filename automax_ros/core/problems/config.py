@@ -61,8 +61,13 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6421", "register or bit of an I/O point"),
     Problem("AMX6422", "variable that cannot be an I/O point"),
     Problem("AMX6423", "register or bit with two names"),
+    # tasks of a rack: hardware events
+    Problem("AMX6440", "INTERRUPT_STATUS that is not an I/O point"),
+    Problem("AMX6441", "INTERRUPT_STATUS that is not an interrupt status register"),
+    Problem("AMX6442", "event of one name with two interrupts"),
+    Problem("AMX6443", "more hardware events than an interrupt line serves"),
+    Problem("AMX6445", "interrupts in another period than the scans", Severity.WARNING),
     # recordings
-    Problem("AMX6700", "event that no module of the rack raises"),
     # rack files: operation
     Problem("AMX6701", "version of the Programming Executive"),
     Problem("AMX6702", "tick rate that the Executive could not choose yet"),
