@@ -86,8 +86,6 @@ class ProcessInputs:
 
     def free(self, freezer: Freezer) -> bool:
         """Let inputs follow the process again, whoever owes a scan; return whether writes have waited."""
-        if not freezer.owed and not freezer.kept:
-            return False
         freezer.owed = set()
         for key in freezer.keys:
             self._frozen.pop(key, None)
