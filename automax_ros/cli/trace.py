@@ -5,6 +5,9 @@ before the scan latches; an empty cell leaves it as it is. Commons, locals and t
 SCAN_LOOP runs once before the first row. The task's own COMMON statements define the common memory, all 0 at first.
 Cells are separated by commas or by semicolons. A table of `automax export` can be read: its column time_s is passed
 over, for each row is a scan; so export --every the task's scan time.
+
+With --stimuli a YAML file sets variables by time (set, ramp, sine, square), the first scan being at 0; without a table
+the task then scans for --duration seconds.
 """
 
 from __future__ import annotations
@@ -19,17 +22,21 @@ from typing import TextIO
 
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
+from automax_ros.cli.stimuli_file import StimuliRefused, entries_of
 from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.trace_input import InputTable
+from automax_ros.cli.trace_stimuli import StimulatedScans
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
+from automax_ros.cli.window import seconds_above_0
 from automax_ros.core.names import NameFault
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_text
+from automax_ros.rack.stimuli.reader import read_for_task
 from automax_ros.running.error_log import LogEntry
 from automax_ros.running.lone_task import LoneTask, LoneVariable
 from automax_ros.running.task import ScanRecord, Status
@@ -41,7 +48,11 @@ _ROWS_A_LOOK = 256
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax trace``."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a task (.BLK)")
-    parser.add_argument("--input", type=Path, required=True, metavar="IN.csv", help="what to set before each scan")
+    parser.add_argument("--input", type=Path, metavar="IN.csv", help="what to set before each scan")
+    parser.add_argument("--stimuli", type=Path, metavar="FILE", help="what to set by time (docs/stimuli.md)")
+    parser.add_argument(
+        "--duration", type=seconds_above_0, metavar="S", help="seconds of task time after which the trace ends"
+    )
     parser.add_argument("--output", type=Path, metavar="OUT.csv", help="where to write (default: standard output)")
     parser.add_argument(
         "--errors", type=Path, metavar="ERR.csv", help="where to write the run-time errors of each scan"
@@ -52,6 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Trace the task; 1 if it has errors, stops or faults, 2 if the table or an option is at fault."""
+    if arguments.input is None and (arguments.stimuli is None or arguments.duration is None):
+        raise UsageError("what is the task to work on?", "give --input IN.csv, or --stimuli FILE with --duration S")
     target = target_of(arguments)
     source, result = check_task_file(arguments.file, target)
     if result.program is None:
@@ -59,16 +72,22 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     lone = LoneTask(result.program)
     watched = _watched(lone, watch_list(arguments.watch))
+    read = {"FILE": arguments.file, "--input": arguments.input, "--stimuli": arguments.stimuli}
     require_different_files(
-        {"FILE": arguments.file, "--input": arguments.input},
+        {key: path for key, path in read.items() if path is not None},
         {"--output": arguments.output, "--errors": arguments.errors},
     )
+    try:
+        stimuli = entries_of(read_for_task(arguments.stimuli, lone)) if arguments.stimuli is not None else ()
+    except StimuliRefused:
+        return 1
     with ExitStack() as files:
-        table = files.enter_context(InputTable(arguments.input, lone))
+        table = files.enter_context(InputTable(arguments.input, lone)) if arguments.input is not None else None
+        scans = StimulatedScans(lone, stimuli, table, arguments.duration)
         output = files.enter_context(opened_for_writing(arguments.output))
         errors = files.enter_context(opened_for_writing(arguments.errors)) if arguments.errors else None
-        bar = files.enter_context(ProgressBar("trace", table.size, wanted=arguments.output is not None))
-        _Trace(lone, watched, output, errors).run(table, bar)
+        bar = files.enter_context(ProgressBar("trace", scans.size, wanted=arguments.output is not None))
+        _Trace(lone, watched, output, errors).run(scans, bar)
     return _conclusion(lone, all_told=errors is not None)
 
 
@@ -86,14 +105,14 @@ class _Trace:
             self._errors.writerow(["scan", "line", "code", "message"])
             lone.task.record_scans()
 
-    def run(self, table: InputTable, bar: ProgressBar) -> None:
-        """Scan once for each row, until the table or the task ends."""
+    def run(self, scans: StimulatedScans, bar: ProgressBar) -> None:
+        """Scan until the table, the duration or the task ends."""
         task, period = self._lone.task, self._lone.task.period_ns
         self._write_errors(task.run())
         self._show_printed()
         if not self._runs():
             return
-        for number, _ in enumerate(table.rows()):
+        for number in scans.rows():
             time_ns = number * period
             self._write_errors(task.scan(time_ns))
             self._show_printed()
@@ -102,7 +121,7 @@ class _Trace:
             if not self._runs():
                 return
             if number % _ROWS_A_LOOK == 0:
-                bar.show(table.position)
+                bar.show(scans.position)
 
     def _runs(self) -> bool:
         return self._lone.task.status is Status.RUNNING
