@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--state",
         type=Path,
         metavar="DIR",
-        help="keep non-volatile commons and tunables in this folder from run to run (default on the wall clock: "
+        help="keep what outlives a power cycle in this folder from run to run (default on the wall clock: "
         ".automax/RACK next to the rack file; simulated: nowhere)",
     )
     parser.add_argument(

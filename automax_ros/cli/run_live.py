@@ -59,6 +59,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         stimulation.begin()
         live.run(plan.duration_ns, on_idle)
     finally:
+        state.freeze()
         try:
             live.close()
         finally:

@@ -59,6 +59,7 @@ class Operations:
         self._critical = {task.name for _, task in config.placed_tasks if task.critical}
         self.ran_at_power_off: frozenset[str] = frozenset()
         self.deleted: frozenset[str] = frozenset()
+        self.starting: frozenset[str] | None = None
         self._power_return: PowerReturn | None = None
         self._power_event: ScheduledEvent | None = None
         self.powered = self.battery_good = True
@@ -70,11 +71,15 @@ class Operations:
         return None if self.stopped is None else self.stopped.reason
 
     def start(self) -> None:
-        """Begin what modules do by themselves, and put all tasks into RUN with their first scan at this instant."""
+        """Begin what modules do by themselves, and put tasks into RUN with their first scan at this instant.
+
+        These are all tasks, or those of ``starting`` where that is known: the ones that ran before a power-up.
+        """
         for module in self._modules:
             module.power_on()
         now = self._scheduler.now_ns
-        self._run_together(self._in_starting_order(), lambda _: now)
+        begins = [item for item in self._in_starting_order() if self.starting is None or item.name in self.starting]
+        self._run_together(begins, lambda _: now)
 
     def run(self, name: str) -> None:
         """Put a task into RUN: its start-up part now, its first scan at the next tick of its Processor (decision).

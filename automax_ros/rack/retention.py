@@ -1,48 +1,59 @@
-"""What a rack keeps over a power cycle, in a folder between two runs: non-volatile commons and tunables (2.4.5).
+"""What a rack keeps over a power cycle, in a folder between two runs (2.4.5, J2-3106-1 p. 10-6).
 
-The folder holds one file, ``state.json``, replaced as a whole. A tunable belongs to its task's source: after an edit of
-the task it begins at CURRENT again, as after an installation (decision). A common that the rack file no longer defines,
-or defines with another type or size, begins as installed. Values come back as writes at the start, after the presets,
-so that recordings have them (decision).
+Kept are non-volatile commons, forces, and of each task tunables, locals and the error log; with ``auto_run`` also which
+tasks ran. The folder holds one file, ``state.json``, replaced as a whole.
+
+To start from it is a power-up: what a module loses without power is lost. A task whose source was edited begins as
+installed, since to load it again is an installation (decision). With ``auto_run`` the tasks that ran are put into RUN;
+without it all are: whoever starts the emulator does what RUN ALL does (decision). Values of commons come back as writes
+at the start, after the presets, so that recordings have them (decision).
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.names import element_name
+from automax_ros.core.safe_file import replace_file
 from automax_ros.core.types import Value
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault, read_bytes
+from automax_ros.rack.kept_tasks import KeptTask, kept_task, restore_task
 from automax_ros.rack.rack import Rack
-from automax_ros.running.task import Task
+from automax_ros.running.task import Status
 from automax_ros.running.views import MemoryValueError
 
-FORMAT = 1
+FORMAT = 2
 MOST_BYTES = 64_000_000
-"""Largest state file (decision: common memory and tunables of four Processors are far below)."""
+"""Largest state file (decision: common memory and locals of four Processors are far below)."""
 _FILE = "state.json"
+Document = dict[str, Any]
+"""All that is kept, as JSON has it."""
 
 
 class RetentionFault(Fault):
-    """A state folder cannot be read or written, or its file is damaged or another rack's."""
+    """A state folder cannot be read or written, its file is damaged or another rack's, or it does not fit the rack."""
 
 
 @dataclass(frozen=True)
 class Restored:
-    """What came back: ``settings`` for ``Rack.start``, how many commons and tunables differ from an installation."""
+    """What came back.
+
+    ``settings`` are for ``Rack.start``; ``commons``, ``tunables`` and ``forces`` are how many differ from an
+    installation; ``notes`` say what was kept and is not used any more.
+    """
 
     settings: tuple[tuple[str, Value], ...] = ()
     commons: int = 0
     tunables: int = 0
+    forces: int = 0
+    notes: tuple[str, ...] = ()
 
 
 def default_folder(config: RackConfig) -> Path:
@@ -58,88 +69,97 @@ class Retention:
         self._rack = rack
         self.path = folder / _FILE
         self._views = [view for view, variable in enumerate(rack.config.variables) if variable.non_volatile]
-        self._saved: list[list[Any]] = self._present()
+        self._saved: Document = self.present()
 
     def restore(self) -> Restored:
-        """Set the tunables, and return what the start must write; nothing where nothing was kept.
+        """Bring tasks and forces back, and return what the start must write; nothing where nothing was kept.
+
+        To be called before anybody observes the rack, so that what they are told first has it.
 
         Raises:
-            RetentionFault: the file cannot be read, is damaged, or is another rack's.
+            RetentionFault: the file cannot be read, is damaged, is another rack's, or does not fit this one.
         """
         try:
             data = read_bytes(self.path, MOST_BYTES)
         except FileFault as fault:
             if isinstance(fault.__cause__, FileNotFoundError | NotADirectoryError):
                 return Restored()
-            raise self._fault(str(fault)) from fault
+            raise self._fault("AMX6710", f"cannot be used: it {fault}") from fault
         try:
             return self._restored(json.loads(data, parse_constant=_no_number))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-            raise self._fault(f"is damaged: {_reason(error)}") from error
+            raise self._fault("AMX6711", f"is damaged: {_reason(error)}") from error
 
-    def save(self, *, durable: bool = False) -> bool:
-        """Write the present state if it has changed; ``durable`` waits until it is on the disk. Return whether it had.
+    def present(self) -> Document:
+        """Return all that is to be kept as it is now, between two scans."""
+        rack, variables = self._rack, self._rack.config.variables
+        commons: Document = {}
+        for view in self._views:
+            value = rack.memory.present(view)
+            commons[variables[view].name] = {
+                **_shape(variables[view]),
+                "values": value if isinstance(value, list) else [value],
+            }
+        tasks = {item.name: kept_task(item.task, hash_of(item.source.text)) for item in rack.scheduled}
+        document: Document = {"format": FORMAT, "rack": rack.config.name, "commons": commons}
+        document |= {"forced": {item.name: item.value for item in rack.forces()}, "tasks": tasks}
+        if rack.config.auto_run:
+            document["status"] = self._statuses()
+        return document
+
+    def save(self, document: Document | None = None) -> bool:
+        """Write a state, or the present one, down to the disk, if it is not the one that was written last.
+
+        Returns whether it was written.
 
         Raises:
             RetentionFault: it cannot be written.
         """
-        present = self._present()
+        present = self.present() if document is None else document
         if present == self._saved:
             return False
-        text = json.dumps(self._document(), indent=1, allow_nan=False)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            _replace(self.path, text, durable=durable)
+            replace_file(self.path, json.dumps(present, allow_nan=False).encode())
         except OSError as error:
-            raise self._fault(f"cannot be written: {error.strerror}") from error
+            raise self._fault("AMX6712", f"cannot be written: {error.strerror}") from error
         self._saved = present
         return True
 
-    @property
-    def _tunables(self) -> list[tuple[Task, str]]:
-        """The tunables of the tasks as they are now: a task may have been reloaded."""
-        return [(task, name) for task in self._rack.tasks for name in _tunables(task)]
+    def _statuses(self) -> dict[str, str]:
+        """Return how the tasks stand; while the power is off those that ran before it count as running."""
+        rack = self._rack
+        ran = frozenset() if rack.operations.powered else rack.operations.ran_at_power_off
+        return {task.name: (Status.RUNNING if task.name in ran else task.status).name for task in rack.tasks}
 
-    @property
-    def _sources(self) -> dict[str, str]:
-        sources = self._rack.sources.items()
-        return {name: hashlib.sha256(source.text.encode()).hexdigest() for name, source in sources}
-
-    def _present(self) -> list[list[Any]]:
-        memory = self._rack.memory
-        commons: list[Any] = [memory.present(view) for view in self._views]
-        return [commons, [task.value(name) for task, name in self._tunables]]
-
-    def _document(self) -> dict[str, Any]:
-        variables = self._rack.config.variables
-        values, tunables = self._present()
-        commons: dict[str, Any] = {}
-        for view, value in zip(self._views, values, strict=True):
-            elements = value if isinstance(value, list) else [value]
-            commons[variables[view].name] = {**_shape(variables[view]), "values": elements}
-        tasks: dict[str, Any] = {name: {"source": source, "tunables": {}} for name, source in self._sources.items()}
-        for (task, name), value in zip(self._tunables, tunables, strict=True):
-            tasks[task.name]["tunables"][name] = value
-        return {"format": FORMAT, "rack": self._rack.config.name, "commons": commons, "tasks": tasks}
-
-    def _restored(self, document: dict[str, Any]) -> Restored:
+    def _restored(self, document: Document) -> Restored:
         if document["format"] != FORMAT:
             raise ValueError(f"its format is {document['format']!r}, not {FORMAT}")
         if document["rack"] != self._rack.config.name:
             raise ValueError(f"it is that of rack {str(document['rack'])[:40]!r}")
-        settings = list(self._settings(document["commons"]))
+        notes: list[str] = []
+        settings = list(self._settings(document["commons"], notes))
         commons = len({name.partition("(")[0] for name, _ in settings})
-        tunables = self._tune(document["tasks"])
-        self._saved = []
-        return Restored(tuple(settings), commons, tunables)
+        tunables = self._restore_tasks(document["tasks"], notes)
+        forces = self._force(document["forced"], notes)
+        if self._rack.config.auto_run:
+            self._begin_with(document.get("status", {}))
+        for module in self._rack.modules:
+            module.power_off()
+        self._saved = {}
+        return Restored(tuple(settings), commons, tunables, forces, tuple(notes))
 
-    def _settings(self, commons: dict[str, Any]) -> Iterator[tuple[str, Value]]:
+    def _settings(self, commons: Mapping[str, Document], notes: list[str]) -> Iterator[tuple[str, Value]]:
         """Yield the elements that an installation would set otherwise."""
-        for view in self._views:
-            variable = self._rack.config.variables[view]
-            kept = commons.get(variable.name)
-            if kept is None or {key: kept[key] for key in _shape(variable)} != _shape(variable):
+        variables = self._rack.config.variables
+        defined = {variables[view].name: view for view in self._views}
+        for name, kept in commons.items():
+            view = defined.get(name)
+            if view is None:
+                notes.append(f"{name[:40]} was kept and is not non_volatile any more: its value is lost")
                 continue
+            variable = variables[view]
+            self._compare_shapes(variable, {key: kept[key] for key in _shape(variable)})
             if len(kept["values"]) != variable.elements:
                 raise ValueError(f"{variable.name} has {variable.elements} elements")
             for index, value in enumerate(kept["values"]):
@@ -147,46 +167,71 @@ class Retention:
                 if fitting != (variable.presets[index] if variable.presets else variable.type.zero):
                     yield element_name(variable, index), fitting
 
-    def _tune(self, tasks: dict[str, Any]) -> int:
-        """Set the tunables of tasks that are as they were; all of them fit, or none is set."""
-        wanted = []
-        sources = self._sources
-        for task, name in self._tunables:
-            kept = tasks.get(task.name)
-            if kept is not None and kept["source"] == sources[task.name]:
-                value = task.tuning(name, kept["tunables"][name])
-                if value != task.value(name):
-                    wanted.append((task, name, value))
-        for task, name, value in wanted:
-            self._rack.tune(task, name, value)
-        return len(wanted)
+    def _compare_shapes(self, variable: CommonVariable, kept: Document) -> None:
+        if kept != _shape(variable):
+            place = f"{self._rack.config.path}:{variable.line}"
+            message = f"{variable.name} was kept as {_described(kept)}; {place} defines {_described(_shape(variable))}"
+            raise self._misfit(message)
 
-    def _fault(self, message: str) -> RetentionFault:
+    def _restore_tasks(self, kept: Mapping[str, KeptTask], notes: list[str]) -> int:
+        tunables = 0
+        for item in self._rack.scheduled:
+            state = kept.get(item.name)
+            if state is None:
+                continue
+            if state["source"] != hash_of(item.source.text):
+                notes.append(f"task {item.name} was edited: it begins as installed")
+                continue
+            tunables += restore_task(item.task, state)
+        names = {item.name for item in self._rack.scheduled}
+        notes += [f"task {name[:40]} was kept and is not in the rack any more" for name in kept if name not in names]
+        return tunables
+
+    def _force(self, forced: Mapping[str, Value], notes: list[str]) -> int:
+        """Force what was forced; a common that is not there any more is told, one that cannot be forced is an error."""
+        lines = {variable.name: variable.line for variable in self._rack.config.declared}
+        known = [name for name in forced if name in lines]
+        notes += [f"{name[:40]} was forced and is not defined any more" for name in forced if name not in lines]
+        for name in known:
+            try:
+                self._rack.force(name, forced[name])
+            except MemoryValueError as error:
+                raise self._misfit(
+                    f"{name} was kept as forced ({self._rack.config.path}:{lines[name]}): {error}"
+                ) from error
+        return len(known)
+
+    def _begin_with(self, statuses: Mapping[str, str]) -> None:
+        """Let those tasks begin that ran, as AUTO RUN does; one that is new runs too."""
+        for task in self._rack.tasks:
+            task.status = Status[statuses.get(task.name, "RUNNING")]
+        running = [task for task in self._rack.tasks if task.status is Status.RUNNING]
+        self._rack.operations.starting = frozenset(task.name for task in running)
+        for task in running:
+            task.status = Status.STOPPED
+
+    def _misfit(self, message: str) -> RetentionFault:
+        hint = "change the rack file back, or remove the state to start the rack as installed"
+        return RetentionFault(f"the kept state does not fit: {message}", hint, code="AMX6713", place=str(self.path))
+
+    def _fault(self, code: str, message: str) -> RetentionFault:
         hint = "remove it to start the rack as installed, or name another folder with --state"
-        return RetentionFault(f"the kept state {message}", hint, place=str(self.path))
+        return RetentionFault(f"the kept state {message}", hint, code=code, place=str(self.path))
 
 
-def _tunables(task: Task) -> list[str]:
-    return [symbol.name for symbol in task.compiled.program.symbols.values() if symbol.tuning is not None]
+def hash_of(text: str) -> str:
+    """Return what the text of a source is known by."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _shape(variable: CommonVariable) -> dict[str, Any]:
+def _shape(variable: CommonVariable) -> Document:
     return {"type": variable.type.word, "dimensions": list(variable.dimensions), "length": variable.length}
 
 
-def _replace(path: Path, text: str, *, durable: bool) -> None:
-    """Put a whole file in the place of another: whoever reads it gets one or the other."""
-    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(text)
-            if durable:
-                file.flush()
-                os.fsync(file.fileno())
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+def _described(shape: Document) -> str:
+    largest = ",".join(str(size - 1) for size in shape["dimensions"])
+    length = f" of {shape['length']} characters" if shape["length"] else ""
+    return f"{shape['type']}{length}{f' ({largest})' if largest else ''}"
 
 
 def _no_number(text: str) -> None:

@@ -150,6 +150,7 @@ class RackStream:
     def begin(self, epoch_ns: int = 0) -> None:
         """Send the facts that stand at the start, and observe the rack: to be called just before ``Rack.start``.
 
+        States of tasks are among them where they are not those of an installation: after a power-up.
         ``epoch_ns`` is the wall clock at rack time 0; simulated time has none.
         """
         self._messages.epoch_ns = epoch_ns
@@ -158,6 +159,9 @@ class RackStream:
         _send(self._messages.table(), self._tables, self._messages.stamp(self._rack.now_ns))
         self._send_image(self._rack.now_ns)
         self._send_values(self._values, self._rack.now_ns)
+        for task in self._tasks:
+            if not _as_installed(task):
+                self._send_state(task, self._rack.now_ns)
         self._rack.observe(self)
         self._begun = True
 
@@ -295,6 +299,10 @@ class RackStream:
             stamp = self._messages.stamp(now_ns)
             for take in value.takes:
                 take(stamp, payload)
+
+
+def _as_installed(task: Task) -> bool:
+    return task.snapshot() == task.layout.flatten(task.layout.fresh())
 
 
 def _send(message: Message, takes: Collection[Take], stamp: int | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What a rack keeps between two runs: non-volatile commons and tunables, in a folder that may be damaged."""
+"""What a rack keeps between two runs: commons, forces and tasks, in a folder that may be damaged."""
 
 import json
 import os
@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.rack.loader import load
+from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import Restored, Retention, RetentionFault, default_folder
 
@@ -18,6 +19,8 @@ slots:
   0: {module: 57C435, tasks: {T: {priority: 5}}}
 common:
   LOST%:
+  PLAIN%:
+  FORCINGSTATUS@:
   COUNT%: {non_volatile: true, preset: 7}
   WIDE!: {non_volatile: true}
   GAIN: {non_volatile: true, preset: 0.5}
@@ -29,9 +32,14 @@ TASK = """\
 10 COMMON LOST%, COUNT%
 20 LOCAL K [CURRENT=1.5, LOW=0.0, HIGH=10.0]
 30 LOCAL N% [CURRENT=4, LOW=0, HIGH=10]
+40 LOCAL OWN%, NIL%, LIST(2), NOTE$:8
+50 NOTE$ = "Grüß"
+60 LIST(1) = 0.1
 100 CALL SCAN_LOOP(TICKS=1)
 110 COUNT% = COUNT% + 1
 120 LOST% = COUNT%
+125 IF OWN% = 3 THEN NIL% = 1 / NIL%
+126 OWN% = OWN% + 1
 130 END
 """
 VALUES = {"COUNT%": 120, "WIDE!": -70000, "GAIN": 0.1, "ON@": False, "TEXT$": "Grüß\n", "TABLE%(1,2)": -5}
@@ -97,7 +105,7 @@ def test_saved_only_when_changed(folder):
     assert (folder / "state" / "state.json").stat().st_ino == stamp
     after, retention, _ = begun(folder)
     after.run(0.02)
-    assert retention.save(durable=True)
+    assert retention.save()
     assert sorted(os.listdir(folder / "state")) == ["state.json"]
 
 
@@ -127,25 +135,118 @@ def test_edited_task_begins_at_current_again(folder):
     changed(folder)
     (folder / "T.BLK").write_text(TASK.replace("CURRENT=1.5", "CURRENT=3.0"))
     rack, _, restored = begun(folder)
-    assert rack.tasks[0].value("K") == 3.0
+    assert (rack.tasks[0].value("K"), rack.tasks[0].value("OWN%")) == (3.0, 0)
     assert (restored.commons, restored.tunables) == (6, 0)
+    assert restored.notes == ("task T was edited: it begins as installed",)
 
 
-def test_common_of_another_shape_begins_as_installed(folder):
-    changed(folder)
-    text = RACK.replace("TABLE%(1,2)", "TABLE%(2,2)").replace("  WIDE!: {non_volatile: true}\n", "")
-    (folder / "rack.yaml").write_text(text.replace("TEXT$:8", "TEXT$:9"))
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("TABLE%(1,2)", "TABLE%(2,2)", "TABLE% was kept as INTEGER (1,2); {}:13 defines INTEGER (2,2)"),
+        ("TABLE%(1,2)", "TABLE%(5)", "TABLE% was kept as INTEGER (1,2); {}:13 defines INTEGER (5)"),
+        ("TABLE%(1,2)", "TABLE%", "TABLE% was kept as INTEGER (1,2); {}:13 defines INTEGER"),
+        ("TEXT$:8", "TEXT$:9", "TEXT$ was kept as STRING of 8 characters; {}:12 defines STRING of 9 characters"),
+        ("PLAIN%:", "PLAIN%(3):", "PLAIN% was kept as forced ({}:6): PLAIN% cannot be forced: it is an array"),
+    ],
+)
+def test_a_common_of_another_shape_is_an_error_that_shows_both_places(folder, old, new, words):
+    rack, retention = changed(folder)
+    rack.force("PLAIN%", 4)
+    retention.save()
+    text = RACK.replace(old, new)
+    assert text != RACK
+    (folder / "rack.yaml").write_text(text)
+    with pytest.raises(RetentionFault) as caught:
+        begun(folder)
+    assert caught.value.code == "AMX6713"
+    assert words.format(folder / "rack.yaml") in caught.value.message
+    assert caught.value.place == str(folder / "state" / "state.json")
+    (folder / "rack.yaml").write_text(RACK)
+    assert begun(folder)[2].commons == 6, "nothing was lost"
+
+
+def test_what_is_not_there_any_more_is_told(folder):
+    rack, retention = changed(folder)
+    rack.force("PLAIN%", 4)
+    retention.save()
+    text = RACK.replace("  WIDE!: {non_volatile: true}\n", "").replace("GAIN: {non_volatile: true, ", "GAIN: {")
+    (folder / "rack.yaml").write_text(text.replace("  PLAIN%:\n", ""))
     rack, _, restored = begun(folder)
-    assert rack.memory.present(rack.memory.view("TABLE%")) == [0] * 9
-    assert rack.value("TEXT$") == ""
-    assert rack.value("GAIN") == pytest.approx(0.1)
-    assert restored.commons == 3
+    assert set(restored.notes) == {
+        "WIDE! was kept and is not non_volatile any more: its value is lost",
+        "GAIN was kept and is not non_volatile any more: its value is lost",
+        "PLAIN% was forced and is not defined any more",
+    }
+    assert (rack.value("GAIN"), restored.commons, rack.forces()) == (0.5, 4, [])
+
+
+def test_locals_error_logs_and_forces_survive(folder):
+    rack, retention = changed(folder)
+    rack.force("PLAIN%", 44)
+    rack.force("COUNT%", -7)
+    rack.run(0.05)
+    retention.save()
+    task = rack.tasks[0]
+    own, log = task.value("OWN%"), task.errors.flatten()
+    assert (own > 20, log[:3]) == (True, [2, 125, 7024])
+    after, _, restored = begun(folder)
+    task = after.tasks[0]
+    assert (task.value("OWN%"), task.value("LIST")[1], task.value("NOTE$")) == (own, pytest.approx(0.1), "Grüß")
+    assert task.errors.flatten() == log
+    assert [(item.name, item.value) for item in after.forces()] == [("PLAIN%", 44), ("COUNT%", -7)]
+    assert (after.value("FORCINGSTATUS@"), restored.forces) == (True, 2)
+    after.run(0.05)
+    assert (after.value("COUNT%"), task.value("OWN%")) == (-7, own + 10)
+
+
+AUTO = RACK.replace("rack: KEEP\n", "rack: KEEP\nauto_run: true\n").replace(
+    "T: {priority: 5}", "T: {priority: 5}, U: {priority: 6, file: T.BLK}, V: {priority: 7, file: V.BLK}"
+)
+FAULTY = "10 LOCAL I%\n20 CALL SCAN_LOOP(TICKS=9)\n30 FOR I% = 0 TO 1\n40 I% = 0\n50 NEXT I%\n60 END\n"
+
+
+def statuses(rack):
+    return [task.status.name for task in rack.tasks]
+
+
+@pytest.mark.parametrize("auto_run", [True, False])
+def test_with_auto_run_those_tasks_run_that_ran(folder, auto_run):
+    (folder / "V.BLK").write_text("10 CALL SCAN_LOOP(TICKS=1)\n20 END\n")
+    (folder / "rack.yaml").write_text(AUTO if auto_run else AUTO.replace("auto_run: true", "auto_run: false"))
+    rack, retention, _ = begun(folder)
+    assert statuses(rack) == ["RUNNING"] * 3
+    rack.operations.stop("U")
+    retention.save()
+    after, retention, _ = begun(folder)
+    assert statuses(after) == (["RUNNING", "STOPPED", "RUNNING"] if auto_run else ["RUNNING"] * 3)
+    after.run(0.02)
+    ran = statuses(after)
+    after.operations.power(1_000_000_000)
+    retention.save()
+    again, _, _ = begun(folder)
+    assert statuses(again) == ran, "what ran when the power went"
+
+
+def test_auto_run_starts_nothing_after_a_fault(folder):
+    (folder / "V.BLK").write_text(FAULTY)
+    (folder / "rack.yaml").write_text(AUTO)
+    rack, retention, _ = begun(folder)
+    rack.run(0.06)
+    assert statuses(rack) == ["STOPPED", "STOPPED", "FAULTED"]
+    retention.save()
+    after, _, _ = begun(folder)
+    assert statuses(after) == ["STOPPED", "STOPPED", "FAULTED"]
+    with pytest.raises(OperationRefused, match="clear the error log first"):
+        after.operations.run("V")
+    after.operations.clear_errors("V")
+    after.operations.run("V")
 
 
 def test_rack_without_anything_to_keep_writes_nothing(folder):
     (folder / "rack.yaml").write_text("rack: KEEP\nslots:\n  0: {module: 57C435, tasks: {T: {priority: 5}}}\n"
                                       "common:\n  COUNT%:\n  LOST%:\n")  # fmt: skip
-    (folder / "T.BLK").write_text("\n".join(line for line in TASK.splitlines() if "CURRENT" not in line) + "\n")
+    (folder / "T.BLK").write_text("10 COMMON COUNT%\n20 CALL SCAN_LOOP(TICKS=1)\n30 COUNT% = COUNT% + 1\n40 END\n")
     rack, retention, _ = begun(folder)
     rack.run(0.1)
     assert not retention.save()
@@ -165,16 +266,17 @@ HOSTILE = {
     "deep": b"[" * 100_000,
     "digits": b"1" * 100_000,
     "nothing in it": b"{}",
-    "another format": b'{"format": 2, "rack": "KEEP", "commons": {}, "tasks": {}}',
-    "another rack": b'{"format": 1, "rack": "OTHER", "commons": {}, "tasks": {}}',
-    "commons are a list": b'{"format": 1, "rack": "KEEP", "commons": [], "tasks": {}}',
-    "tasks are a text": b'{"format": 1, "rack": "KEEP", "commons": {}, "tasks": "x"}',
+    "another format": b'{"format": 3, "rack": "KEEP", "commons": {}, "forced": {}, "tasks": {}}',
+    "another rack": b'{"format": 2, "forced": {}, "rack": "OTHER", "commons": {}, "tasks": {}}',
+    "commons are a list": b'{"format": 2, "forced": {}, "rack": "KEEP", "commons": [], "tasks": {}}',
+    "tasks are a text": b'{"format": 2, "forced": {}, "rack": "KEEP", "commons": {}, "tasks": "x"}',
 }
 
 
-def fault(folder):
+def fault(folder, code):
     with pytest.raises(RetentionFault) as caught:
         begun(folder)
+    assert caught.value.code == code
     assert "state.json" in str(caught.value)
     assert "hint: remove it to start the rack as installed" in str(caught.value)
     return str(caught.value)
@@ -184,18 +286,18 @@ def fault(folder):
 def test_damaged_file_is_a_clear_error(folder, name):
     (folder / "state").mkdir()
     (folder / "state" / "state.json").write_bytes(HOSTILE[name])
-    assert "is damaged: " in fault(folder)
+    assert "is damaged: " in fault(folder, "AMX6711")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"values": [\n    120\n', '"values": [\n    40000\n', "COUNT%"),
-        ('"values": [\n    120\n', '"values": [\n    "x"\n', "COUNT%"),
-        ('"values": [\n    120\n', '"values": [\n    1, 2\n', "COUNT% has 1 element"),
-        ('"values": [\n    120\n', '"values": [\n    NaN\n', "NaN is not a number"),
-        ('"values": [\n    120\n', '"values": [\n    1e999\n', "COUNT%"),
-        ('"values": [\n    120\n', '"values": 3, "x": [\n 1\n', "not what a rack has written"),
+        ('"values": [120', '"values": [40000', "COUNT%"),
+        ('"values": [120', '"values": ["x"', "COUNT%"),
+        ('"values": [120', '"values": [1, 2', "COUNT% has 1 element"),
+        ('"values": [120', '"values": [NaN', "NaN is not a number"),
+        ('"values": [120', '"values": [1e999', "COUNT%"),
+        ('"values": [120', '"values": 3, "x": [1', "not what a rack has written"),
         ('"K": 2.25', '"K": 99.0', "K = 99 lies outside"),
         ('"K": 2.25', '"K": "2"', "K cannot be"),
         ('"K": 2.25', '"L": 2.25', "it lacks 'K'"),
@@ -207,24 +309,25 @@ def test_value_that_does_not_fit_is_a_clear_error(folder, old, new, words):
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
-    assert words in fault(folder)
+    assert words in fault(folder, "AMX6711")
 
 
 def test_what_is_no_file_is_refused_at_once(folder):
     (folder / "state").mkdir()
     os.mkfifo(folder / "state" / "state.json")
-    assert "is not a regular file" in fault(folder)
+    assert "is not a regular file" in fault(folder, "AMX6710")
     (folder / "state" / "state.json").unlink()
     (folder / "state" / "state.json").mkdir()
-    assert "is a folder" in fault(folder)
+    assert "is a folder" in fault(folder, "AMX6710")
 
 
 def test_folder_that_cannot_be_written_is_told(folder):
     (folder / "state").write_text("a file stands there")
     rack, retention, _ = begun(folder)
     rack.run(0.1)
-    with pytest.raises(RetentionFault, match="cannot be written"):
+    with pytest.raises(RetentionFault, match="cannot be written") as caught:
         retention.save()
+    assert caught.value.code == "AMX6712"
 
 
 @settings(deadline=None, derandomize=True, database=None, max_examples=60)

@@ -91,6 +91,30 @@ def test_recording_of_a_run_with_a_state_replays(rack):
     assert replayed.code == 0, replayed.out + replayed.err
 
 
+COUNTING = """\
+10 COMMON LEVEL%, COPY%
+20 LOCAL BEGUN%, N%, LIST%(3)
+30 BEGUN% = BEGUN% + 1
+40 LEVEL% = BEGUN% * 1000 + N%
+100 CALL SCAN_LOOP(TICKS=1)
+110 N% = N% + 1
+120 LIST%(BEGUN%) = N%
+130 COPY% = LIST%(1)
+140 END
+"""
+
+
+def test_locals_of_the_last_run_stand_in_the_recording_before_the_start(rack):
+    (rack.parent / "T.BLK").write_text(COUNTING)
+    run = ("run", rack, "--simulated", "--duration", "0.1", "--state", rack.parent / "kept")
+    assert automax(*run).code == 0
+    ended = automax(*run, "--record", rack.parent / "bag", "--watch", "LEVEL%,COPY%")
+    assert "LEVEL%=2019" in ended.out
+    assert "COPY%=19" in ended.out
+    replayed = automax("replay", rack.parent / "bag")
+    assert replayed.code == 0, replayed.out + replayed.err
+
+
 @pytest.mark.parametrize("simulated", [True, False])
 def test_damaged_state_is_a_clear_error(ros_domain_id, rack, simulated):
     state = rack.parent / "kept"
@@ -99,7 +123,7 @@ def test_damaged_state_is_a_clear_error(ros_domain_id, rack, simulated):
     how = ("--simulated",) if simulated else ()
     ended = automax("run", rack, *how, "--duration", "0.1", "--state", state)
     assert ended.code == 2
-    assert "state.json: the kept state is damaged: " in ended.err
+    assert "state.json: error[AMX6711]: the kept state is damaged: " in ended.err
     assert "hint: remove it to start the rack as installed" in ended.err
 
 

@@ -73,6 +73,11 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6702", "tick rate that the Executive could not choose yet"),
     Problem("AMX6703", "module that the Executive did not know yet"),
     Problem("AMX6704", "what the loss of a module does"),
+    # kept states
+    Problem("AMX6710", "kept state cannot be read"),
+    Problem("AMX6711", "kept state is damaged"),
+    Problem("AMX6712", "kept state cannot be written"),
+    Problem("AMX6713", "kept state does not fit the rack"),
     Problem("AMX6800", "folder for a recording exists already"),
     Problem("AMX6801", "recording cannot be written"),
     Problem("AMX6802", "message cannot be recorded"),

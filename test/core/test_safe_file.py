@@ -1,0 +1,144 @@
+"""A file that is replaced is the old one or the new one, wherever the machine stops."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from automax_ros.core import safe_file
+from automax_ros.core.safe_file import replace_file
+
+OLD, NEW = b"old" * 1000, b"new" * 2000
+
+
+class Dead(BaseException):
+    """The machine has stopped: nothing is carried out any more."""
+
+
+class Machine:
+    """Stops before one of the calls to the operating system, after which none has an effect."""
+
+    def __init__(self, lives: int) -> None:
+        self.lives, self.calls = lives, []
+
+    def call(self, name, function):
+        def counted(*arguments, **options):
+            if self.lives == 0:
+                raise Dead
+            self.lives -= 1
+            self.calls.append(name)
+            return function(*arguments, **options)
+
+        return counted
+
+
+class File:
+    """An open file of a machine that may stop; a write that is cut off leaves half of it."""
+
+    def __init__(self, machine: Machine, descriptor: int) -> None:
+        self._machine, self._descriptor = machine, descriptor
+
+    def write(self, data: bytes) -> None:
+        half = len(data) // 2
+        for name, part in (("write", data[:half]), ("write", data[half:])):
+            self._machine.call(name, os.write)(self._descriptor, part)
+
+    def flush(self) -> None:
+        pass
+
+    def fileno(self) -> int:
+        return self._descriptor
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        os.close(self._descriptor)
+
+
+@pytest.fixture
+def machine(monkeypatch):
+    def made(lives: int) -> Machine:
+        found = Machine(lives)
+        for name in ("fsync", "replace", "unlink", "open"):
+            monkeypatch.setattr(safe_file.os, name, found.call(name, getattr(os, name)))
+        monkeypatch.setattr(safe_file.os, "fdopen", lambda descriptor, _: File(found, descriptor))
+        monkeypatch.setattr(safe_file.tempfile, "mkstemp", found.call("mkstemp", tempfile.mkstemp))
+        return found
+
+    yield made
+    monkeypatch.undo()
+
+
+def test_whole_and_durable_in_this_order(tmp_path, machine):
+    path = tmp_path / "state.json"
+    running = machine(100)
+    replace_file(path, NEW)
+    assert running.calls == ["mkstemp", "open", "write", "write", "fsync", "replace", "open", "fsync"]
+    assert path.read_bytes() == NEW
+
+
+@pytest.mark.parametrize("lives", range(9))
+@pytest.mark.parametrize("before", [OLD, None])
+def test_wherever_it_stops_the_file_is_the_old_or_the_new_one(tmp_path, machine, monkeypatch, lives, before):
+    path = tmp_path / "state.json"
+    if before is not None:
+        path.write_bytes(before)
+    running = machine(lives)
+    with contextlib.suppress(Dead):
+        replace_file(path, NEW)
+    monkeypatch.undo()
+    found = path.read_bytes() if path.exists() else None
+    assert found == (NEW if "replace" in running.calls else before)
+    replace_file(path, OLD)
+    assert path.read_bytes() == OLD, "what a crash has left is in nobody's way"
+
+
+@pytest.mark.parametrize("failing", ["fsync", "replace"])
+def test_what_cannot_be_written_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, failing):
+    path = tmp_path / "state.json"
+    path.write_bytes(OLD)
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(safe_file.os, failing, fail)
+    with pytest.raises(OSError, match="No space left"):
+        replace_file(path, NEW)
+    assert (path.read_bytes(), os.listdir(tmp_path)) == (OLD, ["state.json"])
+
+
+def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path):
+    with pytest.raises(FileNotFoundError):
+        replace_file(tmp_path / "nowhere" / "state.json", NEW)
+
+
+WRITER = """\
+import sys
+from pathlib import Path
+from automax_ros.core.safe_file import replace_file
+number = 0
+while True:
+    replace_file(Path(sys.argv[1]), str(number % 10).encode() * 300_000)
+    number += 1
+"""
+
+
+def test_a_killed_writer_leaves_a_whole_file(tmp_path):
+    path = tmp_path / "state.json"
+    replace_file(path, b"0" * 300_000)
+    for kill in range(8):
+        with subprocess.Popen([sys.executable, "-c", WRITER, str(path)]) as writer:
+            first = path.stat().st_ino
+            while path.stat().st_ino == first:
+                time.sleep(0.001)
+            time.sleep(0.0017 * kill)
+            writer.kill()
+        data = path.read_bytes()
+        assert len(data) == 300_000
+        assert len(set(data)) == 1
