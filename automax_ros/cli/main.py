@@ -24,6 +24,7 @@ SUBCOMMANDS: dict[str, str] = {
     "response": "step response and Bode diagram of a dynamic block",
     "load": "CPU load of each module by the manual's execution times",
     "new": "make a rack file from a folder of tasks",
+    "convert": "make tasks of an old plant acceptable",
     "run": "run a rack",
     "record": "record a rack that runs",
     "replay": "execute a recording again and show the first scan that differs",

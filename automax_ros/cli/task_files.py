@@ -88,7 +88,7 @@ def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult
     Raises:
         UsageError: the file cannot be read, or is of a kind that has no checker.
     """
-    _require_block_task(path)
+    require_task(path)
     try:
         source = read_task_source(path)
     except FileFault as fault:
@@ -96,8 +96,13 @@ def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult
             raise UsageError(f"{path} {fault}") from fault
         too_large = Diagnostic("AMX0001", f"the text {fault}", Span(1, 1, 2), hint="divide the task")
         return SourceText(str(path), ""), CheckResult(None, [too_large])
-    result = check(source, name=path.stem.upper(), catalogue=CATALOGUE, target=target.processor, tick_ns=target.tick_ns)
-    return source, result
+    return source, check_text(path, source.text, target)
+
+
+def check_text(path: Path, text: str, target: Target) -> CheckResult:
+    """Check the text of a task by itself, as that of a file of this name."""
+    source = SourceText(str(path), text)
+    return check(source, name=path.stem.upper(), catalogue=CATALOGUE, target=target.processor, tick_ns=target.tick_ns)
 
 
 def name_warning(path: Path) -> Diagnostic | None:
@@ -113,7 +118,12 @@ def name_warning(path: Path) -> Diagnostic | None:
     return None
 
 
-def _require_block_task(path: Path) -> None:
+def require_task(path: Path) -> None:
+    """Refuse a file whose name is not that of a task.
+
+    Raises:
+        UsageError: it is of another kind.
+    """
     suffix = path.suffix.upper()
     if suffix == TASK_SUFFIX:
         return

@@ -1,6 +1,6 @@
 """The AutoMax PC3000: a Processor on a card of its own in a personal computer, a rack without a backplane.
 
-It is written as the only module of a rack, in slot 0, which is no slot of the hardware (decision). It holds its common
+It is written as the only module of a rack, in slot 0, though the hardware has none (decision). It holds its common
 variables itself; no I/O module can stand next to it, so there are neither points nor interrupts, hardware events and
 current minor loops (J-3675 p. 6-17). Its times are those of table 6.
 """
