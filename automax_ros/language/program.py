@@ -8,6 +8,7 @@ from automax_ros.blocks.channels import programmed_channels
 from automax_ros.blocks.declaration import Block
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.types import DataType, Value
+from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.language.syntax.tree import (
     BooleanLiteral,
     Call,
@@ -18,6 +19,7 @@ from automax_ros.language.syntax.tree import (
     Scope,
     Statement,
 )
+from automax_ros.language.syntax.waiting_tree import Direction
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,23 @@ class BoundCall:
 
 
 @dataclass(frozen=True)
+class OpenedFile:
+    """What a number after # is in a BASIC task: a port by its name, or one end of a channel with items of ``types``."""
+
+    number: int
+    port: str = ""
+    direction: Direction | None = None
+    types: tuple[DataType, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """What it is, for messages."""
+        if self.direction is None:
+            return f"port {self.port}"
+        return f"a channel FOR {self.direction.value}"
+
+
+@dataclass(frozen=True)
 class Program:
     """A task without errors.
 
@@ -128,6 +147,8 @@ class Program:
     the checker bound it to, SCAN_LOOP included; ``data`` is the pool of DATA values, ``data_lines`` the line number of
     each DATA line and the index in the pool at which it begins. ``events`` are declared by EVENT; ``event`` is the one
     that starts the scan, None where the clock does. ``scan_loop_line`` is the BASIC line of SCAN_LOOP.
+
+    A BASIC task has no SCAN_LOOP: its statements are ``scan``, ``ticks`` is 1, and ``files`` are what it opens.
     """
 
     name: str
@@ -144,6 +165,13 @@ class Program:
     scan_loop_line: int = 0
     target: str = "automax"
     source_hash: str = ""
+    kind: TaskKind = TaskKind.CONTROL_BLOCK
+    files: tuple[OpenedFile, ...] = ()
+
+    @property
+    def is_basic(self) -> bool:
+        """Whether it is a BASIC task, which waits where it wants and latches nothing."""
+        return self.kind is TaskKind.BASIC
 
     @property
     def period_ns(self) -> int:

@@ -87,5 +87,19 @@ _BLOCKS = (
     Problem("AMX4098", "constant is limited at run time", Severity.WARNING),
     Problem("AMX4099", "LOOP_TIME is not a whole number of scan periods", Severity.WARNING),
 )
+_BASIC_TASKS = (
+    Problem("AMX4110", "statement of a BASIC task in a form that it does not have"),
+    Problem("AMX4111", "block in a BASIC task"),
+    Problem("AMX4112", "number of a channel or port out of range"),
+    Problem("AMX4113", "channel or port that the task does not open"),
+    Problem("AMX4114", "one number for two channels or ports"),
+    Problem("AMX4115", "items do not fit the channel or port"),
+    Problem("AMX4116", "statement does not fit this channel or port"),
+    Problem("AMX4117", "unknown port"),
+    Problem("AMX4118", "constant of a BASIC task's statement out of range"),
+    Problem("AMX4119", "BASIC task on a UDC"),
+    Problem("AMX4120", "port without an end to the wait", Severity.WARNING),
+    Problem("AMX4121", "SET of a hardware event"),
+)
 
-PROBLEMS: tuple[Problem, ...] = (*_DECLARATIONS, *_EXPRESSIONS, *_FLOW, *_EVENTS, *_BLOCKS)
+PROBLEMS: tuple[Problem, ...] = (*_DECLARATIONS, *_EXPRESSIONS, *_FLOW, *_EVENTS, *_BLOCKS, *_BASIC_TASKS)

@@ -19,9 +19,11 @@ from automax_ros.language.checks.statements import check_reads, check_statement,
 from automax_ros.language.checks.structures import find_structures
 from automax_ros.language.checks.task_layout import TaskLayout, find_layout
 from automax_ros.language.checks.unconfirmed import find_unconfirmed
+from automax_ros.language.checks.waiting import check_waiting, find_files
 from automax_ros.language.program import CommonSpec, Program
 from automax_ros.language.syntax.parser import parse
 from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
+from automax_ros.language.syntax.task_kind import TaskKind, kind_of_source
 from automax_ros.language.syntax.tree import Call, Declaration, Module, Read, Statement
 
 AUTOMAX = Platform.AUTOMAX
@@ -51,7 +53,7 @@ def check(
     tick_ns: int = DEFAULT_TICK_NS,
     commons: Mapping[str, CommonSpec] | None = None,
 ) -> CheckResult:
-    """Check a control-block task; never raises, whatever the text.
+    """Check a task; never raises, whatever the text. The source's name tells whether it is a BASIC task.
 
     ``name`` is the task's name, ``catalogue`` the blocks by name, ``tick_ns`` the tick in ns. ``commons`` is what the
     rack defines, by full name: a COMMON that it lacks or defines otherwise is an error, and so is a write to an input
@@ -65,6 +67,7 @@ def check(
     context = Context(
         target, tick_ns, catalogue, commons, source.lines, broken_lines(source, found), diagnostics=list(found)
     )
+    context.kind = kind_of_source(source.name)
     layout = None
     try:
         layout = _check_module(context, module)
@@ -72,7 +75,7 @@ def check(
         message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"
         context.diagnostics.append(Diagnostic(_TOO_MANY, message, context.diagnostics[-1].span, context.line))
     diagnostics = in_order(context.diagnostics)
-    unconfirmed = find_unconfirmed(module)
+    unconfirmed = find_unconfirmed(module, context.kind)
     if layout is None or has_errors(diagnostics):
         return CheckResult(None, diagnostics, unconfirmed)
     return CheckResult(_program(context, layout, name, source), diagnostics, unconfirmed)
@@ -82,6 +85,7 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     layout = find_layout(context, module)
     check_declarations(context, layout)
     find_structures(context, layout)
+    find_files(context, layout)
     if layout.scan_loop is not None:
         context.line = layout.scan_loop_line
         check_scan_loop(context, layout.scan_loop)
@@ -89,9 +93,10 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     for statement, line, _ in layout.numbered():
         context.line = line
         if isinstance(statement, Call):
-            check_call(context, statement)
+            _check_call(context, statement)
         else:
             check_statement(context, statement)
+            check_waiting(context, statement)
             if isinstance(statement, Read):
                 reads.append((statement, line))
     check_storage(context)
@@ -100,6 +105,14 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     check_sharing(context, layout)
     _check_expected_blocks(context, layout)
     return layout
+
+
+def _check_call(context: Context, statement: Call) -> None:
+    if context.kind is TaskKind.BASIC:
+        hint = "control blocks run in control-block tasks (.BLK), which scan"
+        context.report("AMX4111", f"a BASIC task calls no block: {statement.block}", statement.span, hint)
+    else:
+        check_call(context, statement)
 
 
 def _check_expected_blocks(context: Context, layout: TaskLayout) -> None:
@@ -116,24 +129,24 @@ def _check_expected_blocks(context: Context, layout: TaskLayout) -> None:
 
 
 def _program(context: Context, layout: TaskLayout, name: str, source: SourceText) -> Program:
-    assert layout.scan_loop is not None
-    assert context.ticks is not None
     data, data_lines = data_pool(context)
     return Program(
         name=name,
         symbols=context.symbols,
         startup=_executed(layout.startup),
         scan=_executed(layout.scan),
-        ticks=context.ticks,
+        ticks=context.ticks or 1,
         tick_ns=context.tick_ns,
         calls=context.calls,
         data=data,
         data_lines=data_lines,
         events=tuple(context.events.values()),
-        event=event_name(layout.scan_loop),
+        event=event_name(layout.scan_loop) if layout.scan_loop is not None else None,
         scan_loop_line=layout.scan_loop_line or 0,
         target=context.target.value,
         source_hash=hashlib.sha256(source.text.encode("utf-8", "surrogatepass")).hexdigest(),
+        kind=context.kind,
+        files=tuple(context.files.values()),
     )
 
 

@@ -12,8 +12,9 @@ from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.problems.problem import Severity
 from automax_ros.core.text import Suggester
 from automax_ros.language.checks.broken_lines import BrokenLines
-from automax_ros.language.program import BoundCall, CommonSpec, DataStructure, Symbol
+from automax_ros.language.program import BoundCall, CommonSpec, DataStructure, OpenedFile, Symbol
 from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
+from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.language.syntax.tree import Data, Event
 
 
@@ -22,7 +23,8 @@ class Context:
     """One check of one task.
 
     ``lines`` are the physical lines of its text; ``line`` is the BASIC line number in force, None before the first.
-    ``structures`` are the data structures by name, with the span of the name where its SHIFT block makes it.
+    ``files`` are what the numbers after # of a BASIC task are. ``structures`` are the data structures by name, with the
+    span of the name where its SHIFT block makes it.
     """
 
     target: Platform
@@ -38,6 +40,8 @@ class Context:
     calls: dict[Span, BoundCall] = field(default_factory=dict)
     structures: dict[str, tuple[DataStructure, Span]] = field(default_factory=dict)
     suggest: Suggester = field(default_factory=Suggester)
+    kind: TaskKind = TaskKind.CONTROL_BLOCK
+    files: dict[int, OpenedFile] = field(default_factory=dict)
     line: int | None = None
     ticks: int | None = None
 

@@ -25,7 +25,8 @@ from automax_ros.language.syntax.tree import (
     Statement,
     Stop,
 )
-from automax_ros.language.syntax.walk import bodies
+from automax_ros.language.syntax.waiting_tree import PrintFile
+from automax_ros.language.syntax.walk import bodies, jumps_of
 
 _IDLE = (Remark, Data, Declaration, Event, Label)
 """Statements that do nothing when they are reached."""
@@ -110,7 +111,9 @@ def _targets(statement: Statement) -> list[tuple[int, str]]:
     if isinstance(statement, OnJump):
         verb = "ON ... GOSUB" if statement.gosub else "ON ... GOTO"
         return [(line, verb) for line in statement.lines]
-    return []
+    if isinstance(statement, PrintFile):
+        return [(line, "FULL =") for line in jumps_of(statement)]
+    return [(line, "EMPTY =") for line in jumps_of(statement)]
 
 
 def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:

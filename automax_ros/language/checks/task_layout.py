@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.language.checks.context import Context
+from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.language.syntax.tree import Call, End, Label, Module, Remark, Statement
 from automax_ros.language.syntax.walk import bodies, statements_in_order
 
@@ -29,12 +30,16 @@ class TaskLayout:
 
 
 def find_layout(context: Context, module: Module) -> TaskLayout:
-    """Split a task at its SCAN_LOOP and report what is wrong with SCAN_LOOP and END."""
+    """Split a task at its SCAN_LOOP and report what is wrong with SCAN_LOOP and END; a BASIC task is all one part."""
     loops = [
         (statement, line)
         for statement, line in statements_in_order(module.statements)
         if isinstance(statement, Call) and (block := context.catalogue.get(statement.block)) and block.begins_scan
     ]
+    if context.kind is TaskKind.BASIC:
+        layout = TaskLayout((), None, module.statements)
+        _check_ends(context, module, layout)
+        return layout
     _check_scan_loops(context, module, loops)
     layout = _split(module, loops)
     _check_blocks_before(context, layout)
@@ -108,17 +113,18 @@ def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
                 "AMX4044",
                 "the task has no END",
                 _end_of_text(module),
-                "the last statement of a task is END: it marks the end of the scan",
+                "the last statement of a task is END",
             )
         return
     following = [item for item in layout.scan[at + 1 :] if not isinstance(item, (Remark, Label))]
     if following:
         context.line = following[0].number
+        early = "the task's run early" if context.kind is TaskKind.BASIC else "a scan early"
         context.report(
             "AMX4045",
             "nothing may follow END",
             following[0].span,
-            "END is the last statement; subroutines stand before it, and IF ... THEN END ends a scan early",
+            f"END is the last statement; subroutines stand before it, and IF ... THEN END ends {early}",
             (Note("END is here", layout.scan[at].span),),
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import did_you_mean
@@ -11,20 +12,26 @@ from automax_ros.language.syntax.expressions import expression, variable
 from automax_ros.language.syntax.frames import NESTING_LIMIT, FrameStack, too_deep
 from automax_ros.language.syntax.reporter import SyntaxFaultError
 from automax_ros.language.syntax.statements import SIMPLE_STATEMENTS, assignment
+from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.language.syntax.tokens import RESERVED_WORDS, STATEMENT_WORDS, Kind, Token
 from automax_ros.language.syntax.tree import Expression, For, Goto, If, Statement
 from automax_ros.language.syntax.unknown import refuse_statement, refuse_word
+from automax_ros.language.syntax.waiting import WAITING_STATEMENTS
 
 _BLOCK_WORDS = ("FOR", "NEXT", "END_IF", "ENDIF")
+_STATEMENTS = {
+    TaskKind.CONTROL_BLOCK: SIMPLE_STATEMENTS,
+    TaskKind.BASIC: {**SIMPLE_STATEMENTS, **WAITING_STATEMENTS},
+}
 _ELSE_IF = ("ELSEIF", "ELSIF", "ELSE_IF")
 
 
 class StatementReader:
     """Reads statements into the open blocks of a task."""
 
-    def __init__(self, frames: FrameStack, basic_task: bool) -> None:
+    def __init__(self, frames: FrameStack, kind: TaskKind) -> None:
         self._frames = frames
-        self._basic_task = basic_task
+        self._kind = kind
 
     def read(self, cursor: Cursor) -> None:
         """Read one statement; raises SyntaxFaultError."""
@@ -83,7 +90,7 @@ class StatementReader:
         cursor.skip_line()
 
     def _refuse_misspelt(self, cursor: Cursor) -> None:
-        refuse_word(cursor, self._basic_task)
+        refuse_word(cursor, self._kind)
         word = cursor.current.text
         if cursor.following.text == "=":
             return
@@ -97,7 +104,7 @@ class StatementReader:
         """Read an assignment or a simple statement; its span ends on its first physical line."""
         start = cursor.position
         token = cursor.current
-        read = SIMPLE_STATEMENTS.get(token.text) if token.kind is Kind.WORD else None
+        read = self._reader(cursor) if token.kind is Kind.WORD else None
         if read is not None:
             statement = read(cursor, cursor.advance())
         elif token.kind is Kind.NAME or (token.kind is Kind.WORD and _assigns(cursor)):
@@ -106,6 +113,18 @@ class StatementReader:
         else:
             refuse_statement(cursor)
         return dataclasses.replace(statement, span=_span(cursor, start))
+
+    def _reader(self, cursor: Cursor) -> Callable[[Cursor, Token], Statement] | None:
+        """Return what reads the statement that a word begins, None where the word names a variable or nothing."""
+        word = cursor.current.text
+        table = _STATEMENTS[self._kind]
+        if word in RESERVED_WORDS:
+            return table.get(word)
+        if cursor.following.text == "=" or (
+            cursor.following.text in ("(", "[") and _assigned_behind_parenthesis(cursor)
+        ):
+            return None
+        return table.get(word)
 
     def _if(self, cursor: Cursor) -> None:
         start = cursor.position
@@ -173,7 +192,7 @@ class StatementReader:
         if word in _BLOCK_WORDS and cursor.following.text != "=":
             hint = "put nothing after THEN and the statements on lines of their own, closed by END_IF"
             cursor.fail("AMX0060", f"{word} cannot stand after THEN on one line", hint)
-        refuse_word(cursor, self._basic_task)
+        refuse_word(cursor, self._kind)
 
     def _for(self, cursor: Cursor) -> None:
         start = cursor.position

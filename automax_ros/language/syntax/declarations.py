@@ -100,17 +100,22 @@ def _tuning(cursor: Cursor) -> Tuning:
     )
 
 
+def event_word(cursor: Cursor) -> str:
+    """Read the name of an event."""
+    token = cursor.current
+    if token.kind is not Kind.WORD or token.text in RESERVED_WORDS:
+        hint = "the name of an event has no type character" if token.kind is Kind.NAME else None
+        cursor.fail("AMX0076", f"{cursor.found()} cannot be the name of an event", hint)
+    return cursor.check_name(cursor.advance())
+
+
 def event(cursor: Cursor, start: Token) -> Event:
     """Read EVENT NAME = event [, INTERRUPT_STATUS = variable, TIMEOUT = count] (section 4)."""
     del start
     form = "EVENT NAME = event, INTERRUPT_STATUS = variable, TIMEOUT = count"
     cursor.expect("NAME", "AMX0076", "EVENT needs NAME = and the name of the event", form)
     cursor.expect("=", "AMX0035", "`=` is missing after NAME", form)
-    token = cursor.current
-    if token.kind is not Kind.WORD or token.text in RESERVED_WORDS:
-        hint = "the name of an event has no type character" if token.kind is Kind.NAME else None
-        cursor.fail("AMX0076", f"{cursor.found()} cannot be the name of an event", hint)
-    name = cursor.check_name(cursor.advance())
+    name = event_word(cursor)
     status: Reference | None = None
     timeout: int | None = None
     while cursor.accept(","):

@@ -8,6 +8,7 @@ from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.frames import FrameStack
 from automax_ros.language.syntax.lines import END_OF_FILE, LineReader, LogicalLine
 from automax_ros.language.syntax.reporter import Reporter, SyntaxFaultError, TooManyProblemsError
+from automax_ros.language.syntax.task_kind import TaskKind, kind_of_source
 from automax_ros.language.syntax.tokens import Kind, SourceFault, Token
 from automax_ros.language.syntax.tree import Label, Module, Remark, Statement
 
@@ -17,10 +18,11 @@ STATEMENT_LIMIT = 8192
 """Longest statement with its continuation lines, in characters (decision: a bound on untrusted texts)."""
 
 
-def parse(source: SourceText, basic_task: bool = False) -> tuple[Module, list[Diagnostic]]:
+def parse(source: SourceText) -> tuple[Module, list[Diagnostic]]:
     """Return the tree of a task and the problems of its text; never raises, whatever the text.
 
-    Where there are errors the tree has the statements that could be read. ``basic_task`` is true for a ``.BAS`` text.
+    Where there are errors the tree has the statements that could be read. The source's name
+    tells the kind of task.
     """
     reporter = Reporter()
     if len(source.text) > SOURCE_LIMIT:
@@ -29,15 +31,15 @@ def parse(source: SourceText, basic_task: bool = False) -> tuple[Module, list[Di
     if source.text.partition(END_OF_FILE)[0].count("\0") * 4 > len(source.text):
         hint = "save it as ANSI, ASCII or UTF-8"
         return Module(()), [Diagnostic("AMX0006", "the file is not plain text but UTF-16", Span(1, 1, 2), hint=hint)]
-    return _TaskParser(source, reporter, basic_task).module(), reporter.diagnostics
+    return _TaskParser(source, reporter, kind_of_source(source.name)).module(), reporter.diagnostics
 
 
 class _TaskParser:
-    def __init__(self, source: SourceText, reporter: Reporter, basic_task: bool) -> None:
+    def __init__(self, source: SourceText, reporter: Reporter, kind: TaskKind) -> None:
         self._reporter = reporter
         self._reader = LineReader(source, reporter)
         self._frames = FrameStack(reporter)
-        self._statements = StatementReader(self._frames, basic_task)
+        self._statements = StatementReader(self._frames, kind)
         self._long_names: set[str] = set()
 
     def module(self) -> Module:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from automax_ros.language.syntax.constants import REAL_DIGITS
 from automax_ros.language.syntax.expressions import LEVELS, NOT_LEVEL
 from automax_ros.language.syntax.functions import FUNCTIONS
@@ -33,11 +36,25 @@ from automax_ros.language.syntax.tree import (
     Remark,
     Restore,
     Return,
+    SetEvent,
     Statement,
     Stop,
     StringLiteral,
     Tuning,
     Unary,
+)
+from automax_ros.language.syntax.waiting_tree import (
+    ITEM_TYPES,
+    Close,
+    Delay,
+    Get,
+    InputFile,
+    OpenChannel,
+    OpenPort,
+    PrintFile,
+    Put,
+    StartEvery,
+    WaitOn,
 )
 
 _SIGN_LEVEL = max(LEVELS.values()) + 1
@@ -105,6 +122,11 @@ def _rest(statement: Statement) -> str:
         return f"IOWRITE {_list((statement.slot, statement.register, statement.value))}"
     if isinstance(statement, Remark):
         return _remark(statement)
+    if isinstance(statement, SetEvent):
+        return f"SET {statement.event}"
+    waiting = _WAITING.get(type(statement))
+    if waiting is not None:
+        return waiting(statement)
     words: dict[type[object], str] = {
         Return: "RETURN",
         Stop: "STOP",
@@ -169,11 +191,15 @@ def _tuning(tuning: Tuning) -> str:
 
 
 def _print(statement: Print) -> str:
-    parts = ["PRINT"]
+    return " ".join(["PRINT", *_printed(statement)])
+
+
+def _printed(statement: Print | PrintFile) -> list[str]:
+    parts = []
     for index, item in enumerate(statement.items):
         separator = statement.separators[index] if index < len(statement.separators) else ""
         parts.append(print_expression(item) + separator)
-    return " ".join(parts)
+    return parts
 
 
 def _event(event: Event) -> str:
@@ -190,3 +216,69 @@ def _remark(remark: Remark) -> str:
     mark = "!" if remark.costs else "REM"
     text = " &\n".join(lines)
     return f"{mark} {text}" if text else mark
+
+
+def _wait(statement: WaitOn) -> str:
+    return f"WAIT ON {statement.event}"
+
+
+def _delay(statement: Delay) -> str:
+    return f"DELAY {print_expression(statement.count)} {statement.unit.value}"
+
+
+def _start_every(statement: StartEvery) -> str:
+    return f"START EVERY {print_expression(statement.count)} {statement.unit.value}"
+
+
+def _open_channel(statement: OpenChannel) -> str:
+    letters = {kind: letter for letter, kind in ITEM_TYPES.items()}
+    types = ", ".join(letters[kind] for kind in statement.types)
+    text = f"OPEN CHANNEL FOR {statement.direction.value} AS FILE #{statement.file}, TYPE = ({types})"
+    return text if statement.depth is None else f"{text}, DEPTH = {print_expression(statement.depth)}"
+
+
+def _open_port(statement: OpenPort) -> str:
+    text = f"OPEN {_literal(StringLiteral(statement.port))} AS FILE #{statement.file}"
+    if statement.setup is None:
+        return f"{text}, ACCESS = {statement.access}"
+    text += f", SETUP = {print_expression(statement.setup)}"
+    return text if statement.baud is None else f"{text}, {print_expression(statement.baud)}"
+
+
+def _close(statement: Close) -> str:
+    return f"CLOSE #{statement.file}"
+
+
+def _branch(key: str, line: int | None) -> str:
+    return "" if line is None else f":{key}={line}"
+
+
+def _input(statement: InputFile) -> str:
+    return f"INPUT{_branch('EMPTY', statement.empty)} #{statement.file}, {_list(statement.targets)}"
+
+
+def _print_file(statement: PrintFile) -> str:
+    head = f"PRINT{_branch('FULL', statement.full)} #{statement.file}"
+    return f"{head}, {' '.join(_printed(statement))}" if statement.items else head
+
+
+def _get(statement: Get) -> str:
+    return f"GET{_branch('EMPTY', statement.empty)} #{statement.file}, {print_expression(statement.target)}"
+
+
+def _put(statement: Put) -> str:
+    return f"PUT #{statement.file}, {print_expression(statement.item)}"
+
+
+_WAITING: dict[type[object], Callable[[Any], str]] = {
+    WaitOn: _wait,
+    Delay: _delay,
+    StartEvery: _start_every,
+    OpenChannel: _open_channel,
+    OpenPort: _open_port,
+    Close: _close,
+    InputFile: _input,
+    PrintFile: _print_file,
+    Get: _get,
+    Put: _put,
+}

@@ -6,15 +6,16 @@ from collections.abc import Callable
 
 from automax_ros.language.syntax.calls import call
 from automax_ros.language.syntax.cursor import Cursor
-from automax_ros.language.syntax.declarations import declaration, event
+from automax_ros.language.syntax.declarations import declaration, event, event_word
 from automax_ros.language.syntax.expressions import constant, expression, target
+from automax_ros.language.syntax.jumps import line_number
+from automax_ros.language.syntax.print_list import print_items
 from automax_ros.language.syntax.tokens import Kind, Token
 from automax_ros.language.syntax.tree import (
     Assignment,
     ClearErrorLog,
     Data,
     End,
-    Expression,
     Gosub,
     Goto,
     IoWrite,
@@ -23,9 +24,15 @@ from automax_ros.language.syntax.tree import (
     Read,
     Restore,
     Return,
+    SetEvent,
     Statement,
     Stop,
 )
+
+
+def _set(cursor: Cursor, start: Token) -> SetEvent:
+    del start
+    return SetEvent(event_word(cursor))
 
 
 def assignment(cursor: Cursor) -> Assignment:
@@ -36,16 +43,6 @@ def assignment(cursor: Cursor) -> Assignment:
         cursor.fail("AMX0035", f"`=` is missing: {cursor.found()} stands where it should be", hint)
     cursor.advance()
     return Assignment(left, expression(cursor))
-
-
-def line_number(cursor: Cursor, word: str) -> int:
-    """Read the line number that a jump names."""
-    token = cursor.current
-    if token.kind is not Kind.INTEGER or not token.text.isdigit() or not isinstance(token.value, int):
-        cursor.fail("AMX0062", f"{word} needs a line number, not {cursor.found()}")
-    cursor.advance()
-    cursor.reporter.report_token(token)
-    return token.value
 
 
 def _line_numbers(cursor: Cursor, word: str) -> tuple[int, ...]:
@@ -120,24 +117,10 @@ def _restore(cursor: Cursor, start: Token) -> Restore:
 
 def _print(cursor: Cursor, start: Token) -> Print:
     del start
-    if cursor.at("#"):
+    if cursor.at("#", ":"):
         hint = "PRINT without # writes to the task's log"
         cursor.fail("AMX0031", "PRINT to a port or channel belongs to BASIC tasks: it can suspend the task", hint)
-    if cursor.at("USING"):
-        cursor.fail("AMX0032", "PRINT USING is not part of the language", "print the values as they are")
-    items: list[Expression] = []
-    separators: list[str] = []
-    while not cursor.at_end() and not cursor.at("ELSE"):
-        items.append(expression(cursor))
-        if cursor.at(",", ";"):
-            separators.append(cursor.advance().text)
-            continue
-        separators.append("")
-        named = cursor.current.is_name and not cursor.at("ELSE", "REM")
-        if named or cursor.current.kind is Kind.STRING:
-            cursor.fail("AMX0071", f"`,` or `;` is missing before {cursor.found()}")
-        break
-    return Print(tuple(items), tuple(separators))
+    return print_items(cursor)
 
 
 def _io_write(cursor: Cursor, start: Token) -> IoWrite:
@@ -168,5 +151,6 @@ SIMPLE_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
     "GLOBAL": declaration,
     "EVENT": event,
     "CALL": call,
+    "SET": _set,
 }
-"""How each simple statement is read after its first word."""
+"""How each simple statement is read after its first word; SET may name a variable all the same."""

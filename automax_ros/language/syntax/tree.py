@@ -11,114 +11,65 @@ from dataclasses import dataclass, field
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.types import DataType, type_of_name
-
-NO_SPAN = Span(0, 0, 0)
-
-
-def _span() -> Span:
-    """Return a span field's default: nodes made by hand have none."""
-    return field(default=NO_SPAN, compare=False, kw_only=True)
-
-
-# Expressions
-
-
-@dataclass(frozen=True)
-class IntegerLiteral:
-    """A decimal or hexadecimal integer constant; ``value`` is the signed 32-bit value (decimal ones may exceed it)."""
-
-    value: int
-    hexadecimal: bool = False
-    span: Span = _span()
-
-
-@dataclass(frozen=True)
-class RealLiteral:
-    """A real constant; ``text`` is its spelling."""
-
-    value: float
-    text: str = field(default="", compare=False)
-    span: Span = _span()
-
-
-@dataclass(frozen=True)
-class StringLiteral:
-    """A string constant without its quotes."""
-
-    value: str
-    span: Span = _span()
-
-
-@dataclass(frozen=True)
-class BooleanLiteral:
-    """TRUE, ON, FALSE or OFF."""
-
-    value: bool
-    span: Span = _span()
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A simple variable by its name, or a whole array where one is expected; ``name`` ends with the type character."""
-
-    name: str
-    span: Span = _span()
-
-    @property
-    def type(self) -> DataType:
-        """The data type, which the name gives."""
-        return type_of_name(self.name)
-
-
-@dataclass(frozen=True)
-class Element:
-    """An array element."""
-
-    name: str
-    subscripts: tuple[Expression, ...]
-    span: Span = _span()
-
-    @property
-    def type(self) -> DataType:
-        """The data type that the array's name tells."""
-        return type_of_name(self.name)
-
-
-@dataclass(frozen=True)
-class Unary:
-    """A sign or NOT: ``operator`` is ``-``, ``+`` or ``NOT``. ``-NAME@`` in a block parameter inverts."""
-
-    operator: str
-    operand: Expression
-    span: Span = _span()
-
-
-@dataclass(frozen=True)
-class Binary:
-    """Two operands: ``** * / + - = <> < > <= >= AND OR XOR``."""
-
-    operator: str
-    left: Expression
-    right: Expression
-    span: Span = _span()
-
-
-@dataclass(frozen=True)
-class FunctionCall:
-    """A call of a built-in function; ``name`` keeps its type character, such as ``BIT_SET%``."""
-
-    name: str
-    arguments: tuple[Expression, ...] = ()
-    span: Span = _span()
-
-
-Expression = (
-    IntegerLiteral | RealLiteral | StringLiteral | BooleanLiteral | Reference | Element | Unary | Binary | FunctionCall
+from automax_ros.language.syntax.expression_tree import (
+    NO_SPAN,
+    Binary,
+    BooleanLiteral,
+    Element,
+    Expression,
+    FunctionCall,
+    IntegerLiteral,
+    RealLiteral,
+    Reference,
+    StringLiteral,
+    Target,
+    Unary,
+    span_field,
 )
-Target = Reference | Element
+from automax_ros.language.syntax.waiting_tree import SetEvent, WaitingStatement
 
-
-# Statements
+__all__ = [
+    "NO_SPAN",
+    "Argument",
+    "Assignment",
+    "Binary",
+    "BooleanLiteral",
+    "Call",
+    "ClearErrorLog",
+    "Data",
+    "Declaration",
+    "Declared",
+    "Element",
+    "End",
+    "Event",
+    "Expression",
+    "For",
+    "FunctionCall",
+    "Gosub",
+    "Goto",
+    "If",
+    "IntegerLiteral",
+    "IoWrite",
+    "Label",
+    "Module",
+    "OnJump",
+    "Print",
+    "Read",
+    "RealLiteral",
+    "Reference",
+    "Remark",
+    "Restore",
+    "Return",
+    "Scope",
+    "SetEvent",
+    "Statement",
+    "Stop",
+    "StringLiteral",
+    "Target",
+    "Tuning",
+    "Unary",
+    "WaitingStatement",
+]
 
 
 @dataclass(frozen=True)
@@ -129,7 +80,7 @@ class Tuning:
     high: Expression | None = None
     low: Expression | None = None
     step: Expression | None = None
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -144,7 +95,7 @@ class Declared:
     subscripts: tuple[int, ...] = ()
     length: int | None = None
     tuning: Tuning | None = None
-    span: Span = _span()
+    span: Span = span_field()
 
     @property
     def type(self) -> DataType:
@@ -166,7 +117,7 @@ class Declaration:
     scope: Scope
     variables: tuple[Declared, ...]
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -176,7 +127,7 @@ class Assignment:
     target: Target
     value: Expression
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -188,7 +139,7 @@ class If:
     otherwise: tuple[Statement, ...] = ()
     one_line: bool = False
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -201,7 +152,7 @@ class For:
     step: Expression | None
     body: tuple[Statement, ...]
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -210,7 +161,7 @@ class Goto:
 
     line: int
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -219,7 +170,7 @@ class Gosub:
 
     line: int
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -227,7 +178,7 @@ class Return:
     """RETURN from a subroutine."""
 
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -238,7 +189,7 @@ class OnJump:
     lines: tuple[int, ...]
     gosub: bool = False
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -247,7 +198,7 @@ class Read:
 
     targets: tuple[Target, ...]
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -256,7 +207,7 @@ class Data:
 
     values: tuple[Expression, ...]
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -265,7 +216,7 @@ class Restore:
 
     line: int | None = None
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -275,7 +226,7 @@ class Print:
     items: tuple[Expression, ...] = ()
     separators: tuple[str, ...] = ()
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -283,7 +234,7 @@ class Stop:
     """STOP: the task ends."""
 
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -294,7 +245,7 @@ class Event:
     interrupt_status: Reference | None = None
     timeout: int | None = None
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -303,7 +254,7 @@ class Argument:
 
     keyword: str
     value: Expression
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -313,7 +264,7 @@ class Call:
     block: str
     arguments: tuple[Argument, ...] = ()
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -324,7 +275,7 @@ class IoWrite:
     register: Expression
     value: Expression
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -332,7 +283,7 @@ class ClearErrorLog:
     """CLR_ERRLOG."""
 
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -340,7 +291,7 @@ class End:
     """END: the end of the scan."""
 
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -350,7 +301,7 @@ class Remark:
     text: str
     costs: bool
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True)
@@ -362,7 +313,7 @@ class Label:
     """
 
     number: int | None = field(default=None, kw_only=True)
-    span: Span = _span()
+    span: Span = span_field()
 
 
 Statement = (
@@ -386,6 +337,8 @@ Statement = (
     | End
     | Remark
     | Label
+    | SetEvent
+    | WaitingStatement
 )
 
 

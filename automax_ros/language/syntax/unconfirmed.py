@@ -10,6 +10,9 @@ from automax_ros.language.syntax.functions import FUNCTIONS
 UNCONFIRMED_STATEMENTS: dict[str, str] = {
     "CALL": "CALL after `\\` or THEN: section 3.1 wants a line number",
     "IOWRITE": "IOWRITE slot, register, value: the name and the order of the operands",
+    "EMPTY": "EMPTY= and FULL=: where the number of the channel or port stands",
+    "GET": "GET #n, variable and PUT #n, string: the operands",
+    "SET": "SET in a control-block task: no source lists it there",
     "TUNABLE": "LOCAL NAME [CURRENT=..., HIGH=..., LOW=..., STEP=...]: the bracket and its keys",
 }
 """Statements and parts of statements, with what is not confirmed of them."""

@@ -7,6 +7,7 @@ from typing import NoReturn
 from automax_ros.core.text import did_you_mean
 from automax_ros.language.syntax.cursor import Cursor
 from automax_ros.language.syntax.lexer import TYPE_CHARACTERS
+from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.language.syntax.tokens import BASIC_TASK_WORDS, RESERVED_WORDS, STATEMENT_WORDS, Kind
 
 FOREIGN_WORDS = {
@@ -41,16 +42,14 @@ FOREIGN_WORDS = {
 }
 
 
-def refuse_word(cursor: Cursor, basic_task: bool) -> None:
-    """Raise the fitting error for a word that begins no statement of a control-block task, before it is read."""
+def refuse_word(cursor: Cursor, kind: TaskKind) -> None:
+    """Raise the fitting error for a word that begins no statement of this kind of task, before it is read."""
     word = cursor.current.text
     if cursor.following.text == "=":
         if word in RESERVED_WORDS:
             cursor.fail("AMX0034", f"`{word}` is a word of the language and cannot name a variable")
         return
-    if word in BASIC_TASK_WORDS:
-        if basic_task:
-            cursor.fail("AMX0031", f"{word}: statements that suspend a task are not available in BASIC tasks yet")
+    if kind is not TaskKind.BASIC and word in BASIC_TASK_WORDS:
         message = f"{word} belongs to BASIC tasks: a control-block task must not be suspended"
         cursor.fail("AMX0031", message, BASIC_TASK_WORDS[word])
     if word in FOREIGN_WORDS:

@@ -13,6 +13,8 @@ from automax_ros.language.syntax.tree import (
     Expression,
     For,
     FunctionCall,
+    Gosub,
+    Goto,
     If,
     IoWrite,
     OnJump,
@@ -20,7 +22,18 @@ from automax_ros.language.syntax.tree import (
     Read,
     Reference,
     Statement,
+    Target,
     Unary,
+)
+from automax_ros.language.syntax.waiting_tree import (
+    Delay,
+    Get,
+    InputFile,
+    OpenChannel,
+    OpenPort,
+    PrintFile,
+    Put,
+    StartEvery,
 )
 
 
@@ -66,7 +79,46 @@ def expressions_of(statement: Statement) -> tuple[Expression, ...]:
         return statement.items
     if isinstance(statement, IoWrite):
         return statement.slot, statement.register, statement.value
-    return ()
+    return _expressions_of_waiting(statement)
+
+
+def _expressions_of_waiting(statement: Statement) -> tuple[Expression, ...]:
+    if isinstance(statement, (Delay, StartEvery)):
+        return (statement.count,)
+    if isinstance(statement, OpenChannel):
+        return () if statement.depth is None else (statement.depth,)
+    if isinstance(statement, OpenPort):
+        return tuple(part for part in (statement.setup, statement.baud) if part is not None)
+    if isinstance(statement, InputFile):
+        return statement.targets
+    if isinstance(statement, PrintFile):
+        return statement.items
+    if isinstance(statement, Get):
+        return (statement.target,)
+    return (statement.item,) if isinstance(statement, Put) else ()
+
+
+def targets_of(statement: Statement) -> tuple[Target, ...]:
+    """Return the variables and elements that a BASIC statement writes."""
+    if isinstance(statement, (Assignment, Get)):
+        return (statement.target,)
+    if isinstance(statement, (Read, InputFile)):
+        return statement.targets
+    return (statement.variable,) if isinstance(statement, For) else ()
+
+
+def jumps_of(statement: Statement) -> tuple[int, ...]:
+    """Return the lines that a statement itself may go to, those inside it not included."""
+    if isinstance(statement, (Goto, Gosub)):
+        return (statement.line,)
+    if isinstance(statement, OnJump):
+        return statement.lines
+    line = None
+    if isinstance(statement, (InputFile, Get)):
+        line = statement.empty
+    elif isinstance(statement, PrintFile):
+        line = statement.full
+    return () if line is None else (line,)
 
 
 def parts(expression: Expression) -> Iterator[Expression]:
