@@ -1,4 +1,4 @@
-"""The compiler: a checked program becomes Python functions.
+"""The compiler: a checked program becomes Python functions. BASIC tasks: see ``background``.
 
 Three functions come from one lowering of the same tree:
 
@@ -21,94 +21,51 @@ what a scan may touch: see ``ScanIo``.
 from __future__ import annotations
 
 import ast
-import gc
-from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, cast
 
-from automax_ros.blocks.declaration import HELPERS
 from automax_ros.compile import build
+from automax_ros.compile.assembly import called, local_field, made, stores
+from automax_ros.compile.background import BackgroundCompilation
 from automax_ros.compile.calls import BlockInstance, instance_of
 from automax_ros.compile.cost import CostModel
 from automax_ros.compile.emitter import Emitter
-from automax_ros.compile.functions import BUILTINS, OPERATIONS
-from automax_ros.compile.layout import Layout, Role, StateField, StateValue
+from automax_ros.compile.layout import Layout, StateField
 from automax_ros.compile.pynames import block_prefix, forced_name, latched_name, variable_name
+from automax_ros.compile.scan_io import BackgroundIo, ScanIo, ScanTooLong, StateValues, Wish
 from automax_ros.compile.statements import STOPPED, StatementLowering
-from automax_ros.core.types import Latched, Value
-from automax_ros.language.program import Program, Symbol
+from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Call, For, If, Reference, Scope, Statement
-
-StateValues = list[StateValue]
-
-
-class ScanTooLong(Exception):
-    """A scan executed more statements than a scan may; ``line`` is the BASIC line it was at."""
-
-    def __init__(self, line: int) -> None:
-        """Take the BASIC line number."""
-        super().__init__(f"more statements than a scan may execute, at line {line}")
-        self.line = line
-
-
-class ScanIo(Protocol):
-    """What a compiled scan touches apart from its own state."""
-
-    def latch(self) -> Latched:
-        """Return the latched commons in the order of ``CompiledTask.latched``."""
-        ...
-
-    def forces(self) -> tuple[bool, ...]:
-        """Return which of ``CompiledTask.written`` a force holds."""
-        ...
-
-    def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Write back what blocks changed: pairs of view and value; called only if something changed."""
-        ...
-
-    def read_now(self, view: int, element: int = 0) -> Value:
-        """Read actual memory."""
-        ...
-
-    def write_now(self, view: int, value: Value, element: int = 0) -> None:
-        """Write actual memory."""
-        ...
-
-    def log(self, line: int, code: int) -> None:
-        """Log a run-time error."""
-        ...
-
-    def print_line(self, values: tuple[Value, ...], separators: str) -> None:
-        """Print to the task's log; a separator (``,`` ``;`` or a blank) follows each value."""
-        ...
-
-    def errors_logged(self) -> bool:
-        """Return whether the error log holds an entry."""
-        ...
-
-    def clear_errors(self) -> None:
-        """Clear the error log."""
-        ...
-
-    def io_read(self, slot: int, register: int) -> tuple[int, int]:
-        """Return a register of an I/O module, and the problem or 0."""
-        ...
-
-    def io_write(self, slot: int, register: int, value: int) -> int:
-        """Write a register of an I/O module; return the problem or 0."""
-        ...
-
 
 Startup = Callable[[StateValues, ScanIo], bool]
 Scans = Callable[[StateValues, ScanIo], Generator[bool, None, None]]
+Burst = Callable[[StateValues, BackgroundIo], Wish]
+BurstSteps = Callable[[StateValues, BackgroundIo], Generator[int, None, Wish]]
 ScanSteps = Callable[[StateValues, ScanIo], Generator[int, None, bool]]
+
+
+class Compilation(Protocol):
+    """Makes the functions of one task when they are asked for; ``names`` are those of its printed source."""
+
+    names: tuple[str, ...]
+
+    def functions(self, *names: str) -> dict[str, object]:
+        """Compile some of the functions."""
+        ...
+
+    def definitions(self, *names: str) -> list[ast.FunctionDef]:
+        """Return some of the functions as trees."""
+        ...
 
 
 @dataclass(frozen=True)
 class CompiledTask:
-    """A task ready to run. ``latched`` are the commons that a scan latches, ``written`` what blocks can change."""
+    """A task ready to run: a control-block task scans, a BASIC task has bursts, and its ``scans`` are none.
+
+    ``latched`` are the commons that a scan latches, ``written`` what blocks can change.
+    """
 
     program: Program
     layout: Layout
@@ -116,7 +73,7 @@ class CompiledTask:
     written: tuple[str, ...]
     startup: Startup
     scans: Scans
-    _compilation: _Compilation = field(repr=False, compare=False)
+    _compilation: Compilation = field(repr=False, compare=False)
 
     @cached_property
     def scans_forced(self) -> Scans:
@@ -134,18 +91,45 @@ class CompiledTask:
         return cast(ScanSteps, self._compilation.functions("scan_steps_forced")["scan_steps_forced"])
 
     @cached_property
+    def burst(self) -> Burst:
+        """What a BASIC task does from one suspension to the next, at one instant."""
+        return cast(Burst, self._compilation.functions("burst")["burst"])
+
+    @cached_property
+    def burst_steps(self) -> BurstSteps:
+        """The same in steps of modeled time."""
+        return cast(BurstSteps, self._compilation.functions("burst_steps")["burst_steps"])
+
+    @cached_property
     def source(self) -> str:
-        """The three functions as text."""
-        definitions = self._compilation.definitions("startup", "scans", "scan_steps")
+        """The functions as text."""
+        definitions = self._compilation.definitions(*self._compilation.names)
         return "\n\n\n".join(ast.unparse(item) for item in build.placed(definitions).body) + "\n"
 
 
 def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:
     """Compile a checked program against a rack's views (full name -> view) of all commons it declares."""
+    if program.is_basic:
+        return _background(program, views, cost_model or CostModel())
     return _Compilation(program, views, cost_model or CostModel()).result()
 
 
+def _background(program: Program, views: Mapping[str, int], cost_model: CostModel) -> CompiledTask:
+    compilation = BackgroundCompilation(program, views, cost_model)
+    return CompiledTask(program, compilation.layout, (), (), _no_startup, _no_scans, compilation)
+
+
+def _no_startup(_: StateValues, __: ScanIo) -> bool:
+    return False
+
+
+def _no_scans(_: StateValues, __: ScanIo) -> Generator[bool, None, None]:
+    yield from ()
+
+
 class _Compilation:
+    names: tuple[str, ...] = ("startup", "scans", "scan_steps")
+
     def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel) -> None:
         self._program = program
         self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
@@ -153,7 +137,7 @@ class _Compilation:
         self._instances = _instances(program)
         self._latched = tuple(symbol.name for symbol in program.symbols.values() if symbol.latched)
         self._fields: dict[str, StateField] = {
-            variable_name(symbol.name): _local_field(symbol)
+            variable_name(symbol.name): local_field(symbol)
             for symbol in program.symbols.values()
             if symbol.scope is Scope.LOCAL
         }
@@ -163,24 +147,20 @@ class _Compilation:
 
     def result(self) -> CompiledTask:
         """Compile the task."""
-        made = self.functions("startup", "scans")
+        functions = self.functions("startup", "scans")
         return CompiledTask(
             program=self._program,
             layout=Layout(tuple(self._fields.values())),
             latched=self._latched,
             written=self._written(),
-            startup=cast(Startup, made["startup"]),
-            scans=cast(Scans, made["scans"]),
+            startup=cast(Startup, functions["startup"]),
+            scans=cast(Scans, functions["scans"]),
             _compilation=self,
         )
 
     def functions(self, *names: str) -> dict[str, object]:
         """Compile some of the functions."""
-        with _collections_paused():
-            code = compile(build.placed(self.definitions(*names)), f"<{self._program.name}>", "exec")
-        made: dict[str, object] = {"__builtins__": {}, **self._globals}
-        exec(code, made)
-        return made
+        return made(self.definitions(*names), self._program.name, self._globals)
 
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
         """Lower some of the three functions; the state's fields are known when ``scans`` was among them."""
@@ -252,20 +232,11 @@ class _Compilation:
         body, emitter.body = emitter.body, outer
         return body
 
-    def _stores(self, body: list[ast.stmt]) -> list[ast.stmt]:
-        """Return the stores of the fields that the body sets: one by one, which is faster than all at once."""
-        assigned = _assigned(body)
-        return [
-            build.set_item("state", build.constant(position), build.name(name))
-            for position, name in enumerate(self._fields)
-            if name in assigned
-        ]
-
     def _wrapped(
         self, name: str, body: list[ast.stmt], emitter: Emitter, lowering: StatementLowering
     ) -> ast.FunctionDef:
         """Return the whole function: load the state, bind what is used, the body, store the state."""
-        self._globals.update(_called(emitter))
+        self._globals.update(called(emitter))
         self._globals.update(emitter.extra_globals)
         opening: list[ast.stmt] = []
         if self._fields:
@@ -273,17 +244,17 @@ class _Compilation:
         if lowering.block_lines:
             lines: list[ast.expr] = [build.constant(line) for line in lowering.block_lines]
             opening.append(build.assign("block_lines", ast.Tuple(lines, build.LOAD)))
-        stores = self._stores(body)
+        stored = stores(list(self._fields), body)
         body = [*self._start_values(emitter, lowering), *body]
         stopped = build.name(STOPPED) if lowering.can_stop else build.constant(False)
         if name.startswith("scans"):
             body.append(build.do(ast.Yield(stopped)))
             forever = build.loop(build.constant(True), body)
-            return build.function(name, ["state", "io"], [*opening, build.finally_do([forever], stores)])
+            return build.function(name, ["state", "io"], [*opening, build.finally_do([forever], stored)])
         if lowering.counts_steps or emitter.modeled:
-            body = [build.finally_do(body, stores)]
+            body = [build.finally_do(body, stored)]
         else:
-            body += stores
+            body += stored
         return build.function(name, ["state", "io"], [*opening, *body, ast.Return(stopped)])
 
     def _start_values(self, emitter: Emitter, lowering: StatementLowering) -> list[ast.stmt]:
@@ -295,47 +266,6 @@ class _Compilation:
             "cost": (0, emitter.modeled),
         }
         return [build.assign(name, build.constant(value)) for name, (value, used) in values.items() if used]
-
-
-@contextmanager
-def _collections_paused() -> Iterator[None]:
-    """Collect no garbage meanwhile: a long task's tree is all alive, and to look through it takes most of the time."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-def _assigned(body: list[ast.stmt]) -> frozenset[str]:
-    """Return the names that statements set."""
-    return frozenset(
-        node.id for node in build.nodes(*body) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    )
-
-
-def _called(emitter: Emitter) -> dict[str, object]:
-    functions: dict[str, object] = dict(OPERATIONS)
-    functions.update({builtin.carry_out.__name__: builtin.carry_out for builtin in BUILTINS.values()})
-    functions.update(HELPERS)
-    return {**HELPERS, **{name: functions[name] for name in sorted(emitter.calls)}}
-
-
-def _local_field(symbol: Symbol) -> StateField:
-    if symbol.tuning is not None:
-        return StateField(symbol.name, symbol.type, Role.TUNABLE, symbol.tuning.current)
-    return StateField(
-        symbol.name,
-        symbol.type,
-        Role.LOCAL,
-        symbol.type.zero,
-        symbol.elements,
-        is_array=bool(symbol.dimensions),
-        dimensions=symbol.dimensions,
-        length=symbol.length,
-    )
 
 
 def _instances(program: Program) -> dict[object, BlockInstance]:

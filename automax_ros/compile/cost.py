@@ -47,6 +47,17 @@ STATEMENT_ESTIMATES_US = {
     "Print": 60.0,
     "IoWrite": 10.0,
     "ClearErrorLog": 4.0,
+    "SetEvent": 12.0,
+    "WaitOn": 20.0,
+    "Delay": 20.0,
+    "StartEvery": 20.0,
+    "OpenChannel": 60.0,
+    "OpenPort": 60.0,
+    "Close": 30.0,
+    "InputFile": 40.0,
+    "PrintFile": 60.0,
+    "Get": 30.0,
+    "Put": 40.0,
 }
 """Estimated microseconds on a 7010 by kind of BASIC statement; others take none (decision)."""
 SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8, Model.PC3000: 0.7}

@@ -23,6 +23,7 @@ from automax_ros.language.syntax.tree import (
     Statement,
     Stop,
 )
+from automax_ros.language.syntax.walk import bodies, jumps_of
 
 JUMPS = (Goto, Gosub, Return, OnJump, Stop, End)
 PC = "pc"
@@ -35,14 +36,9 @@ def jump_targets(statements: tuple[Statement, ...]) -> frozenset[int]:
     """Return the line numbers that anything in the statements jumps to."""
     lines: set[int] = set()
     for statement in statements:
-        if isinstance(statement, (Goto, Gosub)):
-            lines.add(statement.line)
-        elif isinstance(statement, OnJump):
-            lines.update(statement.lines)
-        elif isinstance(statement, If):
-            lines |= jump_targets(statement.then) | jump_targets(statement.otherwise)
-        elif isinstance(statement, For):
-            lines |= jump_targets(statement.body)
+        lines.update(jumps_of(statement))
+        for body in bodies(statement):
+            lines |= jump_targets(body)
     return frozenset(lines)
 
 
@@ -60,6 +56,16 @@ def is_jumping(statement: Statement, targets: frozenset[int]) -> bool:
 def count_statements(statements: tuple[Statement, ...]) -> int:
     """Return how many statements stand in a suite, those inside its IF and FOR not included."""
     return sum(not isinstance(statement, Label) for statement in statements)
+
+
+def before_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """Return the statements before the task's END, after which only remarks stand; all if something jumps to those."""
+    targets = jump_targets(statements)
+    for position, statement in enumerate(statements):
+        if isinstance(statement, End):
+            jumped_to = any(item.number in targets for item in statements[position:])
+            return statements if jumped_to else statements[:position]
+    return statements
 
 
 @dataclass
@@ -123,19 +129,20 @@ class Flow:
             place.value = self.current
 
     def assemble(self, limit: int) -> list[ast.stmt]:
-        """Return the loop over all blocks; more than ``limit`` statements raise ScanTooLong."""
+        """Return the loop over all blocks from the first on; more than ``limit`` statements raise ScanTooLong."""
+        too_long = ast.Raise(build.call("ScanTooLong", build.item("block_lines", build.name(PC))), None)
+        return [build.assign(PC, build.constant(0)), self.blocks_loop(limit, [too_long])]
+
+    def blocks_loop(self, limit: int, too_many: list[ast.stmt]) -> ast.stmt:
+        """Return the loop over all blocks, which begins where ``pc`` tells and leaves by ``too_many`` statements."""
         for place, line in self._to_lines:
             place.value = self.labels[line]
         for place in self._to_end:
             place.value = len(self.blocks)
-        too_long = ast.Raise(build.call("ScanTooLong", build.item("block_lines", build.name(PC))), None)
-        turns: list[ast.stmt] = [build.when(build.compare(build.name(STEPS), ">", build.constant(limit)), [too_long])]
+        turns: list[ast.stmt] = [build.when(build.compare(build.name(STEPS), ">", build.constant(limit)), too_many)]
         turns += _dispatched([self._whole(number) for number in range(len(self.blocks))], 0)
         end = build.constant(len(self.blocks))
-        return [
-            build.assign(PC, build.constant(0)),
-            build.loop(build.compare(build.name(PC), "<>", end), turns),
-        ]
+        return build.loop(build.compare(build.name(PC), "<>", end), turns)
 
     def _whole(self, number: int) -> list[ast.stmt]:
         """Return a block that counts its statements and takes another turn where it jumps back."""
@@ -168,6 +175,8 @@ def _turning(suite: list[ast.stmt], number: int) -> list[ast.stmt]:
     last = suite[-1]
     if isinstance(last, ast.If):
         return [*suite[:-1], ast.If(last.test, _turning(last.body, number), _turning(last.orelse, number))]
+    if isinstance(last, ast.Return):
+        return suite
     assert isinstance(last, ast.Assign)
     forward = isinstance(last.value, ast.Constant) and isinstance(last.value.value, int) and last.value.value > number
     return suite if forward else [*suite, ast.Continue()]

@@ -10,14 +10,12 @@ from automax_ros.compile import build
 from automax_ros.compile.calls import BlockInstance, lower_block
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.expressions import lower, of_type
-from automax_ros.compile.flow import JUMPS, PC, STEPS, Flow, count_statements, is_jumping, jump_targets
-from automax_ros.compile.folding import value_of
+from automax_ros.compile.flow import JUMPS, PC, STEPS, Flow, before_end, count_statements, is_jumping, jump_targets
 from automax_ros.compile.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
 from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.loops import Loop, begin_loop, end_turn, loop_fields, loop_test
-from automax_ros.compile.stores import store
+from automax_ros.compile.stores import printable, store
 from automax_ros.core.types import DataType
-from automax_ros.language.checks.typing_rules import type_of
 from automax_ros.language.syntax.tree import (
     Assignment,
     Call,
@@ -36,6 +34,7 @@ from automax_ros.language.syntax.tree import (
     Remark,
     Restore,
     Return,
+    SetEvent,
     Statement,
     Stop,
 )
@@ -66,12 +65,19 @@ class StatementLowering:
 
     def lower_all(self, statements: tuple[Statement, ...]) -> None:
         """Emit the statements; END after them is left to the caller."""
-        statements = _before_end(statements)
+        statements = before_end(statements)
         self._targets = jump_targets(statements)
-        if any(is_jumping(statement, self._targets) for statement in statements):
+        if self._needs_blocks(statements):
             self._lower_blocks(statements)
         else:
             self._lower_straight(statements)
+
+    def _needs_blocks(self, statements: tuple[Statement, ...]) -> bool:
+        return any(self._jumps(statement) for statement in statements)
+
+    def _jumps(self, statement: Statement) -> bool:
+        """Return whether a statement cannot stand in straight code."""
+        return is_jumping(statement, self._targets)
 
     # Straight code
 
@@ -151,6 +157,9 @@ class StatementLowering:
         self.emitter.book_cost()
         self.emitter.emit(flow.to_end())
         self.emitter.body = outer
+        self._assemble(flow)
+
+    def _assemble(self, flow: Flow) -> None:
         self.block_lines = (*flow.lines, self.emitter.line)
         self.emitter.emit(*flow.assemble(STATEMENT_LIMIT))
 
@@ -172,7 +181,7 @@ class StatementLowering:
             if isinstance(statement, Label):
                 continue
             flow.count()
-            if is_jumping(statement, self._targets):
+            if self._jumps(statement):
                 self._flow_one(flow, statement)
             else:
                 self._lower_straight((statement,))
@@ -309,7 +318,7 @@ class StatementLowering:
         lower_block(self.emitter, instance)
 
     def _print(self, statement: Print) -> None:
-        values = [_printable(self.emitter, item) for item in statement.items]
+        values = [printable(self.emitter, item) for item in statement.items]
         separators = build.constant("".join(separator or " " for separator in statement.separators))
         call = build.call(self.emitter.member("print_line"), ast.Tuple(values, build.LOAD), separators)
         self.emitter.emit(build.do(call))
@@ -360,25 +369,12 @@ class StatementLowering:
     def _clear_log(self, _: ClearErrorLog) -> None:
         self.emitter.emit(build.do(build.call(self.emitter.member("clear_errors"))))
 
+    def _set_event(self, statement: SetEvent) -> None:
+        self.emitter.checkpoint()
+        self.emitter.emit(build.do(build.call(self.emitter.member("set_event"), build.constant(statement.event))))
+
     def _remark(self, _: Remark) -> None:
         """A remark does nothing; its time is added by the frame of every statement."""
-
-
-def _before_end(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
-    """Return the statements before the task's END, after which only remarks stand; all if something jumps to those."""
-    targets = jump_targets(statements)
-    for position, statement in enumerate(statements):
-        if isinstance(statement, End):
-            jumped_to = any(item.number in targets for item in statements[position:])
-            return statements if jumped_to else statements[:position]
-    return statements
-
-
-def _printable(emitter: Emitter, item: Expression) -> ast.expr:
-    value = lower(emitter, item)
-    if type_of(item) is DataType.REAL and isinstance(literal := value_of(value.node), int):
-        return build.constant(float(literal))
-    return value.node
 
 
 _Carry = Callable[[StatementLowering, Statement], None]
@@ -391,4 +387,5 @@ _SIMPLE: dict[type, _Carry] = {
     IoWrite: StatementLowering._io_write,  # type: ignore[dict-item]
     ClearErrorLog: StatementLowering._clear_log,  # type: ignore[dict-item]
     Remark: StatementLowering._remark,  # type: ignore[dict-item]
+    SetEvent: StatementLowering._set_event,  # type: ignore[dict-item]
 }

@@ -6,12 +6,13 @@ import ast
 
 from automax_ros.compile import build
 from automax_ros.compile.emitter import Emitter
-from automax_ros.compile.expressions import SUBSCRIPT, Lowered, clamped, lower_index
+from automax_ros.compile.expressions import SUBSCRIPT, Lowered, clamped, lower, lower_index
 from automax_ros.compile.folding import value_of
 from automax_ros.compile.functions import DOUBLE_CLAMPED, INTEGER_CLAMPED, REAL_CLAMPED
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType
-from automax_ros.language.syntax.tree import Element, Target
+from automax_ros.language.checks.typing_rules import type_of
+from automax_ros.language.syntax.tree import Element, Expression, Target
 
 _EXACT_IN_REAL = 2**24
 
@@ -42,8 +43,12 @@ def write_at(emitter: Emitter, name: str, index: ast.expr, in_range: ast.expr | 
 
 def converted(emitter: Emitter, name: str, kind: DataType, value: Lowered) -> ast.expr:
     """Return a value as a variable takes it: truncated, clamped, rounded to 24 bits or cut to its length."""
+    return converted_to(emitter, kind, emitter.symbol(name).length, value)
+
+
+def converted_to(emitter: Emitter, kind: DataType, length: int, value: Lowered) -> ast.expr:
+    """Return a value as a variable of a type takes it; ``length`` is a string's."""
     if kind is DataType.STRING:
-        length = emitter.symbol(name).length
         literal = value_of(value.node)
         if isinstance(literal, str):
             return build.constant(literal[:length])
@@ -69,3 +74,11 @@ def _as_real(emitter: Emitter, value: Lowered) -> ast.expr:
     emitter.emit(build.assign_all([result, flag], emitter.operation("store_real", value.node)))
     emitter.emit(build.when(build.name(flag), emitter.note_overflow(build.constant(REAL_CLAMPED))))
     return build.name(result)
+
+
+def printable(emitter: Emitter, item: Expression) -> ast.expr:
+    """Return an expression's value as PRINT takes it: a REAL is a REAL, whatever its literal."""
+    value = lower(emitter, item)
+    if type_of(item) is DataType.REAL and isinstance(literal := value_of(value.node), int):
+        return build.constant(float(literal))
+    return value.node

@@ -5,19 +5,21 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import cast
 
-from automax_ros.compile.compiler import CompiledTask, ScanTooLong, StateValues
+from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.functions import text_of
 from automax_ros.compile.layout import Layout, Role, StateField
+from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.running.backplane import BUS_ERROR, NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog, LogEntry
+from automax_ros.running.events import Events
 from automax_ros.running.views import Memory
 
 SCAN_TOO_LONG = 7040
@@ -90,6 +92,10 @@ class TaskIo:
     def print_line(self, values: tuple[Value, ...], separators: str) -> None:
         """Print to the task's log."""
         self._task.printed.append(format_print(values, separators))
+
+    def set_event(self, name: str) -> None:
+        """Set a software event (SET)."""
+        self._task.events.event(name).set(self._memory.now_ns)
 
     def errors_logged(self) -> bool:
         """Return whether the error log holds an entry (TST_ERRLOG@)."""
@@ -167,6 +173,7 @@ class Task:
         slot: int = 0,
         priority: int = 11,
         backplane: Backplane = NO_MODULES,
+        events: Events | None = None,
     ) -> None:
         """Install the task: its state is as at installation (2.4.5)."""
         self.memory = memory
@@ -174,6 +181,7 @@ class Task:
         self.slot = slot
         self.priority = priority
         self.backplane = backplane
+        self.events = Events() if events is None else events
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
         self._recording = False
         self._scans: Generator[bool, None, None] | None = None
@@ -191,7 +199,7 @@ class Task:
         self.status = Status.STOPPED
         self.scan_number = 0
         self._forced = any(map(self.memory.is_forced, self.written))
-        self._io: TaskIo = RecordingIo(self) if self._recording else TaskIo(self)
+        self._io: TaskIo = self._make_io()
 
     @property
     def name(self) -> str:
@@ -220,8 +228,8 @@ class Task:
     def record_scans(self, *, on: bool = True) -> None:
         """Begin or end to keep a record of each scan."""
         self._put_down()
-        self._io = RecordingIo(self) if on else TaskIo(self)
         self._recording = on
+        self._io = self._make_io()
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
         """Put the task into RUN: blocks start again, the statements before SCAN_LOOP execute once.
@@ -354,6 +362,22 @@ class Task:
         """Scan from now on in the form that heeds forces, or in the quick one."""
         self._put_down()
         self._forced = any(map(self.memory.is_forced, self.written))
+
+    def waiting(self) -> list[int]:
+        """Return, as numbers, what a suspended task waits for; a control-block task is never suspended."""
+        return []
+
+    def wait_again(self, numbers: Sequence[int]) -> None:
+        """Take over what ``waiting`` gave.
+
+        Raises:
+            ValueError: a task cannot wait for that.
+        """
+        if numbers:
+            raise ValueError(f"task {self.name} cannot wait: it is no BASIC task")
+
+    def _make_io(self) -> TaskIo:
+        return RecordingIo(self) if self._recording else TaskIo(self)
 
     def _put_down(self) -> None:
         """Let the compiled scan store the state that it holds."""

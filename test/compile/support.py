@@ -13,6 +13,7 @@ from automax_ros.core.types import Value
 from automax_ros.language.checks.checker import check
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Scope
+from automax_ros.running.basic_task import BasicTask
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
 from automax_ros.running.views import ViewSpec
@@ -26,10 +27,12 @@ def repeatable(examples: int) -> settings:
     return settings(deadline=None, derandomize=True, max_examples=examples, database=None)
 
 
-def program_of(text: str, name: str = "TASK", target: Platform = Platform.AUTOMAX) -> Program:
+def program_of(
+    text: str, name: str = "TASK", target: Platform = Platform.AUTOMAX, suffix: str = ".blk", tick_ns: int = TICK
+) -> Program:
     """The checked program of a task; fails on an error, not on a warning. Every Processor has the same tick here."""
-    source = SourceText("task.blk", text)
-    result = check(source, name=name, catalogue=CATALOGUE, tick_ns=TICK, target=target)
+    source = SourceText(f"task{suffix}", text)
+    result = check(source, name=name, catalogue=CATALOGUE, tick_ns=tick_ns, target=target)
     assert result.program is not None, render_all(result.diagnostics, source)
     return result.program
 
@@ -56,6 +59,19 @@ def task_of(
     for name, value in commons.items():
         memory.write_from_outside(memory.view(name), value, OTHER)
     return Task(compiled, memory, writer=WRITER), memory
+
+
+def basic_task_of(
+    text: str, *, name: str = "TASK", memory=None, cost_model=None, channels=None, events=None, **commons: Value
+) -> tuple[BasicTask, CommonMemory]:
+    """A BASIC task and a memory made of its own COMMON statements, or in a memory that has them."""
+    program = program_of(text, name, suffix=".bas")
+    memory = memory or CommonMemory(views_of(program))
+    views = {spec.name: memory.view(spec.name) for spec in views_of(program)}
+    for variable, value in commons.items():
+        memory.write_from_outside(memory.view(variable), value, OTHER)
+    compiled = compile_program(program, views, cost_model)
+    return BasicTask(compiled, memory, writer=WRITER, channels=channels, events=events), memory
 
 
 def lines(*statements: str, declare: str = "LOCAL A%, B%, C%, D!, E!, R, Q, X@, Y@, S$, T%(10)") -> str:

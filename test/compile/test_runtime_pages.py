@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import pytest
-from core.problem_pages import PAGES, read_page
+from core.problem_pages import PAGES, Fence, read_page
 
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.running.task import Status
 
-from .support import task_of
+from .support import basic_task_of, task_of
 
 SCANS = 20
 CODES = [code for code in PROBLEMS if code.startswith("AMX7")]
-WITHOUT_EXAMPLE = {"AMX7042", "AMX7070"}
+WITHOUT_EXAMPLE = {"AMX7042", "AMX7051", "AMX7052", "AMX7070"}
 """No task can provoke these by itself: the host does, or the rack."""
 
 
-def codes_of(text: str) -> tuple[set[int], Status]:
-    """What a task logs over some scans, and how it ends."""
-    task, _ = task_of(text)
+def codes_of(fence: Fence) -> tuple[set[int], bool]:
+    """What a task logs over some scans, or bursts of a BASIC task, and whether it is faulted then."""
+    task, _ = task_of(fence.text) if fence.language == "blk" else basic_task_of(fence.text)
     task.record_scans()
     records = [task.run(), *(task.scan(number * task.period_ns) for number in range(1, SCANS + 1))]
-    return {code for record in records if record is not None for _, code in record.errors}, task.status
+    return {
+        code for record in records if record is not None for _, code in record.errors
+    }, task.status is Status.FAULTED
 
 
 def test_only_what_no_task_provokes_has_no_example():
@@ -31,23 +33,23 @@ def test_only_what_no_task_provokes_has_no_example():
 
 @pytest.mark.parametrize("code", sorted(set(CODES) - WITHOUT_EXAMPLE))
 def test_example_logs_its_code_alone(code):
-    found, status = codes_of(read_page(code).example.text)
+    found, faulted = codes_of(read_page(code).example)
     assert found == {int(code[3:])}
-    assert (status is Status.FAULTED) == (code == "AMX7040")
+    assert faulted == (code == "AMX7040")
 
 
 @pytest.mark.parametrize("code", sorted(set(CODES) - WITHOUT_EXAMPLE))
 def test_cure_logs_nothing(code):
-    assert codes_of(read_page(code).cure.text) == (set(), Status.RUNNING)
+    assert codes_of(read_page(code).cure) == (set(), False)
 
 
 def test_what_the_runtime_logs_has_a_page():
     """Every number of a problem in the runtime's own modules is in the table."""
     from automax_ros.blocks import declaration
-    from automax_ros.compile import expressions, functions, loops, statements
-    from automax_ros.running import task
+    from automax_ros.compile import expressions, functions, loops, statements, waiting
+    from automax_ros.running import channels, task
 
-    modules = (declaration, expressions, functions, loops, statements, task)
+    modules = (declaration, expressions, functions, loops, statements, waiting, channels, task)
     numbers = {value for module in modules for value in vars(module).values() if isinstance(value, int)}
     logged = {f"AMX{number}" for number in numbers if 7000 <= number < 8000}
     assert logged <= set(CODES)

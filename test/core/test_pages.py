@@ -34,7 +34,7 @@ def whole(code: str, text: str) -> str:
 def checked(fence: Fence) -> CheckResult:
     tick_ns = 500_000 if fence.target is Platform.UDC else 5_500_000
     return check(
-        SourceText("task.blk", fence.text),
+        SourceText(f"task.{fence.language}", fence.text),
         name="TASK",
         catalogue=CATALOGUE,
         target=fence.target,

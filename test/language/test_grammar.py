@@ -17,9 +17,12 @@ from automax_ros.language.syntax.lexer import LineLexer
 from automax_ros.language.syntax.parser import parse
 from automax_ros.language.syntax.statements import SIMPLE_STATEMENTS
 from automax_ros.language.syntax.tokens import BOOLEAN_WORDS, OPERATOR_WORDS, RESERVED_WORDS, STATEMENT_WORDS
+from automax_ros.language.syntax.unknown import FOREIGN_WORDS
+from automax_ros.language.syntax.waiting import WAITING_KEYS, WAITING_STATEMENTS
 
 from .grammar import OTHER_ANSWERS, RULES, TOKENS, Recognizer, has_a_key_twice, is_token, text_of, tokens_of, words
 
+WAITING = "task statement"
 STATEMENTS = ("simple statement", "one-line if")
 
 
@@ -27,8 +30,8 @@ def repeatable(examples: int) -> settings:
     return settings(max_examples=examples, deadline=None, derandomize=True, database=None)
 
 
-def errors(text: str) -> list[str]:
-    found = parse(SourceText("TASK.BLK", text))[1]
+def errors(text: str, name: str = "TASK.BLK") -> list[str]:
+    found = parse(SourceText(name, text))[1]
     return [item.message for item in found if PROBLEMS[item.code].severity is Severity.ERROR]
 
 
@@ -39,21 +42,21 @@ def is_word(text: str) -> bool:
 def test_every_word_of_the_parser_stands_in_the_grammar_and_no_other() -> None:
     reserved = STATEMENT_WORDS | OPERATOR_WORDS | BOOLEAN_WORDS.keys() | {"THEN", "TO", "STEP"}
     assert reserved == RESERVED_WORDS
-    keys = {*EVENT_KEYS, *TUNING_KEYS, "NAME"}
+    keys = {*EVENT_KEYS, *TUNING_KEYS, "NAME", "SET", *WAITING_STATEMENTS, *WAITING_KEYS, "OUTPUT"}
     assert {word for word in words() if is_word(word)} == reserved | FUNCTIONS.keys() | keys
-    assert SIMPLE_STATEMENTS.keys() <= words()
+    assert SIMPLE_STATEMENTS.keys() | WAITING_STATEMENTS.keys() <= words()
 
 
 def test_every_operator_and_mark_stands_in_the_grammar() -> None:
     signs = {word for word in words() if not is_word(word)}
     assert {operator for operator in LEVELS if not is_word(operator)} <= signs
-    assert signs - LEVELS.keys() == set("()[],;:!\\")
+    assert signs - LEVELS.keys() == set("()[],;:!\\#")
 
 
 def test_every_rule_and_token_is_used_and_known() -> None:
-    used = {"task", *TOKENS, "end of line"}
+    used = {"task", "task statement", *TOKENS, "end of line"}
     waiting = [*RULES.values()]
-    named = {"task"}
+    named = {"task", "task statement"}
     while waiting:
         node = waiting.pop()
         waiting += node.parts
@@ -98,9 +101,9 @@ def test_tokens_are_those_of_the_lexer(kind: str) -> None:
 OTHERS = [*sorted(words() - {"!", "REM"}), "5", "1.5", "0FFH", "'TEXT'", "A", "A%", "A$"]
 
 
-def near_miss(random: Random) -> list[str]:
+def near_miss(random: Random, rules: tuple[str, ...] = STATEMENTS) -> list[str]:
     """A statement with a token left out, repeated, exchanged with the next or replaced by another."""
-    tokens = tokens_of(random.choice(STATEMENTS), random)
+    tokens = tokens_of(random.choice(rules), random)
     at = random.randrange(len(tokens))
     way = random.choice(["left out", "repeated", "exchanged", "replaced"])
     if way == "left out":
@@ -140,6 +143,26 @@ def check_near_misses(number: int) -> None:
 
 def test_the_parser_refuses_what_the_grammar_does_not_allow_and_nothing_else() -> None:
     check_near_misses(500)
+
+
+def test_statements_of_basic_tasks_are_those_of_the_grammar() -> None:
+    for seed in range(200):
+        tokens = tokens_of(WAITING, Random(seed))
+        text = f"10 {' '.join(tokens)}"
+        assert Recognizer(tokens).accepts(WAITING), text
+        assert errors(text, "TASK.BAS") == [], text
+        assert errors(text, "TASK.BLK"), text
+
+
+def test_near_misses_of_statements_of_basic_tasks_are_refused() -> None:
+    refused = 0
+    for seed in range(400):
+        tokens = near_miss(Random(seed), (WAITING,))
+        if tokens and not re.search(r"[<>=] [<>=]", " ".join(tokens)) and not FOREIGN_WORDS.keys() & {tokens[0]}:
+            allowed = any(Recognizer(tokens).accepts(rule) for rule in (WAITING, "statement"))
+            refused += not allowed
+            assert (errors(f"10 {' '.join(tokens)}", "TASK.BAS") == []) is allowed, " ".join(tokens)
+    assert refused > 130
 
 
 @pytest.mark.soak

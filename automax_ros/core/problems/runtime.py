@@ -25,5 +25,10 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX7031", "bus error", hardware="31"),
     Problem("AMX7040", "scan stopped: too many statements", hardware="14"),
     Problem("AMX7070", "overlap: the last scan was still under way", hardware="14"),
+    Problem("AMX7050", "channel or port is not open"),
+    Problem("AMX7051", "another task reads the channel"),
+    Problem("AMX7052", "TYPE is not the channel's"),
+    Problem("AMX7053", "DEPTH of a channel out of range"),
+    Problem("AMX7054", "time of DELAY or START EVERY out of range"),
     Problem("AMX7042", "deadline missed on the wall clock"),
 )

@@ -1,0 +1,86 @@
+"""BASIC tasks as Python functions: what such a task does from one suspension to the next, a burst.
+
+Two functions come from one lowering of the statements:
+
+- ``burst(state, io)``: a burst at one instant;
+- ``burst_steps(state, io)``: the same as a generator, which yields the modeled time in ns that has passed before each
+  access to what others can see, and before the burst ends.
+
+Both begin where the ``PC`` of the state tells and return what the task waits for then: a ``Suspension`` with its
+number. All that must outlast a suspension is in the state: the PC, GOSUB's stack, limits and steps of FOR, which files
+are open. So a task that waits can be kept, loaded and executed again.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+from collections.abc import Mapping
+
+from automax_ros.compile import build
+from automax_ros.compile.assembly import called, local_field, made, stores
+from automax_ros.compile.cost import CostModel
+from automax_ros.compile.emitter import Emitter
+from automax_ros.compile.flow import PC
+from automax_ros.compile.layout import Layout, Role, StateField
+from automax_ros.compile.pynames import variable_name
+from automax_ros.compile.scan_io import Suspension
+from automax_ros.compile.waiting import EVERY, GOSUB, WaitingLowering
+from automax_ros.core.types import DataType
+from automax_ros.language.program import Program
+from automax_ros.language.syntax.tree import Scope
+
+
+class BackgroundCompilation:
+    """Compiles one BASIC task."""
+
+    names: tuple[str, ...] = ("burst", "burst_steps")
+
+    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel) -> None:
+        """Take a checked BASIC task and the rack's views."""
+        self._program = program
+        self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
+        self._cost = cost_model
+        self._fields: dict[str, StateField] = {
+            variable_name(symbol.name): local_field(symbol)
+            for symbol in program.symbols.values()
+            if symbol.scope is Scope.LOCAL
+        }
+        self._fields[PC] = StateField("PC", DataType.DOUBLE, Role.STACK, 0)
+        self._globals: dict[str, object] = {}
+        self.definitions("burst")
+        self.layout = Layout(tuple(self._fields.values()))
+
+    def functions(self, *names: str) -> dict[str, object]:
+        """Compile ``burst``, ``burst_steps``, or both."""
+        return made(self.definitions(*names), self._program.name, self._globals)
+
+    def definitions(self, *names: str) -> list[ast.FunctionDef]:
+        """Return the functions as trees."""
+        return [self._function(name, modeled=name == "burst_steps") for name in names]
+
+    def _function(self, name: str, *, modeled: bool) -> ast.FunctionDef:
+        emitter = Emitter(self._program, self._views, modeled, self._cost)
+        lowering = WaitingLowering(emitter, {})
+        lowering.lower_all(self._program.scan)
+        self._fields.update(lowering.fields)
+        self._fields[PC] = dataclasses.replace(self._fields[PC], below=lowering.blocks + 1)
+        body = [*emitter.body, *self._end(emitter)]
+        self._globals.update(called(emitter))
+        self._globals.update(emitter.extra_globals)
+        opening = [build.assign_all(list(self._fields), build.name("state")), build.assign("steps", build.constant(0))]
+        if modeled:
+            opening.append(build.assign("cost", build.constant(0)))
+        kept = stores(list(self._fields), body)
+        return build.function(name, ["state", "io"], [*opening, build.finally_do(body, kept)])
+
+    def _end(self, emitter: Emitter) -> list[ast.stmt]:
+        """Return END: a subroutine is left with it; the next run begins after the START EVERY, if there is one."""
+        emitter.body = []
+        emitter.checkpoint()
+        if GOSUB in self._fields:
+            emitter.emit(build.assign(GOSUB, build.constant(0)))
+        if EVERY in self._fields:
+            emitter.emit(build.when(build.name(EVERY), [build.assign(PC, build.name(EVERY))]))
+        pair = ast.Tuple([build.constant(int(Suspension.END)), build.constant(0)], build.LOAD)
+        return [*emitter.body, ast.Return(pair)]

@@ -1,0 +1,126 @@
+"""What compiled tasks and those who run them agree on: the state, what a task may touch, how it can end."""
+
+from __future__ import annotations
+
+import enum
+from typing import Protocol
+
+from automax_ros.compile.layout import StateValue
+from automax_ros.core.types import Latched, Value
+
+StateValues = list[StateValue]
+
+
+class ScanTooLong(Exception):
+    """A scan executed more statements than a scan may; ``line`` is the BASIC line it was at."""
+
+    def __init__(self, line: int) -> None:
+        """Take the BASIC line number."""
+        super().__init__(f"more statements than a scan may execute, at line {line}")
+        self.line = line
+
+
+class ScanIo(Protocol):
+    """What a compiled scan touches apart from its own state."""
+
+    def latch(self) -> Latched:
+        """Return the latched commons in the order of ``CompiledTask.latched``."""
+        ...
+
+    def forces(self) -> tuple[bool, ...]:
+        """Return which of ``CompiledTask.written`` a force holds."""
+        ...
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Write back what blocks changed: pairs of view and value; called only if something changed."""
+        ...
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Read actual memory."""
+        ...
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Write actual memory."""
+        ...
+
+    def log(self, line: int, code: int) -> None:
+        """Log a run-time error."""
+        ...
+
+    def print_line(self, values: tuple[Value, ...], separators: str) -> None:
+        """Print to the task's log; a separator (``,`` ``;`` or a blank) follows each value."""
+        ...
+
+    def errors_logged(self) -> bool:
+        """Return whether the error log holds an entry."""
+        ...
+
+    def clear_errors(self) -> None:
+        """Clear the error log."""
+        ...
+
+    def set_event(self, name: str) -> None:
+        """Set a software event."""
+        ...
+
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+        """Return a register of an I/O module, and the problem or 0."""
+        ...
+
+    def io_write(self, slot: int, register: int, value: int) -> int:
+        """Write a register of an I/O module; return the problem or 0."""
+        ...
+
+
+class Suspension(enum.IntEnum):
+    """Why a BASIC task gives the Processor up, and what the number beside it says."""
+
+    END = 0
+    """END: it goes on when its START EVERY says so, else its run is over."""
+    STOP = 1
+    """STOP: its run is over."""
+    DELAY = 2
+    """It goes on after so many ns."""
+    EVENT = 3
+    """It waits for the event of this index in ``Program.events``."""
+    EMPTY = 4
+    """It waits for a message of the channel of this number."""
+    FULL = 5
+    """It waits for room in the channel of this number."""
+    ABSENT = 6
+    """It waits for another task to open the channel of this number for input."""
+    PORT = 7
+    """It waits for a character of a port, for ever."""
+    BUSY = 8
+    """It has executed so many statements that others get their turn."""
+
+
+Wish = tuple[int, int]
+"""A ``Suspension`` and its number: what a BASIC task waits for."""
+
+MUST_WAIT = -1
+"""What an access to a channel returns in place of a problem where the task must wait."""
+
+
+class BackgroundIo(ScanIo, Protocol):
+    """What a BASIC task touches besides."""
+
+    def start_every(self, period_ns: int) -> None:
+        """Register that the task goes on each period from now."""
+        ...
+
+    def open_reader(self, number: int, types: str, depth: int) -> int:
+        """Make this task the reader of a channel; return the problem or 0. ``types``: type characters, `.` for REAL."""
+        ...
+
+    def open_writer(self, number: int, types: str) -> int:
+        """Find a channel to write to; return the problem, 0, or MUST_WAIT while nobody reads it."""
+        ...
+
+    def receive(self, number: int) -> tuple[tuple[Value, ...], int]:
+        """Take the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
+        ...
+
+    def send(self, number: int, message: tuple[Value, ...]) -> int:
+        """Put a message into a channel; return 0, the problem, or MUST_WAIT where it is full."""
+        ...
