@@ -11,7 +11,6 @@ from functools import partial
 from typing import cast
 
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.functions import text_of
 from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.kinds import WriteKind
@@ -20,14 +19,13 @@ from automax_ros.core.types import DataType, Latched, Value
 from automax_ros.running.backplane import BUS_ERROR, NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.events import Events
+from automax_ros.running.printing import format_print
 from automax_ros.running.views import Memory
 
 SCAN_TOO_LONG = 7040
 OVERLAP = 7070
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
-PRINT_ZONE = 14
-"""Columns of a zone of PRINT, to the next of which a comma leads (decision)."""
 
 
 class Status(enum.Enum):
@@ -368,11 +366,7 @@ class Task:
         return []
 
     def wait_again(self, numbers: Sequence[int]) -> None:
-        """Take over what ``waiting`` gave.
-
-        Raises:
-            ValueError: a task cannot wait for that.
-        """
+        """Take over what ``waiting`` gave; ValueError where a task cannot wait for that."""
         if numbers:
             raise ValueError(f"task {self.name} cannot wait: it is no BASIC task")
 
@@ -401,13 +395,3 @@ def snapshot_layout(compiled: CompiledTask) -> Layout:
     """Return the layout of a task's snapshots: the state, then the error log."""
     log = StateField(LOG_FIELD, DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
     return Layout((*compiled.layout.fields, log))
-
-
-def format_print(values: tuple[Value, ...], separators: str) -> str:
-    """Return a line of PRINT: a comma leads to the next zone of 14 columns, a semicolon joins (decision)."""
-    line = ""
-    for value, separator in zip(values, separators, strict=True):
-        line += text_of(value)
-        if separator == ",":
-            line = line.ljust((len(line) // PRINT_ZONE + 1) * PRINT_ZONE)
-    return line
