@@ -10,6 +10,7 @@ Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, a
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
@@ -23,6 +24,7 @@ from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.ros_names import set_topic
+from automax_ros.rack.scale import Scale
 from automax_ros.rack.writers import ROS_WRITER
 from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED, QosProfile
@@ -86,7 +88,7 @@ class _Inlet:
     def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
         self._node, self._view, self._variable = node, view, variable
         self._name, self._kind = set_topic(topic.name), message_class(topic.type_name)
-        self._hears_best_effort = self._is_best_effort = False
+        self._hears_best_effort = self._is_best_effort = self._has_clamped = False
         self._throttle = Throttle(REFUSAL_INTERVAL_S)
         node.create_subscription(
             self._kind,
@@ -114,12 +116,32 @@ class _Inlet:
 
     def _write(self, message: Any) -> None:
         try:
-            self._node.site.rack.write_view(self._view, _elements(self._variable, message), ROS_WRITER)
+            scale = self._variable.scale
+            values = _elements(self._variable, message) if scale is None else [(0, self._counts(scale, message.data))]
+            self._node.site.rack.write_view(self._view, values, ROS_WRITER)
         except MemoryValueError as error:
             refusal = f"write refused: {error}"
             self._node.site.health.note("refused write", self._variable.name, lambda: refusal)
             if self._throttle.passes():
                 self._node.get_logger().warning(refusal)
+
+    def _counts(self, scale: Scale, value: float) -> int:
+        """Return the counts of a value in the engineer's unit; one beyond their range is clamped, and told once.
+
+        Raises:
+            MemoryValueError: not a finite number.
+        """
+        if not math.isfinite(value):
+            raise MemoryValueError(f"{value!r} is not a value for {self._variable.name}")
+        counts, clamped = scale.counts_of(value)
+        if clamped:
+            text = f"{self._name}: {value:.8g} {self._variable.unit}".rstrip()
+            text += f" lies beyond the scale: {self._variable.name} is {counts} counts"
+            self._node.site.health.note("clamped value", self._variable.name, lambda: text)
+            if not self._has_clamped:
+                self._has_clamped = True
+                self._node.get_logger().warning(text)
+        return counts
 
 
 def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:

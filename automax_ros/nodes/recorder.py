@@ -181,7 +181,8 @@ class LiveRecorder:
         Raises:
             RecordingError: the folder exists already or cannot be written.
         """
-        self._topics = topics = LiveTopics(self._space, table_of(self._table))
+        offered = dict(self._node.get_topic_names_and_types())
+        self._topics = topics = LiveTopics(self._space, table_of(self._table), offered)
         self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
         kinds = topics.all
         # The rack answers each new reader of these: an image first, then states and full scans that follow it.

@@ -17,6 +17,7 @@ from automax_ros.rack.points import KEYS, PointReader
 from automax_ros.rack.presets import preset_value
 from automax_ros.rack.reserved import is_reserved
 from automax_ros.rack.scalars import boolean_value, number_value, text_value, wrong_kind
+from automax_ros.rack.scale import Scale, scale_of
 from automax_ros.rack.sections import Section, entries_of, report_twice
 
 UNIT_LIMIT = 16
@@ -25,7 +26,7 @@ DESCRIPTION_LIMIT = 200
 MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
 """Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
 
-OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "description", *KEYS)
+OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "scale", "description", *KEYS)
 _DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
 _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 
@@ -73,6 +74,7 @@ class CommonReader:
             description=self._text(section, "description", declared.name, DESCRIPTION_LIMIT),
             line=key.span.line,
             point=self._points.read(section, declared, key.span),
+            scale=self._scale(section, declared, direction),
         )
 
     def _name(self, key: Scalar) -> VariableName | None:
@@ -161,6 +163,15 @@ class CommonReader:
             message = f"rate_limit_hz of {name} has no effect: the variable has no topic"
             self._findings.add("AMX6414", message, section.key_span("rate_limit_hz"), "write ros: out as well")
         return rate
+
+    def _scale(self, section: Section, declared: VariableName, direction: Direction) -> Scale | None:
+        node = section.get("scale")
+        if node is None:
+            return None
+        if direction is Direction.CLOSED:
+            message = f"scale of {declared.name} has no effect: the variable has no topic"
+            self._findings.add("AMX6451", message, section.key_span("scale"), "write ros: out or ros: in too")
+        return scale_of(node, declared, section.key_span("scale"), self._findings)
 
     def _flag(self, section: Section, key: str, name: str) -> bool:
         node = section.get(key)

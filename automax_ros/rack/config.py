@@ -13,6 +13,7 @@ from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.scale import Scale
 from automax_ros.rack.task_config import TaskConfig
 
 MAX_SLOT = 15
@@ -53,6 +54,7 @@ class CommonVariable:
     different values one for each element in the order of memory (last subscript fastest), None where the file has none.
     ``point`` is its place on a module, None for common memory itself. A variable with ``bank`` is all the registers of
     the module in that slot; its name, ``SLOT:5%``, is one that no task can declare.
+    ``scale`` is what its counts mean on ROS 2, None where the topic has the variable's own type.
     """
 
     name: str
@@ -68,6 +70,7 @@ class CommonVariable:
     line: int = 0
     point: Point | None = None
     bank: int | None = None
+    scale: Scale | None = None
 
     @property
     def is_array(self) -> bool:

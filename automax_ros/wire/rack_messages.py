@@ -45,6 +45,8 @@ from automax_ros.wire.messages import (
 )
 
 Message = tuple[object, ...]
+SCALED_TYPE = NAMES[Float32]
+"""The ROS type of a variable with a scale: a number in the engineer's unit."""
 _SCALARS: dict[DataType, Any] = {
     DataType.INTEGER: Int16,
     DataType.DOUBLE: Int32,
@@ -89,6 +91,13 @@ def value_type_name(kind: DataType, *, is_array: bool) -> str | None:
     """Return the ROS type of a variable's topic, None for arrays of strings, which std_msgs cannot carry."""
     message = (_ARRAYS if is_array else _SCALARS).get(kind)
     return NAMES[message] if message else None
+
+
+def topic_type_name(variable: CommonVariable) -> str | None:
+    """Return the ROS type of a variable's topic: Float32 where it has a scale. None for arrays of strings."""
+    if variable.scale is not None:
+        return SCALED_TYPE
+    return value_type_name(variable.type, is_array=variable.is_array)
 
 
 def message_maker(variable: CommonVariable) -> Callable[[Any], Message]:

@@ -22,7 +22,7 @@ from automax_ros.running.views import Write
 from automax_ros.wire.cdr import Message, encode, encoder
 from automax_ros.wire.messages import NAMES, CommonWrite, Scan
 from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE, QosProfile
-from automax_ros.wire.rack_messages import RackMessages, message_maker, value_type_name
+from automax_ros.wire.rack_messages import RackMessages, message_maker, topic_type_name
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
 """Time between two images of memory, with full latches and the tasks' states, in the stream, ns (decision: replay may
@@ -58,6 +58,7 @@ class _ValueTopic:
         self.topic = topic
         self.takes: list[Take] = []
         self.make = message_maker(variable)
+        self.scale = variable.scale
         self.encode = encoder(topic.type_name)
         self.interval_ns = round(NS_PER_S / variable.rate_limit_hz) if variable.rate_limit_hz else 0
         self.last_ns = -1
@@ -249,7 +250,7 @@ class RackStream:
         names = topic_names(variable.name for variable in variables)
         topics = {}
         for view, variable in enumerate(variables):
-            type_name = value_type_name(variable.type, is_array=variable.is_array)
+            type_name = topic_type_name(variable)
             if variable.direction is not Direction.CLOSED and type_name is not None:
                 topics[view] = _ValueTopic(variable, Topic(f"{space}/{names[variable.name]}", type_name, VALUE))
         return topics
@@ -293,6 +294,8 @@ class RackStream:
         value.waits = False
         present = self._rack.memory.present(view)
         # A message of a simple variable has one field: a plain tuple is as good, and cheaper.
+        if value.scale is not None and isinstance(present, int):
+            present = value.scale.value_of(present)
         payload = value.encode(value.make(present) if value.variable.is_array else (present,))
         if payload != value.last_payload:
             value.last_ns, value.last_payload = now_ns, payload

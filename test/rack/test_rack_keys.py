@@ -104,6 +104,12 @@ CHANGES: dict[str, tuple[tuple[str, str], Callable[[Behaviour], object], object,
     "preset": (("ros: out", "ros: out, preset: 7"), lambda found: found.count, 44, 51),
     "non_volatile": (("ros: out", "ros: out, non_volatile: true"), lambda found: found.after_stop, 0, 44),
     "unit": (("ft", "m"), lambda found: found.variable.unit, "ft", "m"),
+    "scale": (
+        ("ros: out", "ros: out, scale: {counts: [0, 11], value: [0.0, 0.5]}"),
+        lambda found: [message.data for message in found.on("common/COUNT")][:3],
+        [0, 1, 11],
+        [0.0, pytest.approx(0.5 / 11), 0.5],
+    ),
     "description": (("length", "speed"), lambda found: found.variable.description, "length", "speed"),
 }
 """For each key: the text that is replaced and by what, what is looked at, what it is before and after."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
 from automax_ros.wire.messages import Variable, VariableTable
 from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE, QosProfile
-from automax_ros.wire.rack_messages import value_type_name
+from automax_ros.wire.rack_messages import SCALED_TYPE, value_type_name
 
 MAX_VALUE_TOPICS = 2000
 """Most topics of common variables that a recorder listens to (decision: ROS serves no more at the pace of scans)."""
@@ -25,9 +26,12 @@ class TopicKind:
 class LiveTopics:
     """Topics by name, of the rack whose namespace is ``space`` (with its slash, such as ``/pm1``)."""
 
-    def __init__(self, space: str, table: VariableTable | None = None) -> None:
+    def __init__(
+        self, space: str, table: VariableTable | None = None, offered: Mapping[str, Collection[str]] | None = None
+    ) -> None:
         """Name the topics; without a table those of common variables are not known.
 
+        ``offered`` are the types of topics that the ROS graph has: the table does not say which variables have a scale.
         ``left_out`` is how many topics of common variables lie beyond the limit.
         """
         self.variables = f"{space}/variables"
@@ -37,7 +41,7 @@ class LiveTopics:
         self.states = f"{space}/states"
         self.operations = f"{space}/operations"
         self.config = f"{space}/config"
-        found = _values(space, table) if table else {}
+        found = _values(space, table, offered or {}) if table else {}
         self.values = dict(list(found.items())[:MAX_VALUE_TOPICS])
         self.left_out = len(found) - len(self.values)
 
@@ -55,11 +59,13 @@ class LiveTopics:
         }
 
 
-def _values(space: str, table: VariableTable) -> dict[str, TopicKind]:
+def _values(space: str, table: VariableTable, offered: Mapping[str, Collection[str]]) -> dict[str, TopicKind]:
     """The topics of common variables; a topic outside of the rack's ``common`` is none of a rack."""
     found = {}
     for variable in table.variables:
         type_name = _value_type_name(variable)
+        if type_name and not variable.dimensions and SCALED_TYPE in offered.get(variable.topic, ()):
+            type_name = SCALED_TYPE
         if variable.direction != Direction.CLOSED and type_name and variable.topic.startswith(f"{space}/common/"):
             found[variable.topic] = TopicKind(type_name, VALUE)
     return found

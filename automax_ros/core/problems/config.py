@@ -61,6 +61,8 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6421", "register or bit of an I/O point"),
     Problem("AMX6422", "variable that cannot be an I/O point"),
     Problem("AMX6423", "register or bit with two names"),
+    Problem("AMX6450", "scale of a common variable"),
+    Problem("AMX6451", "scale without a topic", Severity.WARNING),
     # tasks of a rack: hardware events
     Problem("AMX6440", "INTERRUPT_STATUS that is not an I/O point"),
     Problem("AMX6441", "INTERRUPT_STATUS that is not an interrupt status register"),

@@ -1,8 +1,9 @@
 """Analog modules: two inputs (57C409) or four outputs (57C410), 4095 counts at full scale (57C409 manual p. 3-3).
 
 A 57C409 has its two inputs in the registers 0 and 1, their status in 4 and a control register for each in 5 and 6; that
-2 and 3 are their update periods is ours (decision). Each channel has an interrupt, at which its input freezes; the
-module drives the common clock while bit 6 is set in both control registers (p. 3-3). The registers of a 57C410 are ours
+2 and 3 are their update periods is ours (decision). Each channel has an interrupt, at which its input freezes. The
+module drives the common clock while bit 6 is set in one of the control registers; the manual sets it in both (p. 3-3,
+decision). The registers of a 57C410 are ours
 too (decision): four outputs in 0 to 3.
 """
 

@@ -1,0 +1,101 @@
+"""A variable with a scale over real DDS: Float32 both ways, clamped and told once, refused if not finite."""
+
+import math
+import time
+from pathlib import Path
+
+import pytest
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack
+
+RACK = """\
+rack: SCALED
+slots:
+  0: {module: 57C435, tasks: {T: {priority: 5}}}
+  6: {module: 57C409}
+  7: {module: 57C410}
+common:
+  PRESSURE%: {slot: 6, register: 0, ros: in, scale: {counts: [0, 4095], value: [0.0, 10.0]}, unit: bar}
+  SPEED%: {slot: 7, register: 3, ros: out, scale: {counts: [-4095, 4095], value: [-1750.0, 1750.0]}, unit: rpm}
+"""
+TASK = "10 COMMON PRESSURE%, SPEED%\n20 CALL SCAN_LOOP(TICKS=1)\n30 SPEED% = -PRESSURE%\n40 END\n"
+
+
+@pytest.fixture
+def live(ros_domain_id, tmp_path: Path):
+    from automax_ros.nodes.launcher import LiveRack
+
+    (tmp_path / "T.BLK").write_text(TASK)
+    (tmp_path / "rack.yaml").write_text(RACK)
+    config = load(tmp_path / "rack.yaml").config
+    made = LiveRack(Rack(config))
+    made.start([])
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def client(ros_domain_id):
+    from system.support import Client
+
+    with Client() as made:
+        yield made
+
+
+def until(live, client, condition):
+    def on_idle(_: int) -> None:
+        for _ in range(5):
+            client.executor.spin_once(timeout_sec=0)
+        live.stopping = bool(condition())
+
+    live.stopping = False
+    live.run(live.rack.now_ns + 60 * NS_PER_S, on_idle)
+    assert condition(), "it never came true"
+
+
+def test_bars_in_and_revolutions_out(live, client):
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+    from std_msgs.msg import Float32
+
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    speeds: list[float] = []
+    pressures: list[float] = []
+    client.node.create_subscription(Float32, "/scaled/common/SPEED", lambda it: speeds.append(it.data), latched)
+    client.node.create_subscription(Float32, "/scaled/common/PRESSURE", lambda it: pressures.append(it.data), latched)
+    writer = client.node.create_publisher(Float32, "/scaled/common/PRESSURE/set", 10)
+    value = live.rack.value
+
+    def send(bar: float, counts: int) -> None:
+        def arrived() -> bool:
+            writer.publish(Float32(data=bar))
+            time.sleep(0.01)
+            return value("PRESSURE%") == counts and value("SPEED%") == -counts
+
+        until(live, client, arrived)
+        until(live, client, lambda: speeds and abs(speeds[-1] + counts * 1750.0 / 4095) < 1e-3)
+        until(live, client, lambda: pressures and abs(pressures[-1] - counts * 10.0 / 4095) < 1e-5)
+
+    send(5.2, 2129)
+    assert not live.health.counts
+    send(12.5, 4095)
+    send(-1.0, 0)
+    news = live.health.news()
+    assert len(news) == 1, "it is told once"
+    assert "12.5 bar" in news[0]
+    assert "4095 counts" in news[0]
+    assert live.health.counts["clamped value"] >= 2
+    refused = live.health.counts["refused write"]
+    assert not refused
+    for wrong in (math.nan, math.inf, -math.inf):
+        before = live.health.counts["refused write"]
+
+        def told(wrong=wrong, before=before) -> bool:
+            writer.publish(Float32(data=wrong))
+            time.sleep(0.01)
+            return live.health.counts["refused write"] > before
+
+        until(live, client, told)
+    assert value("PRESSURE%") == 0
+    assert [text for text in live.health.news() if "PRESSURE%" in text]
