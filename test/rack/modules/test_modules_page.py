@@ -1,0 +1,61 @@
+"""docs/modules.md says what the modules are: its table holds their registers, its example runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from automax_ros.rack.loader import load
+from automax_ros.rack.modules.io_config import IoKind
+from automax_ros.rack.modules.kind import Registers
+from automax_ros.rack.modules.registry import KINDS
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks_check import check_tasks
+
+PAGE = (Path(__file__).parents[3] / "docs" / "modules.md").read_text(encoding="utf-8")
+MODELS = {number: model.registers for kind in KINDS if isinstance(kind, IoKind) for number, model in kind.table.items()}
+
+
+def rows() -> dict[str, dict[int, str]]:
+    """The direction of each register of each module, as the table has it."""
+    table: dict[str, dict[int, str]] = {}
+    modules: list[str] = []
+    for line in PAGE.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("| ") else []
+        if len(cells) != 4 or cells[2] not in ("input", "output", "either"):
+            continue
+        modules = re.findall(r"57C\d{3}", cells[0]) or modules
+        numbers = [int(number) for number in re.findall(r"\d+", cells[1])]
+        taken = range(numbers[0], numbers[-1] + 1) if " to " in cells[1] else numbers
+        for module in modules:
+            table.setdefault(module, {}).update(dict.fromkeys(taken, cells[2]))
+    return table
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_table_has_every_register_in_its_direction(model):
+    registers: Registers = MODELS[model]
+    assert rows()[model] == {number: registers.direction(number) for number in range(registers.count)}
+
+
+@pytest.mark.parametrize("model", [model for model, registers in MODELS.items() if registers.interrupts])
+def test_every_period_and_status_register_of_an_interrupt_is_an_output(model):
+    registers = MODELS[model]
+    for interrupt in registers.interrupts:
+        assert {interrupt.status, interrupt.period} <= set(registers.outputs)
+        assert {registers.direction(number) for number in interrupt.inputs} == {"input"}
+
+
+def test_the_example_scans_every_22_ms(tmp_path):
+    task, rack_file = (re.search(rf"```{word}\n(.*?)```", PAGE, re.S)[1] for word in ("basic", "yaml"))
+    (tmp_path / "SPEED.BLK").write_text(task)
+    (tmp_path / "rack.yaml").write_text(rack_file)
+    config = load(tmp_path / "rack.yaml").config
+    assert [item.result.diagnostics for item in check_tasks(config)] == [[]]
+    rack = Rack(config)
+    rack.start()
+    rack.write("POSITION%", 500)
+    rack.run(0.1)
+    assert (rack.task("SPEED").scan_number, rack.task("SPEED").value("LAST%")) == (4, 500)
