@@ -108,7 +108,8 @@ class Input:
     literal (both ends allowed), ``one_of`` lists the values it may have; ``symbol`` is the abbreviation in the manual's
     graphic, the name itself where the manual prints none; ``text`` says what it does. ``also`` is a second type that a
     variable may have. ``runs_on`` names the processors whose tasks may program it. ``wants_common``: the manual wants a
-    COMMON variable there. ``sample`` stands in a template, where that is not the default.
+    COMMON variable there. ``sample`` stands in a template, where that is not the default. ``drive_parameter`` is the
+    parameter of the drive, as the rack file calls it, that a constant must be equal to.
     """
 
     name: str
@@ -125,6 +126,7 @@ class Input:
     runs_on: frozenset[Platform] = EVERYWHERE
     wants_common: bool = False
     sample: Value | None = None
+    drive_parameter: str = ""
 
     @property
     def variable(self) -> str:

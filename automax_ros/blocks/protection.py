@@ -178,7 +178,14 @@ THERMAL_OVERLOAD = Block(
             form=Form.VARIABLE,
             wants_common=True,
         ),
-        Input("LIM_BAR", DataType.INTEGER, "LIM_BAR", "maximum current limit in %", default=LIM_BAR),
+        Input(
+            "LIM_BAR",
+            DataType.INTEGER,
+            "LIM_BAR",
+            "maximum current limit in %",
+            default=LIM_BAR,
+            drive_parameter="motor_overload_ratio",
+        ),
         Input("THRESHOLD", DataType.INTEGER, "THRESHOLD", "current in % above which it trips", default=THRESHOLD),
         Input(
             "TRIP_TIME",

@@ -115,6 +115,12 @@ class Layout:
             if field.role in (Role.BLOCK, Role.STACK):
                 state[position] = field.fresh()
 
+    def lose_locals(self, state: list[StateValue]) -> None:
+        """Set the locals of a state, but not its tunables, to their values at installation."""
+        for position, field in enumerate(self.fields):
+            if field.role is Role.LOCAL:
+                state[position] = field.fresh()
+
     def flatten(self, state: Sequence[StateValue]) -> list[Value]:
         """Return all values one after the other, arrays element by element."""
         values: list[Value] = []

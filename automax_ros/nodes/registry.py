@@ -11,6 +11,7 @@ from automax_ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.nodes.io_module import IoModuleNode
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.nodes.udc import UdcNode
 from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
@@ -20,6 +21,7 @@ from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.registry import SUPPORTED
 from automax_ros.rack.modules.resolver import RESOLVER
+from automax_ros.rack.modules.udc_config import UDC
 
 NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     PROCESSOR: ProcessorNode,
@@ -29,6 +31,7 @@ NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     ANALOG_IO: IoModuleNode,
     RESOLVER: IoModuleNode,
     PULSETACH: IoModuleNode,
+    UDC: UdcNode,
 }
 """The node of each kind of module; None where the rack's common memory node is enough."""
 

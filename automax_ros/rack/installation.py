@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.language.program import Program
 from automax_ros.rack.config import RackConfig, Timing
-from automax_ros.rack.interrupt_check import interrupt_findings
 from automax_ros.rack.modules.kind import ModuleConfig, cost_model
+from automax_ros.rack.task_rules import findings_by_task
 from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of, with_findings
 
 Finding = tuple[SourceText, list[Diagnostic]]
@@ -38,6 +38,7 @@ class Installation:
         self._config = config
         self._views = {variable.name: view for view, variable in enumerate(config.variables)}
         self._compiled: dict[str, CompiledTask] = {}
+        self._programs: dict[str, Program] = {}
         self.sources: dict[str, SourceText] = {}
         self.warnings: list[Finding] = []
         checked = check_tasks(config)
@@ -48,6 +49,7 @@ class Installation:
         for task, source, result in checked:
             assert result.program is not None
             self.sources[task.name] = source
+            self._programs[task.name] = result.program
             if result.diagnostics:
                 self.warnings.append((source, result.diagnostics))
             self._compiled[task.name] = self._compile(task.name, result.program)
@@ -65,11 +67,19 @@ class Installation:
         module = self._module(task)
         result = check_source(source, task, module.tick_ns, commons_of(self._config), module.times)
         if result.program is not None:
-            programs = {name: compiled.program for name, compiled in self._compiled.items()} | {task: result.program}
-            result = with_findings(result, interrupt_findings(self._config, programs)[task])
+            found = findings_by_task(self._config, self._programs | {task: result.program})
+            result = with_findings(result, found.pop(task, ()))
+            self._refuse_misfit(task, source, found)
         if result.program is None or has_errors(result.diagnostics):
             raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
+        self._programs[task] = result.program
         return self._compile(task, result.program)
+
+    def _refuse_misfit(self, task: str, source: SourceText, found: Mapping[str, Sequence[Diagnostic]]) -> None:
+        """Refuse a source with which another task, as it runs now, would have errors (decision)."""
+        wrong = [(self.sources[name], list(items)) for name, items in found.items() if has_errors(items)]
+        if wrong:
+            raise RackError(f"{source.name} does not fit the other tasks: task {task} stays as it is", wrong)
 
     def _compile(self, task: str, program: Program) -> CompiledTask:
         modeled = self._config.execution is Timing.MODELED

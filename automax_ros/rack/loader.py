@@ -16,6 +16,7 @@ from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import is_rack_name
+from automax_ros.rack.plants import Plants, read_plants
 from automax_ros.rack.ros_names import namespace
 from automax_ros.rack.scalars import boolean_value, text_value
 from automax_ros.rack.sections import Section, entries_of
@@ -24,7 +25,7 @@ from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.views import bank_variables
 
 _START = Span(1, 1, 2)
-KEYS = ("rack", "operator", "execution", "executive", "auto_run", "on_module_loss", "slots", "common")
+KEYS = ("rack", "operator", "execution", "executive", "auto_run", "on_module_loss", "slots", "plants", "common")
 """What a rack file may say at its top."""
 
 
@@ -100,7 +101,7 @@ class _RackReader:
         loss = self._module_loss(section.get("on_module_loss"))
         execution = self._execution(section.get("execution"))
         executive = self._executive(section.get("executive"))
-        modules = self._modules(section, executive)
+        modules = self._modules(section, executive, read_plants(section.get("plants"), self._findings))
         common = section.get("common")
         variables = CommonReader(modules, self._findings).read(common) if common is not None else ()
         if common is not None:
@@ -164,11 +165,11 @@ class _RackReader:
             return ModuleLoss.STOP_ALL
         return ModuleLoss(text)
 
-    def _modules(self, section: Section, executive: int) -> tuple[ModuleConfig, ...]:
+    def _modules(self, section: Section, executive: int, plants: Plants) -> tuple[ModuleConfig, ...]:
         node = section.get("slots")
         if node is None:
             return ()
-        return SlotReader(self._tasks, self._findings, executive).read(node, section.key_span("slots"))
+        return SlotReader(self._tasks, self._findings, executive, plants).read(node, section.key_span("slots"))
 
     def _check_size(self, variables: tuple[CommonVariable, ...], modules: tuple[ModuleConfig, ...], span: Span) -> None:
         """Compare the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""

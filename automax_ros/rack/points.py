@@ -57,7 +57,10 @@ class PointReader:
     def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
         """Report two registers of which a task may write only one, and a REAL where none can stand."""
         message, place = "", section.key_span("register")
-        if len({module.registers.direction(register) for register in taken}) > 1:
+        own = [register for register in taken if register in module.registers.reserved]
+        if own:
+            message = f"{declared.name}: register {own[0]} of the {module.model} belongs to the module itself"
+        elif len({module.registers.direction(register) for register in taken}) > 1:
             message = f"{declared.name} takes the registers {taken[0]} and {taken[-1]} of the {module.model}"
             message += f": an {' and an '.join(map(module.registers.direction, taken))}"
         elif declared.type is DataType.REAL and any(register not in module.registers.reals for register in taken):

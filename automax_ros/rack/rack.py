@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
@@ -139,6 +140,11 @@ class Rack:
     def tasks(self) -> list[Task]:
         """All tasks: by slot, then in starting order."""
         return [item.task for item in self.scheduled]
+
+    @property
+    def clock_since_ns(self) -> int | None:
+        """Since when the common clock of the backplane runs, None while it does not."""
+        return self._clock.since_ns
 
     @property
     def now_ns(self) -> int:
@@ -304,6 +310,7 @@ class Rack:
         *,
         memory: Memory | None = None,
         trigger: MakeTrigger | None = None,
+        then: Callable[[Task], None] | None = None,
     ) -> ScheduledTask:
         installed = Task(
             self._installation.compiled(task.name),
@@ -319,7 +326,7 @@ class Rack:
             scheduler=self.scheduler,
             trigger=trigger or self._usual_trigger,
             execution=execution,
-            after=self._after,
+            after=self._after if then is None else partial(self._after_and, then),
             stopwatch=self._stopwatch,
         )
 
@@ -330,6 +337,10 @@ class Rack:
 
     def _clock_fault(self, reason: str, code: str) -> None:
         self.operations.stop_all(reason, code)
+
+    def _after_and(self, then: Callable[[Task], None], task: Task, record: ScanRecord | None) -> None:
+        self._after(task, record)
+        then(task)
 
     def _after(self, task: Task, record: ScanRecord | None) -> None:
         if record is not None:

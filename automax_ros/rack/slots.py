@@ -8,10 +8,10 @@ from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.config import MAX_SLOT
-from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
 from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_number
+from automax_ros.rack.plants import Plants
 from automax_ros.rack.scalars import text_value, wrong_kind
 from automax_ros.rack.sections import Entry, Section, entries_of
 from automax_ros.rack.tasks import TaskReader
@@ -22,9 +22,9 @@ _SLOT = re.compile(r"[0-9]{1,3}\Z")
 class SlotReader:
     """Reads the ``slots`` section."""
 
-    def __init__(self, tasks: TaskReader, findings: Findings, executive: int = NEWEST) -> None:
+    def __init__(self, tasks: TaskReader, findings: Findings, executive: int, plants: Plants) -> None:
         """Take the reader of tasks, which knows the names of the whole rack, and the Executive's version."""
-        self._executive = executive
+        self._executive, self._plants = executive, plants
         self._tasks = tasks
         self._findings = findings
         self._standing: dict[int, Standing] = {}
@@ -80,7 +80,9 @@ class SlotReader:
         section = Section(node.entries, _described(standing), ("module", *kind.options), self._findings)
         where = f"{_described(standing)} in slot {slot}"
         return kind.read(
-            FoundModule(slot, model, section, where, key.span, self._tasks, self._findings, self._executive)
+            FoundModule(
+                slot, model, section, where, key.span, self._tasks, self._findings, self._executive, self._plants
+            )
         )
 
     def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:

@@ -13,9 +13,10 @@ MAX_TASKS = 32
 
 @dataclass(frozen=True)
 class TaskConfig:
-    """A task of a Processor: ``file`` is its source, ``priority`` is 4 (first) to 11.
+    """A task of a module: ``file`` is its source, ``priority`` is 4 (first) to 11 on a Processor.
 
-    A ``critical`` task cannot be stopped alone, only with all others (J2-3106-1 p. 8-2).
+    A UDC's tasks have a ``drive``, A or B, in place of a priority (J2-3106-1 p. 8-2): their ``priority`` is 0 and 1,
+    so that A comes before B. A ``critical`` task cannot be stopped alone, only with all others (J2-3106-1 p. 8-2).
     """
 
     name: str
@@ -23,3 +24,4 @@ class TaskConfig:
     priority: int
     line: int = 0
     critical: bool = False
+    drive: str = ""

@@ -1,10 +1,10 @@
-"""The tasks of a Processor, as its ``tasks`` section lists them."""
+"""The tasks of a module, as its ``tasks`` section lists them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import TypeGuard
+from typing import Protocol, TypeGuard
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import did_you_mean, quoted
@@ -26,9 +26,52 @@ _PATH_LIMIT = 200
 _LISTED_FILES = 1000
 
 
+@dataclass(frozen=True)
+class TaskPlace:
+    """Where a task stands among those of its module: ``priority`` orders them, ``drive`` is that of a UDC's task."""
+
+    priority: int
+    drive: str = ""
+
+
+class TaskPlaces(Protocol):
+    """How a kind of module orders its tasks.
+
+    ``key`` says it in a task's section, for example with ``sample``; ``most`` tasks run on one module.
+    """
+
+    @property
+    def key(self) -> str: ...  # noqa: D102
+
+    @property
+    def sample(self) -> str: ...  # noqa: D102
+
+    @property
+    def most(self) -> int: ...  # noqa: D102
+
+    def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
+        """Return what the key of a task says, None (reported) where it is wrong."""
+        ...
+
+
+class Priorities:
+    """A Processor's tasks: priorities, several tasks of one priority if need be."""
+
+    key, sample, most = "priority", "8", MAX_TASKS
+
+    def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
+        """Return a priority."""
+        what = f"priority of {what}"
+        found = integer_value(node, what, findings, low=MIN_PRIORITY, high=MAX_PRIORITY, code="AMX6302")
+        return None if found is None else TaskPlace(found)
+
+
+PRIORITIES = Priorities()
+
+
 @dataclass
 class TaskReader:
-    """Reads the tasks of all Processors of a rack, whose names must differ.
+    """Reads the tasks of all modules of a rack, whose names must differ.
 
     Sources lie in the folder of ``rack_file``, or of the file that it is a link to, unless ``allow_outside``. Without
     a rack file none is touched: the sources are stored under their tasks' names, whatever the rack file calls them.
@@ -39,34 +82,35 @@ class TaskReader:
     findings: Findings
     seen: dict[str, Span] = field(default_factory=dict)
 
-    def read(self, node: Node, where: str) -> tuple[TaskConfig, ...]:
-        """Return the tasks of one Processor that are right; ``where`` names it in messages."""
+    def read(self, node: Node, where: str, places: TaskPlaces = PRIORITIES) -> tuple[TaskConfig, ...]:
+        """Return the tasks of one module that are right; ``where`` names it in messages."""
         entries = entries_of(node, f"tasks of {where}", self.findings) or ()
-        if len(entries) > MAX_TASKS:
-            message = f"{where} has {len(entries)} tasks; a Processor runs at most {MAX_TASKS}"
-            self.findings.add("AMX6303", message, entries[MAX_TASKS][0].span)
-        tasks = (self._task(key, value) for key, value in entries[:MAX_TASKS])
+        if len(entries) > places.most:
+            message = f"{where} has {len(entries)} tasks; it runs at most {places.most}"
+            self.findings.add("AMX6303", message, entries[places.most][0].span)
+        tasks = (self._task(key, value, places) for key, value in entries[: places.most])
         return tuple(task for task in tasks if task is not None)
 
-    def _task(self, key: Scalar, node: Node) -> TaskConfig | None:
+    def _task(self, key: Scalar, node: Node, places: TaskPlaces) -> TaskConfig | None:
         name = self._name(key)
         what = f"task {quoted(key.text)}"
         if _is_file_name(node):
-            hint = f"write {quoted(key.text, marks='')}: {{file: {node.text}, priority: 8}}"
+            hint = f"write {quoted(key.text, marks='')}: {{file: {node.text}, {places.key}: {places.sample}}}"
             self.findings.add("AMX6008", f"{what} must be keys and values, not a file's name", node.span, hint)
             return None
         entries = entries_of(node, what, self.findings)
         if entries is None:
             return None
-        section = Section(entries, what, ("file", "priority", "critical"), self.findings)
-        section.require(("priority",), what, key.span, self.findings)
-        priority = self._priority(section.get("priority"), what)
+        section = Section(entries, what, ("file", places.key, "critical"), self.findings)
+        section.require((places.key,), what, key.span, self.findings)
+        given = section.get(places.key)
+        place = places.read(given, what, self.findings) if given is not None else None
         file = self._file(section.get("file"), key, name, what)
         critical = section.get("critical")
         is_critical = bool(critical and boolean_value(critical, f"critical of {what}", self.findings))
-        if name is None or priority is None or file is None:
+        if name is None or place is None or file is None:
             return None
-        return TaskConfig(name, file, priority, key.span.line, is_critical)
+        return TaskConfig(name, file, place.priority, key.span.line, is_critical, place.drive)
 
     def _name(self, key: Scalar) -> str | None:
         name = self.findings.upper_case(key.text, key.span)
@@ -80,12 +124,6 @@ class TaskReader:
             return None
         self.seen[name] = key.span
         return name
-
-    def _priority(self, node: Node | None, what: str) -> int | None:
-        if node is None:
-            return None
-        what = f"priority of {what}"
-        return integer_value(node, what, self.findings, low=MIN_PRIORITY, high=MAX_PRIORITY, code="AMX6302")
 
     def _file(self, node: Node | None, key: Scalar, name: str | None, what: str) -> Path | None:
         """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1)."""

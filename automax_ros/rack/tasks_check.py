@@ -15,9 +15,9 @@ from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault
-from automax_ros.rack.interrupt_check import interrupt_findings
 from automax_ros.rack.modules.kind import ModuleConfig, Registers
 from automax_ros.rack.task_config import TaskConfig
+from automax_ros.rack.task_rules import findings_by_task
 from automax_ros.rack.task_source import read_task_source
 
 
@@ -61,7 +61,7 @@ def check_tasks(config: RackConfig) -> list[CheckedTask]:
     commons = commons_of(config)
     checked = [_checked(module, task, commons, config) for module, task in config.placed_tasks]
     programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
-    found = interrupt_findings(config, programs)
+    found = findings_by_task(config, programs)
     return [item._replace(result=with_findings(item.result, found.get(item.task.name, ()))) for item in checked]
 
 

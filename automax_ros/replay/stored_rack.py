@@ -21,21 +21,21 @@ from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.text import did_you_mean
 from automax_ros.language.checks.checker import CheckResult
-from automax_ros.language.program import CommonSpec, Program
-from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Reference, Scope
-from automax_ros.language.syntax.walk import statements_in_order
+from automax_ros.language.program import CommonSpec
+from automax_ros.language.written import lines_that_write
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.loader import load_stored
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.modules.processor import MAX_PROCESSORS
+from automax_ros.rack.modules.udc_config import DRIVES, MAX_UDCS
 from automax_ros.rack.task_config import MAX_TASKS
 from automax_ros.rack.tasks_check import check_source, commons_of
 from automax_ros.wire.messages import VariableTable
 
 _RACK_FILE = "rack.yaml"
 _SOURCE = re.compile(r"([A-Z][A-Z0-9_]{0,7})\.(?:BLK|BAS)")
-_MOST_SOURCES = MAX_PROCESSORS * MAX_TASKS
+_MOST_SOURCES = MAX_PROCESSORS * MAX_TASKS + MAX_UDCS * len(DRIVES)
 MOST_RELOADS = 100
 """Most further sources of reloaded tasks that are read from a recording (decision: a bound on its compilation)."""
 
@@ -217,29 +217,3 @@ class _StoredFiles:
         if source not in known and self._count < _MOST_SOURCES + MOST_RELOADS:
             self._count += 1
             known.append(source)
-
-
-def lines_that_write(program: Program) -> dict[str, tuple[int, ...]]:
-    """Return the BASIC lines that can write each common of a task, in the order of the text."""
-    found: dict[str, list[int]] = {}
-
-    def note(target: Expression | None, line: int | None) -> None:
-        if not isinstance(target, (Reference, Element)) or line is None:
-            return
-        symbol = program.symbols.get(target.name)
-        if symbol is not None and symbol.scope is Scope.COMMON and line not in found.setdefault(symbol.name, []):
-            found[symbol.name].append(line)
-
-    for statement, line in statements_in_order((*program.startup, *program.scan)):
-        if isinstance(statement, Assignment):
-            note(statement.target, line)
-        elif isinstance(statement, For):
-            note(statement.variable, line)
-        elif isinstance(statement, Read):
-            for target in statement.targets:
-                note(target, line)
-        elif isinstance(statement, Call) and statement.span in program.calls:
-            bound = program.calls[statement.span]
-            for output in bound.block.outputs:
-                note(bound.arguments.get(output.name), bound.line)
-    return {name: tuple(lines) for name, lines in found.items()}

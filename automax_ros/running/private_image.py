@@ -39,9 +39,7 @@ class PrivateImage(Image):
         if self._common.is_forced(view):
             return
         value = self.registers.keeping(view, element, value, self._common.forced, self.read_now)
-        entries = list(self.registers.consequences(view, element, value, self.read_now)) if view in self._shared else []
-        for entry in ((view, element, value), *entries):
-            self._put(*entry)
+        self._spread(view, element, value)
 
     def is_forced(self, view: int) -> bool:
         """Return whether a force holds a simple view."""
@@ -53,14 +51,39 @@ class PrivateImage(Image):
 
     def copy_in(self, views: Iterable[int]) -> None:
         """Take over views as common memory has them now."""
-        for view in views:
-            for element in range(self.specs[view].elements):
-                self._put(view, element, self._common.read_now(view, element))
+        self.take(self._elements(views))
 
     def copy_out(self, views: Iterable[int], writer: int) -> None:
         """Write to common memory what differs there, as commits of ``writer``."""
-        for view in views:
-            for element in range(self.specs[view].elements):
-                value = self.read_now(view, element)
-                if value != self._common.read_now(view, element):
-                    self._common.write_now(view, value, writer, element, WriteKind.COMMIT)
+        self.give(self._elements(views), writer)
+
+    def take(self, keys: Iterable[tuple[int, int]]) -> None:
+        """Take over single values as common memory has them now; ``keys`` are views with elements."""
+        for view, element in keys:
+            self._put(view, element, self._common.read_now(view, element))
+
+    def take_forced(self) -> None:
+        """Take over what forces hold, with all that shows the same registers."""
+        for view, element in sorted(self._common.forced):
+            self._spread(view, element, self._common.read_now(view, element))
+
+    def give(self, keys: Iterable[tuple[int, int]], writer: int) -> None:
+        """Write single values to common memory where they differ there, as commits of ``writer``."""
+        for view, element in keys:
+            value = self.read_now(view, element)
+            if value != self._common.read_now(view, element):
+                self._common.write_now(view, value, writer, element, WriteKind.COMMIT)
+
+    def clear(self, keys: Iterable[tuple[int, int]]) -> None:
+        """Set values to 0."""
+        for view, element in keys:
+            self._put(view, element, self.specs[view].type.zero)
+
+    def _elements(self, views: Iterable[int]) -> list[tuple[int, int]]:
+        return [(view, element) for view in views for element in range(self.specs[view].elements)]
+
+    def _spread(self, view: int, element: int, value: Value) -> None:
+        """Put a value, and what else shows the same registers."""
+        entries = list(self.registers.consequences(view, element, value, self.read_now)) if view in self._shared else []
+        for entry in ((view, element, value), *entries):
+            self._put(*entry)

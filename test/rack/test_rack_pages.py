@@ -14,7 +14,13 @@ from automax_ros.rack.tasks_check import check_tasks
 from .helpers import write
 
 PAGES = Path(automax_ros.core.__file__).parent / "pages"
-CODES = [code for code in PROBLEMS if "AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710"]
+AMONG_TASKS = range(6480, 6490)
+"""Problems that only the tasks of a rack show, not its file."""
+CODES = [
+    code
+    for code, problem in PROBLEMS.items()
+    if ("AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710") and problem.number not in AMONG_TASKS
+]
 
 
 def section(code: str, heading: str) -> str:

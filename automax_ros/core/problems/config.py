@@ -69,6 +69,20 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6442", "event of one name with two interrupts"),
     Problem("AMX6443", "more hardware events than an interrupt line serves"),
     Problem("AMX6445", "interrupts in another period than the scans", Severity.WARNING),
+    # rack files and tasks: UDC modules and plants
+    Problem("AMX6470", "drive of a UDC task"),
+    Problem("AMX6471", "too many UDC modules"),
+    Problem("AMX6472", "key of a plant that is not supported yet"),
+    Problem("AMX6473", "motor of a plant"),
+    Problem("AMX6474", "plant of a drive"),
+    Problem("AMX6475", "Motor Overload Ratio of a drive"),
+    Problem("AMX6476", "name of a plant"),
+    Problem("AMX6480", "UDC task with a common outside of its dual port"),
+    Problem("AMX6481", "UDC task too large"),
+    Problem("AMX6482", "UDC tasks with unequal TICKS", hardware="95"),
+    Problem("AMX6483", "boolean outputs and inputs of a UDC in one pair of registers", Severity.WARNING),
+    Problem("AMX6484", "application register written by a UDC and by a Processor"),
+    Problem("AMX6485", "constant that differs from the drive's parameter"),
     # recordings
     # rack files: operation
     Problem("AMX6701", "version of the Programming Executive"),

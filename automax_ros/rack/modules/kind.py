@@ -11,8 +11,8 @@ from typing import Any, Protocol, runtime_checkable
 
 from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Span
-from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.findings import Findings
+from automax_ros.rack.plants import Plants
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.sections import Section
 from automax_ros.rack.task_config import TaskConfig
@@ -26,6 +26,7 @@ from automax_ros.running.interrupts import Interrupts
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.scheduler import Scheduler
+from automax_ros.running.task import Task
 from automax_ros.running.views import Memory
 
 ModuleState = Mapping[str, Any]
@@ -53,14 +54,16 @@ class Registers:
     """The registers of a module: how many, and who writes them.
 
     Tasks write ``outputs``. Of ``either`` a variable with ``ros: in`` is an input, any other what its task makes of it.
-    The rest are inputs. ``reals`` are those on which REAL variables may stand. ``copies`` are pairs of a register and
-    the input that shows the same; ``clock_status`` pairs of an input and the bits that are set while there is a common
+    The rest are inputs, but for the ``reserved``: they are the module's own, and no point may stand there. ``reals``
+    are those on which REAL variables may stand. ``copies`` are pairs of a register and the input that shows the same;
+    ``clock_status`` pairs of an input and the bits that are set while there is a common
     clock; ``counters`` are the first of two registers that count 24 bits.
     """
 
     count: int = 0
     outputs: Collection[int] = range(0)
     either: Collection[int] = range(0)
+    reserved: Collection[int] = range(0)
     reals: Collection[int] = range(0)
     interrupts: tuple[Interrupt, ...] = ()
     copies: tuple[tuple[int, int], ...] = ()
@@ -147,7 +150,8 @@ class FoundModule:
     span: Span
     tasks: TaskReader
     findings: Findings
-    executive: int = NEWEST
+    executive: int
+    plants: Plants
 
 
 @dataclass(frozen=True)
@@ -210,10 +214,12 @@ class Install(Protocol):
         *,
         memory: Memory | None = None,
         trigger: MakeTrigger | None = None,
+        then: Callable[[Task], None] | None = None,
     ) -> ScheduledTask:
         """Return the task, installed; it works on the rack's ``memory`` unless it has another.
 
-        Without ``trigger`` its scans begin by the clock, or by the event that SCAN_LOOP names.
+        Without ``trigger`` its scans begin by the clock, or by the event that SCAN_LOOP names. ``then`` is called after
+        each scan, and after its start-up part, when observers were told.
         """
         ...
 

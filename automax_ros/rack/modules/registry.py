@@ -16,6 +16,7 @@ from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.resolver import RESOLVER
+from automax_ros.rack.modules.udc_config import UDC
 
 KINDS: tuple[ModuleKind, ...] = (
     PROCESSOR,
@@ -25,13 +26,13 @@ KINDS: tuple[ModuleKind, ...] = (
     ANALOG_IO,
     RESOLVER,
     PULSETACH,
+    UDC,
 )
 """All kinds of modules: whoever wants a module finds it here."""
 SUPPORTED: dict[str, ModuleKind] = {model: kind for kind in KINDS for model in kind.models}
 """The kind of each number that a rack file may name."""
 
 NOT_YET = {
-    "57552": "UDC module",
     "57C404": "DCS-NET network module",
     "57C405": "drive analog I/O module",
     "57C406": "DC drive controller",

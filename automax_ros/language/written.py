@@ -1,0 +1,44 @@
+"""Which commons a checked task can write, and where: by BASIC statements and by the outputs of blocks."""
+
+from __future__ import annotations
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.language.program import Program
+from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Reference, Scope
+from automax_ros.language.syntax.walk import statements_in_order
+
+Place = tuple[int, Span]
+"""The BASIC line, and where the variable stands in the text."""
+
+
+def places_that_write(program: Program) -> dict[str, list[Place]]:
+    """Return where each common that the task can write is written, in the order of the text."""
+    found: dict[str, list[Place]] = {}
+
+    def note(target: Expression | None, line: int | None) -> None:
+        if not isinstance(target, (Reference, Element)) or line is None:
+            return
+        symbol = program.symbols.get(target.name)
+        if symbol is not None and symbol.scope is Scope.COMMON:
+            found.setdefault(symbol.name, []).append((line, target.span))
+
+    for statement, line in statements_in_order((*program.startup, *program.scan)):
+        if isinstance(statement, Assignment):
+            note(statement.target, line)
+        elif isinstance(statement, For):
+            note(statement.variable, line)
+        elif isinstance(statement, Read):
+            for target in statement.targets:
+                note(target, line)
+        elif isinstance(statement, Call) and statement.span in program.calls:
+            bound = program.calls[statement.span]
+            for output in bound.block.outputs:
+                note(bound.arguments.get(output.name), bound.line)
+    return found
+
+
+def lines_that_write(program: Program) -> dict[str, tuple[int, ...]]:
+    """Return the BASIC lines that can write each common of a task, each once, in the order of the text."""
+    return {
+        name: tuple(dict.fromkeys(line for line, _ in places)) for name, places in places_that_write(program).items()
+    }

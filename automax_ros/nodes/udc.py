@@ -1,0 +1,39 @@
+"""The node ``udc_SLOT``: a UDC module with its tasks.
+
+It does for its tasks all that a Processor's node does; ``/diagnostics`` also tells of the common clock, the next scan,
+and the scans per interrupt.
+"""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from automax_ros.nodes.module_node import Site
+from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.udc_registers import ISCR, SCAN_COUNTER, SCANS_PER_INTERRUPT
+
+_SHOWN = {"iscr": ISCR, "scans_per_interrupt": SCANS_PER_INTERRUPT, "scans_since_interrupt": SCAN_COUNTER}
+
+
+class UdcNode(ProcessorNode):
+    """Serves one UDC."""
+
+    def __init__(self, site: Site, udc: Module) -> None:
+        """Create publishers and parameters, and observe the rack."""
+        self._udc = udc
+        super().__init__(site, udc)
+
+    def _health(self, now_ns: int) -> list[DiagnosticStatus]:
+        return [self._module_status(), *super()._health(now_ns)]
+
+    def _module_status(self) -> DiagnosticStatus:
+        """Return the health of the module itself: WARN while its tasks wait for the common clock."""
+        config, rack = self._udc.config, self.site.rack
+        bank = rack.backplane.bank(config.slot)
+        assert bank is not None
+        values = {name: str(rack.memory.read_now(bank.view, register)) for name, register in _SHOWN.items()}
+        level, text = DiagnosticStatus.OK, "the common clock runs"
+        if rack.clock_since_ns is None:
+            level, text = DiagnosticStatus.WARN, "tasks wait at SCAN_LOOP for the common clock"
+        return self.status(config.model, level, text, config.slot, values)

@@ -1,0 +1,272 @@
+"""A UDC module of a running rack: its scans on the common clock, its copies of registers, its interrupt.
+
+A scan of the module is A's task, then B's, every TICKS x 0.5 ms, from the end of the first interval of the common clock
+on (S-3056 p. 4-4, 4-8). It copies application registers in, lets A run and copies out what A writes, then B. What A has
+written B finds in the same scan (S-3006 p. 4-2). A task that is put into RUN while the other scans joins at the next
+scan of the module (decision). Scans of UDCs come before those of Processors at the same instant (decision).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.rack.modules.kind import ModuleConfig, ModuleState, Parts
+from automax_ros.rack.modules.udc_copies import Copied, Copies, copies_of
+from automax_ros.rack.modules.udc_registers import (
+    APPLICATION,
+    ISCR,
+    RETAINED,
+    SCAN_COUNTER,
+    SCANS_PER_INTERRUPT,
+)
+from automax_ros.rack.scheduled_task import ScheduledTask
+from automax_ros.rack.triggers import Due
+from automax_ros.running.local_memory import LocalMemory
+from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
+from automax_ros.running.task import Status, Task
+
+
+class _Trigger:
+    """Tells the module when its task may scan; the module says when a scan is due."""
+
+    def __init__(self, module: UdcModule, task: Task) -> None:
+        self._module, self.task = module, task
+        self.armed = False
+
+    def arm(self, first_ns: int, due: Due) -> None:  # noqa: ARG002
+        """Let the task take part in the module's scans, whenever they are."""
+        self.armed = True
+        self._module.follow()
+
+    def disarm(self) -> None:
+        """Let the module's scans pass the task over."""
+        if self.armed:
+            self.armed = False
+            self._module.left_out(self.task)
+
+    @property
+    def next_ns(self) -> int | None:
+        """The present, while it takes part: the module keeps the instant of its scans."""
+        return self._module.now_ns if self.armed else None
+
+
+class UdcModule:
+    """A UDC with its tasks, in the order of their drives."""
+
+    def __init__(self, config: ModuleConfig, parts: Parts) -> None:
+        """Install the tasks; nothing happens before the common clock runs."""
+        bank = parts.backplane.bank(config.slot)
+        assert bank is not None
+        self.config, self._parts, self._bank = config, parts, bank.view
+        views = parts.memory.registers
+        self.kept = views.showing(bank.view, RETAINED)
+        self._local = tuple(sorted(views.showing(bank.view, APPLICATION)))
+        self._memory = LocalMemory(parts.memory, {view for view, _ in self._local if view != bank.view})
+        self._copies: Copies | None = None
+        self._count = 0
+        self._rest: list[ScheduledTask] = []
+        self._current: ScheduledTask | None = None
+        self._scanning = False
+        self._skipped = 0
+        self._event: ScheduledEvent | None = None
+        self._key = EventKey(EventClass.SCAN, 0, config.name)
+        self._triggers: dict[str, _Trigger] = {}
+        execution = parts.execution(config.name)
+        self.tasks: Sequence[ScheduledTask] = [
+            parts.install(item, execution, memory=self._memory, trigger=self._trigger, then=self._has_run)
+            for item in config.tasks
+        ]
+        parts.clock.add_enable(config.name, bank.view, ISCR)
+        parts.clock.watch(self.follow)
+
+    @property
+    def now_ns(self) -> int:
+        """Rack time."""
+        return self._parts.scheduler.now_ns
+
+    @property
+    def scan_ns(self) -> int | None:
+        """When the next scan of the module is due, None without the common clock or a task in RUN."""
+        return None if self._event is None else self._parts.scheduler.due_ns(self._event)
+
+    def power_on(self) -> None:
+        """Nothing begins: the common clock is off."""
+
+    def power_off(self) -> None:
+        """Stop the tasks; locals and application registers are lost, tunables and error logs stay (2.4.5)."""
+        for item in self.tasks:
+            item.stop()
+        self.stopped_all()
+
+    def stopped_all(self) -> None:
+        """Lose what a UDC loses at STOP ALL: the locals of its tasks and its local memory (2.4.5)."""
+        self._break_off()
+        self._count = 0
+        self._memory.image.clear(self._local)
+        for item in self.tasks:
+            item.task.lose_locals()
+
+    def follow(self) -> None:
+        """Scan while the common clock runs and a task takes part, every TICKS of its intervals."""
+        clock, running = self._parts.clock, self._taking_part()
+        if not clock.runs or not running:
+            self._cancel()
+        elif self._event is None or self._event.period_ns != running[0].task.period_ns:
+            self._scan_from(clock.next_ns)
+
+    def left_out(self, task: Task) -> None:
+        """Go on without a task that was stopped, also where that was in the middle of its scan."""
+        if self._current is not None and self._current.task is task:
+            self._current = None
+            self._go_on_soon()
+        self.follow()
+
+    def state(self) -> ModuleState:
+        """Return the state of each task, the local memory, and where the module is in its scans."""
+        read = self._memory.image.read_now
+        held = ((view, element, read(view, element)) for view, element in self._local)
+        return {
+            "tasks": {item.name: item.state() for item in self.tasks},
+            "local": [entry for entry in held if entry[2]],
+            "count": self._count,
+            "scan_ns": self.scan_ns,
+            "scanning": self._scanning,
+            "current": None if self._current is None else self._current.name,
+            "rest": [item.name for item in self._rest],
+        }
+
+    def load(self, state: ModuleState) -> None:
+        """Take over a state, in the middle of a scan if need be.
+
+        Raises:
+            ValueError: it is that of a module with other tasks, or does not fit a task.
+        """
+        own = {item.name: item for item in self.tasks}
+        if set(state["tasks"]) != set(own):
+            raise ValueError(f"{self.config.name} has the tasks {sorted(own)}")
+        for name, item in own.items():
+            item.load(state["tasks"][name])
+        image = self._memory.image
+        image.clear(self._local)
+        image.load_image(state["local"])
+        self._count, self._scanning = state["count"], state["scanning"]
+        self._current = own[state["current"]] if state["current"] is not None else None
+        self._rest = [own[name] for name in state["rest"]]
+        self._cancel()
+        if state["scan_ns"] is not None:
+            self._scan_from(state["scan_ns"])
+        if self._scanning and self._current is None:
+            self._go_on_soon()
+
+    def _trigger(self, task: Task) -> _Trigger:
+        """Make the trigger of a task as it is installed; what is copied depends on its source."""
+        self._copies = None
+        self._triggers[task.name] = made = _Trigger(self, task)
+        return made
+
+    def _taking_part(self) -> list[ScheduledTask]:
+        return [item for item in self.tasks if self._triggers[item.name].armed and item.task.status is Status.RUNNING]
+
+    def _scan_from(self, first_ns: int) -> None:
+        self._cancel()
+        running = self._taking_part()
+        period_ns = running[0].task.period_ns
+        self._event = self._parts.scheduler.every(period_ns, first_ns, self._key, self._scan)
+
+    def _cancel(self) -> None:
+        if self._event is not None:
+            self._event.cancel()
+            self._event = None
+
+    def _break_off(self) -> None:
+        self._rest, self._current, self._scanning = [], None, False
+
+    def _scan(self, now_ns: int, skipped: int) -> None:
+        """Begin a scan of the module; if the last one is still under way, its task has overlapped (code 14)."""
+        if self._current is not None:
+            self._current.due(now_ns, skipped)
+            return
+        self._skipped = skipped
+        self._begin(now_ns)
+        self._rest, self._scanning = self._taking_part(), True
+        self._go_on(now_ns)
+
+    def _begin(self, now_ns: int) -> None:
+        """Count the scan, and copy in what the tasks read: every Nth time also the registers of the Nth scan."""
+        self._parts.memory.now_ns = now_ns
+        every = self._scans_per_interrupt
+        self._count = self._count + 1 if self._count + 1 < every else 0
+        self._show_count()
+        image, copies = self._memory.image, self._present_copies
+        image.take(copies.every.inputs)
+        if every and not self._count:
+            image.take(copies.nth.inputs)
+        if self._parts.memory.forced:
+            image.take_forced()
+
+    def _go_on(self, now_ns: int) -> None:
+        """Let the next task scan; after the last one the module's scan is at its end."""
+        while self._rest:
+            self._current = item = self._rest.pop(0)
+            if self._triggers[item.name].armed and item.task.status is Status.RUNNING:
+                item.due(now_ns, self._skipped)
+                return
+        self._current = None
+        if self._scanning:
+            self._scanning = False
+            self._end(now_ns)
+
+    def _has_run(self, task: Task) -> None:
+        """Copy out what a task has written in its scan, and go on with the next one."""
+        if self._current is None or self._current.task is not task or not self._scanning:
+            return
+        self._current = None
+        now_ns = self.now_ns
+        self._copy_out(self._present_copies.every, task.name, now_ns)
+        self._go_on(now_ns)
+
+    def _end(self, now_ns: int) -> None:
+        """Copy out the registers of the Nth scan at the end of the scan before it, then interrupt (S-3006 p. 4-9)."""
+        every = self._scans_per_interrupt
+        if not every or self._count != every - 1:
+            return
+        for name in self._present_copies.nth.outputs:
+            self._copy_out(self._present_copies.nth, name, now_ns)
+        self._parts.interrupts.post(self._bank, ISCR, now_ns)
+
+    def _copy_out(self, copied: Copied, name: str, now_ns: int) -> None:
+        keys = copied.outputs.get(name)
+        if keys:
+            writer = next(item.task.writer for item in self.tasks if item.name == name)
+            self._parts.memory.now_ns = now_ns
+            self._memory.image.give(keys, writer)
+            self._parts.tell_writes()
+
+    def _show_count(self) -> None:
+        """Show the scans since the last Nth one in the counter's register."""
+        memory = self._parts.memory
+        if memory.read_now(self._bank, SCAN_COUNTER) != self._count:
+            writer = self._parts.writer(self.config.name)
+            memory.write_now(self._bank, self._count, writer, SCAN_COUNTER, WriteKind.OUTSIDE)
+            self._parts.tell_writes()
+
+    @property
+    def _scans_per_interrupt(self) -> int:
+        """Register 2001; 0 or less is no interrupt and no copy of the registers of the Nth scan (decision)."""
+        return max(0, int(self._parts.memory.read_now(self._bank, SCANS_PER_INTERRUPT)))
+
+    @property
+    def _present_copies(self) -> Copies:
+        if self._copies is None:
+            programs = [item.task.compiled.program for item in self.tasks]
+            self._copies = copies_of(programs, self._bank, self._parts.memory)
+        return self._copies
+
+    def _go_on_soon(self) -> None:
+        """Go on with the scan once what stopped its task is complete, still at this instant."""
+        self._parts.scheduler.at(self.now_ns, self._key, self._resume)
+
+    def _resume(self, now_ns: int) -> None:
+        if self._scanning and self._current is None:
+            self._go_on(now_ns)

@@ -1,0 +1,112 @@
+"""UDC modules as a rack file configures them: 57552, with a task for drive A, one for drive B, or one alone (2.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from automax_ros.compile.cost import Model
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.text import quoted
+from automax_ros.core.ticks import UDC_TICK_NS
+from automax_ros.core.yaml_text import Node
+from automax_ros.rack.findings import Findings
+from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
+from automax_ros.rack.modules.udc import UdcModule
+from automax_ros.rack.modules.udc_registers import UDC_REGISTERS
+from automax_ros.rack.plants import PlantConfig
+from automax_ros.rack.scalars import text_value
+from automax_ros.rack.sections import Section, entries_of
+from automax_ros.rack.task_config import TaskConfig
+from automax_ros.rack.tasks import TaskPlace
+
+MAX_UDCS = 10
+"""UDC modules of one rack (J2-3106-1 p. 2-5)."""
+DRIVES = ("A", "B")
+"""The drives of a UDC, in the order in which their tasks run."""
+
+
+@dataclass(frozen=True)
+class UdcConfig:
+    """A UDC module. ``tasks`` stand in the order of their drives; ``plants`` are by drive."""
+
+    slot: int
+    model: str
+    tasks: tuple[TaskConfig, ...] = ()
+    plants: Mapping[str, PlantConfig] = field(default_factory=dict)
+    line: int = 0
+
+    tick_ns = UDC_TICK_NS
+    times = Model.UDC
+    has_battery = False
+    registers: Registers = UDC_REGISTERS
+    common_registers = 0
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"udc_{self.slot}"
+
+    def build(self, parts: Parts) -> Module:
+        """Return the module of a running rack."""
+        return UdcModule(self, parts)
+
+
+class _Drives:
+    """The tasks of one UDC: each drive has at most one."""
+
+    key, sample, most = "drive", "A", len(DRIVES)
+
+    def __init__(self) -> None:
+        self._taken: dict[str, Span] = {}
+
+    def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
+        """Return a drive."""
+        text = text_value(node, f"drive of {what}", findings, limit=100)
+        if text is None:
+            return None
+        if text not in DRIVES:
+            findings.add("AMX6470", f"drive of {what} is {quoted(text)}; it must be A or B", node.span)
+        elif text in self._taken:
+            note = Note("that task is here", self._taken[text])
+            findings.add("AMX6470", f"drive {text} has a task already", node.span, notes=(note,))
+        else:
+            self._taken[text] = node.span
+            return TaskPlace(DRIVES.index(text), text)
+        return None
+
+
+class UdcKind:
+    """What a rack file may say of a UDC."""
+
+    word = "UDC"
+    models = {"57552": "UDC module"}  # noqa: RUF012
+    options = ("tasks", "plants")
+
+    def read(self, found: FoundModule) -> UdcConfig:
+        """Read tasks and plants."""
+        node = found.section.get("tasks")
+        tasks = found.tasks.read(node, found.where, _Drives()) if node else ()
+        in_order = tuple(sorted(tasks, key=lambda task: task.priority))
+        return UdcConfig(found.slot, found.model, in_order, _plants(found), found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report too many UDCs; no source tells of a slot where one may not stand."""
+        own = rack.of(self)
+        if len(own) > MAX_UDCS:
+            message = f"the rack has {len(own)} UDC modules; it may have at most {MAX_UDCS}"
+            rack.findings.add("AMX6471", message, own[MAX_UDCS].span)
+
+
+UDC = UdcKind()
+
+
+def _plants(found: FoundModule) -> Mapping[str, PlantConfig]:
+    node = found.section.get("plants")
+    if node is None:
+        return {}
+    what = f"plants of {found.where}"
+    section = Section(entries_of(node, what, found.findings) or (), what, DRIVES, found.findings)
+    named = ((drive, section.get(drive)) for drive in DRIVES)
+    claimed = ((drive, found.plants.claim(node, f"drive {drive} of {found.where}")) for drive, node in named if node)
+    return {drive: plant for drive, plant in claimed if plant is not None}

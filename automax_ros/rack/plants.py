@@ -1,0 +1,152 @@
+"""The ``plants`` section: the motors and loads that drives turn, by name. A plant belongs to one drive of one module.
+
+The emulator reads what the checks of tasks need, the motor and the drive's Motor Overload Ratio; it does not simulate a
+plant yet. Keys that only a simulated plant would heed are refused for the time being (decision), so that nobody takes
+them for heeded.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.yaml_text import Mapping, Node, Scalar
+from automax_ros.drive.nameplate import NamePlate
+from automax_ros.rack.findings import Findings
+from automax_ros.rack.scalars import integer_value, number_value, text_value
+from automax_ros.rack.sections import Section, entries_of, report_twice
+
+MOTORS = ("dc_10hp_240v", "dc_150hp_500v", "dc_800hp_700v")
+"""Motors that a plant may have by name."""
+MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
+"""Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
+_KEYS = ("motor", "motor_overload_ratio")
+_NOT_YET = ("line", "load", "inertia", "couple", "feeds")
+_PLATE = ("hp", "volts", "rpm", "amps", "resistance_ohm", "inductance_h", "inertia_kg_m2")
+_PLATE_REQUIRED = ("hp", "volts", "rpm")
+_MOST = 1e9
+_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}\Z")
+_LIMIT = 100
+
+
+@dataclass(frozen=True)
+class PlantConfig:
+    """A plant: its motor by name or by its plate, and the ``motor_overload_ratio`` of its drive in %."""
+
+    name: str
+    motor: str | NamePlate | None = None
+    motor_overload_ratio: int | None = None
+    line: int = 0
+
+
+@dataclass
+class Plants:
+    """The plants of one rack file, and who has claimed them."""
+
+    findings: Findings
+    known: dict[str, PlantConfig] = field(default_factory=dict)
+    complete: bool = True
+    _claimed: dict[str, tuple[str, Span]] = field(default_factory=dict)
+
+    def claim(self, node: Node, what: str) -> PlantConfig | None:
+        """Return the plant that a module names for ``what``, None (reported) where there is none to have."""
+        text = text_value(node, what, self.findings, limit=_LIMIT)
+        if text is None:
+            return None
+        name = self.findings.upper_case(text, node.span)
+        plant = self.known.get(name)
+        if plant is None:
+            if self.complete:
+                hint = did_you_mean(name, self.known) or "define it in the section `plants:` of the rack file"
+                self.findings.add("AMX6474", f"{what}: the rack has no plant {quoted(text)}", node.span, hint)
+            return None
+        if name in self._claimed:
+            user, place = self._claimed[name]
+            message = f"{what}: the plant {name} is that of {user} (line {place.line}) already"
+            self.findings.add("AMX6474", message, node.span, "a plant belongs to one drive")
+            return None
+        self._claimed[name] = (what, node.span)
+        return plant
+
+
+def read_plants(node: Node | None, findings: Findings) -> Plants:
+    """Return the plants of the section; what is wrong goes to the findings."""
+    plants = Plants(findings)
+    if node is None:
+        return plants
+    places: dict[str, Span] = {}
+    for key, value in entries_of(node, "plants", findings) or ():
+        name = findings.upper_case(key.text, key.span)
+        if not _NAME.match(name):
+            message = f"{quoted(key.text)}: a plant's name has 1 to 16 letters, digits and underscores, a letter first"
+            findings.add("AMX6476", message, key.span)
+            plants.complete = False
+        elif name in places:
+            report_twice(key, f"plant {name}", places[name], findings)
+        else:
+            places[name] = key.span
+            plants.known[name] = _plant(name, key, value, findings)
+    return plants
+
+
+def _plant(name: str, key: Scalar, node: Node, findings: Findings) -> PlantConfig:
+    what = f"plant {name}"
+    section = Section(entries_of(node, what, findings) or (), what, (*_KEYS, *_NOT_YET), findings)
+    for option in _NOT_YET:
+        if option in section:
+            message = f"{option} of {what} is not supported yet: the emulator does not simulate plants"
+            findings.add("AMX6472", message, section.key_span(option), "leave it out")
+    ratio = section.get("motor_overload_ratio")
+    return PlantConfig(
+        name,
+        _motor(section.get("motor"), f"motor of {what}", findings),
+        None if ratio is None else _ratio(ratio, what, findings),
+        key.span.line,
+    )
+
+
+def _ratio(node: Node, what: str, findings: Findings) -> int | None:
+    low, high = MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO
+    return integer_value(node, f"motor_overload_ratio of {what}", findings, low=low, high=high, code="AMX6475")
+
+
+def _motor(node: Node | None, what: str, findings: Findings) -> str | NamePlate | None:
+    if node is None:
+        return None
+    if isinstance(node, Mapping):
+        return _plate(node, what, findings)
+    name = text_value(node, what, findings, limit=_LIMIT)
+    if name is not None and name not in MOTORS:
+        hint = (
+            did_you_mean(name, MOTORS)
+            or f"motors are {', '.join(MOTORS)}, or a name plate: {{hp: 10, volts: 240, ...}}"
+        )
+        findings.add("AMX6473", f"{what} is {quoted(name)}, which the emulator does not have", node.span, hint)
+        return None
+    return name
+
+
+def _plate(node: Mapping, what: str, findings: Findings) -> NamePlate | None:
+    section = Section(node.entries, what, _PLATE, findings)
+    if not section.require(_PLATE_REQUIRED, what, node.span, findings):
+        return None
+    numbers: dict[str, float] = {}
+    for key in _PLATE:
+        value = section.get(key)
+        if value is None:
+            continue
+        found = number_value(value, f"{key} of {what}", findings, low=1e-9, high=_MOST, code="AMX6473")
+        if found is None:
+            return None
+        numbers[key] = found
+    return NamePlate(
+        hp=numbers["hp"],
+        volts=numbers["volts"],
+        rpm=numbers["rpm"],
+        amps=numbers.get("amps"),
+        resistance_ohm=numbers.get("resistance_ohm"),
+        inductance_h=numbers.get("inductance_h"),
+        inertia_kg_m2=numbers.get("inertia_kg_m2"),
+    )
