@@ -17,7 +17,10 @@ from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 CLOCK_PERIOD_NS = UDC_TICK_NS
 """One interval of the clock: 500 us (S-3056 p. 4-4; J2-3106-1 p. 2-5 prints ms)."""
 ENABLE_BIT = 6
-"""The bit that drives the clock, in a UDC's register 2000 as in the ISCR of I/O modules (57C411 p. 4-1; decision)."""
+"""The bit that drives the clock, in a UDC's register 2000 as in the ISCR of I/O modules (decision).
+
+The 57C411's manual says so of that module (p. 4-1).
+"""
 SECOND_DRIVER = "38"
 """The hardware's code where two modules drive the clock (S-3056 p. 4-4)."""
 

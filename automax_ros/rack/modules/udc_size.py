@@ -18,7 +18,7 @@ _STATE_BYTES = 4
 
 
 def estimated_bytes(program: Program) -> int:
-    """Return about how many bytes a task takes: its code, its locals, and what its blocks keep."""
+    """Return about how large a task is, in bytes: its code, its locals, and what its blocks keep."""
     statements = list(statements_in_order((*program.startup, *program.scan)))
     terms = 0
     for statement, _ in statements:

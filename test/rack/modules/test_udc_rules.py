@@ -1,0 +1,154 @@
+"""What must hold among the tasks of a UDC, the rack's other tasks and the UDC's drives."""
+
+from __future__ import annotations
+
+import pytest
+
+from automax_ros.rack.loader import load
+from automax_ros.rack.tasks_check import check_tasks
+
+from .udc_racks import written
+
+TASK = "10 COMMON {commons}\n{more}100 CALL SCAN_LOOP(TICKS={ticks})\n{scan}900 END\n"
+THERMAL = "200 CALL THERMAL_OVERLOAD(I_FDBK=FB%, OVERLOAD=TRIP@{more})\n"
+POINTS = """\
+  FB%: {slot: 10, register: 207}
+  TRIP@: {slot: 10, register: 300, bit: 0}
+  OUT%: {slot: 10, register: 302}
+  IN%: {slot: 10, register: 303}
+  TWO!: {slot: 10, register: 304}
+"""
+
+
+def task(commons: str = "FB%, TRIP@", scan: str = "", *, ticks: int = 2, lim: str = "", more: str = "") -> str:
+    """Return a task of drive A or B that is right but for what a test adds."""
+    return TASK.format(commons=commons, more=more, ticks=ticks, scan=THERMAL.format(more=lim) + scan)
+
+
+def found(folder, points: str = "", *, tasks: str = "WIND_A: {drive: A}", **sources: str) -> list[tuple[str, str]]:
+    """Return the names of tasks and the codes of what is wrong with them."""
+    path = written(folder, POINTS + points, tasks=tasks, **sources)
+    config = load(path).config
+    assert config is not None, load(path).diagnostics
+    return [(item.task.name, one.code) for item in check_tasks(config) for one in item.result.diagnostics]
+
+
+def test_a_udc_task_without_a_fault_passes(tmp_path):
+    assert found(tmp_path, WIND_A=task()) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "code"),
+    [
+        (task(ticks=21), "AMX4085"),
+        (task(scan="210 N% = IOREAD%(5, 0)\n", more="20 LOCAL N%\n"), "AMX4027"),
+        (task(scan="210 IOWRITE 5, 0, 1\n"), "AMX4027"),
+        (task(more="20 EVENT NAME=E1\n"), "AMX4027"),
+        (task("FB%, TRIP@, OUT%", "210 CALL PID(INPUT=1)\n"), "AMX4071"),
+        (task(scan="210 FB% = 3\n"), "AMX4017"),
+    ],
+)
+def test_a_udc_task_is_checked_as_one(tmp_path, source, code):
+    assert found(tmp_path, WIND_A=source)[0] == ("WIND_A", code)
+
+
+def test_a_common_elsewhere_is_out_of_reach(tmp_path):
+    source = task("FB%, TRIP@, REF%, OTHER%", "210 OTHER% = REF%\n")
+    points = "  REF%: {}\n  OTHER%: {slot: 11, register: 300}\n"
+    path = written(tmp_path, POINTS + points, tasks="WIND_A: {drive: A}", more="}\n  11: {module: 57552", WIND_A=source)
+    (checked,) = (item for item in check_tasks(load(path).config) if item.task.name == "WIND_A")
+    assert [(item.code, item.message) for item in checked.result.diagnostics] == [
+        ("AMX6480", "REF% does not stand in the dual port of udc_10"),
+        ("AMX6480", "OTHER% does not stand in the dual port of udc_10"),
+    ]
+    assert checked.result.program is None
+
+
+def statements(count: int) -> str:
+    return "".join(f"{1000 + number} OUT% = IN% + {number}\n" for number in range(count))
+
+
+def test_the_estimated_size_is_at_most_20_kbytes(tmp_path):
+    """An assignment of a sum of two has 8 bytes for itself and 6 for each of its 4 terms: 32."""
+    long = TASK.replace("900 END", "9999 END").format(
+        commons="FB%, TRIP@, OUT%, IN%", more="", ticks=2, scan=THERMAL.format(more="") + "{}"
+    )
+    config = load(written(tmp_path, POINTS, tasks="WIND_A: {drive: A}", WIND_A=long.format(""))).config
+    from automax_ros.rack.modules.udc_size import estimated_bytes
+
+    (alone,) = (item for item in check_tasks(config) if item.task.name == "WIND_A")
+    fixed = estimated_bytes(alone.result.program)
+    most = (20 * 1024 - fixed) // 32
+    assert found(tmp_path, WIND_A=long.format(statements(most))) == []
+    assert found(tmp_path, WIND_A=long.format(statements(most + 1))) == [("WIND_A", "AMX6481")]
+
+
+def test_a_and_b_have_the_same_ticks(tmp_path):
+    both = "WIND_A: {drive: A}, WIND_B: {drive: B}"
+    second = task("FB%, OUT%, IN%").replace("TRIP@", "BTRIP@").replace("COMMON ", "COMMON BTRIP@, ")
+    points = "  BTRIP@: {slot: 10, register: 306, bit: 0}\n"
+    assert found(tmp_path, points, tasks=both, WIND_A=task(), WIND_B=second) == []
+    other = second.replace("TICKS=2", "TICKS=3")
+    assert found(tmp_path, points, tasks=both, WIND_A=task(), WIND_B=other) == [("WIND_B", "AMX6482")]
+
+
+@pytest.mark.parametrize(
+    ("neighbour", "written_too", "wrong"),
+    [
+        ("X@: {slot: 10, register: 300, bit: 5}", False, True),
+        ("X@: {slot: 10, register: 301, bit: 0}", False, True),
+        ("X%: {slot: 10, register: 301}", False, True),
+        ("X@: {slot: 10, register: 302, bit: 0}", False, False),
+        ("X@: {slot: 10, register: 301, bit: 0}", True, False),
+        ("X%: {slot: 10, register: 301}", True, False),
+    ],
+)
+def test_booleans_go_out_by_pairs_of_registers(tmp_path, neighbour, written_too, wrong):
+    name = neighbour.partition(":")[0]
+    value = "TRUE" if name == "X@" else "5"
+    source = task(f"FB%, TRIP@, {name}", f"210 {name} = {value}\n" if written_too else "")
+    points = f"  {neighbour}\n"
+    if "register: 302" in neighbour:
+        points = points.replace("302", "310")
+    assert found(tmp_path, points, WIND_A=source) == ([("WIND_A", "AMX6483")] if wrong else [])
+
+
+def test_words_may_mix_in_a_pair(tmp_path):
+    assert found(tmp_path, WIND_A=task("FB%, TRIP@, OUT%, IN%", "210 OUT% = IN%\n")) == []
+
+
+@pytest.mark.parametrize(
+    ("statement", "wrong"),
+    [
+        ("OUT% = 1", True),
+        ("OUTBIT@ = TRUE", True),
+        ("CALL SUMMER(INPUT1=1, INPUT2=2, OUTPUT=OUT%)", True),
+        ("IN% = 1", False),
+        ("N% = OUT%", False),
+    ],
+)
+def test_a_register_is_an_output_of_the_udc_or_of_a_processor(tmp_path, statement, wrong):
+    line = f"10 COMMON OUT%, IN%, OUTBIT@\n20 LOCAL N%\n100 CALL SCAN_LOOP(TICKS=4)\n110 {statement}\n900 END\n"
+    points = "  OUTBIT@: {slot: 10, register: 302, bit: 4}\n"
+    source = task("FB%, TRIP@, OUT%, IN%", "210 OUT% = IN%\n")
+    assert found(tmp_path, points, WIND_A=source, LINE=line) == ([("LINE", "AMX6484")] if wrong else [])
+
+
+@pytest.mark.parametrize(
+    ("ratio", "lim", "wrong"),
+    [
+        (150, "", False),
+        (200, "", True),
+        (200, ", LIM_BAR=200", False),
+        (150, ", LIM_BAR=200", True),
+        (200, ", LIM_BAR=LIM%", False),
+    ],
+)
+def test_lim_bar_is_the_motor_overload_ratio_of_the_drive(tmp_path, ratio, lim, wrong):
+    source = task(lim=lim, more="20 LOCAL LIM%\n")
+    path = written(tmp_path, POINTS, tasks="WIND_A: {drive: A}", more=", plants: {A: WINDER}", WIND_A=source)
+    text = path.read_text() + f"plants:\n  WINDER: {{motor: dc_150hp_500v, motor_overload_ratio: {ratio}}}\n"
+    path.write_text(text)
+    (checked,) = (item for item in check_tasks(load(path).config) if item.task.name == "WIND_A")
+    found = [(item.code, item.statement) for item in checked.result.diagnostics]
+    assert found == ([("AMX6485", 200)] if wrong else [])
