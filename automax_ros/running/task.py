@@ -301,10 +301,6 @@ class Task:
         self.errors.add(LogEntry(self.compiled.program.scan_loop_line, OVERLAP, self.scan_number))
         self.status = Status.FAULTED
 
-    def lose_locals(self) -> None:
-        """Set locals to 0; tunables and the error log stay: a UDC at STOP ALL (2.4.5)."""
-        self.compiled.layout.lose_locals(self.state)
-
     def snapshot(self) -> list[Value]:
         """Return the task's state as flat values, in the order of ``layout``."""
         return [*self.compiled.layout.flatten(self.state), *self.errors.flatten()]

@@ -105,7 +105,7 @@ class UdcModule:
         self._count = 0
         self._memory.image.clear(self._local)
         for item in self.tasks:
-            item.task.lose_locals()
+            item.task.compiled.layout.lose_locals(item.task.state)
 
     def follow(self) -> None:
         """Scan while the common clock runs and a task takes part, every TICKS of its intervals."""
