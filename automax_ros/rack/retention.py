@@ -69,7 +69,7 @@ class Retention:
         self._rack = rack
         self.path = folder / _FILE
         self._views = [view for view, variable in enumerate(rack.config.variables) if variable.non_volatile]
-        self._saved: Document = self.present()
+        self._saved: Document = self._installed()
 
     def restore(self) -> Restored:
         """Bring tasks and forces back, and return what the start must write; nothing where nothing was kept.
@@ -125,6 +125,15 @@ class Retention:
             raise self._fault("AMX6712", f"cannot be written: {error.strerror}") from error
         self._saved = present
         return True
+
+    def _installed(self) -> Document:
+        """Return the state at the start of a rack that has kept nothing: there is no need to write that."""
+        document = self.present()
+        for view in self._views:
+            variable = self._rack.config.variables[view]
+            if variable.presets:
+                document["commons"][variable.name]["values"] = list(variable.presets)
+        return document
 
     def _statuses(self) -> dict[str, str]:
         """Return how the tasks stand; while the power is off those that ran before it count as running."""
