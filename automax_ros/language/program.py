@@ -148,7 +148,7 @@ class Program:
     each DATA line and the index in the pool at which it begins. ``events`` are declared by EVENT; ``event`` is the one
     that starts the scan, None where the clock does. ``scan_loop_line`` is the BASIC line of SCAN_LOOP.
 
-    A BASIC task has no SCAN_LOOP: its statements are ``scan``, ``ticks`` is 1, and ``files`` are what it opens.
+    A BASIC task has no SCAN_LOOP: its statements are ``scan``, ``ticks`` is 0, and ``files`` are what it opens.
     """
 
     name: str

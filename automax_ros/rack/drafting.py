@@ -21,6 +21,7 @@ from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataT
 from automax_ros.language.checks.checker import CheckResult
 from automax_ros.language.program import CommonSpec
 from automax_ros.language.syntax.parser import parse
+from automax_ros.language.syntax.task_kind import TaskKind, is_task_file, kind_of_source
 from automax_ros.language.syntax.tree import Declaration, Declared, Scope
 from automax_ros.language.syntax.walk import statements_in_order
 from automax_ros.rack.config import (
@@ -114,12 +115,13 @@ class Draft:
                 priority = min(MIN_PRIORITY + ranks.index(periods[task.name]), MAX_PRIORITY)
                 file = "" if task.file == f"{task.name}.BLK" else f"file: {_yaml_quoted(task.file)}, "
                 period = periods[task.name]
-                comment = f"a scan every {period / NS_PER_MS:g} ms" if period < _UNKNOWN_NS else "see `automax check`"
+                scanned = period < _UNKNOWN_NS
+                comment = f"a scan every {period / NS_PER_MS:g} ms" if scanned else _without_period(task)
                 yield _commented(f"      {task.name}: {{{file}priority: {priority}}}", comment)
 
     def _period_ns(self, task: DraftedTask) -> int:
         program = self.results[task.name].program
-        return program.period_ns if program is not None else _UNKNOWN_NS
+        return program.period_ns if program is not None and not program.is_basic else _UNKNOWN_NS
 
     def _common_lines(self) -> Iterator[str]:
         simple = 0
@@ -141,6 +143,10 @@ class Draft:
         return next(fitting, max(COMMON_REGISTERS))
 
 
+def _without_period(task: DraftedTask) -> str:
+    return "a BASIC task" if kind_of_source(task.file) is TaskKind.BASIC else "see `automax check`"
+
+
 def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
     """Collect the tasks and commons of a folder for a rack file in ``rack_folder``, which is the folder or above it.
 
@@ -159,7 +165,7 @@ def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
         _take(found, path, folder, inner)
     if not found.tasks:
         reasons = "".join(f"; {quoted(name)} {reason}" for name, reason in found.left_out[:3])
-        raise DraftFault(f"{folder} holds no task (.BLK){reasons}")
+        raise DraftFault(f"{folder} holds no task (.BLK, .BAS){reasons}")
     for task in found.tasks:
         found.results[task.name] = check_source(task.source, task.name, tick_ns, found.commons)
     return found
@@ -172,7 +178,7 @@ def _sources(folder: Path) -> list[Path]:
         raise DraftFault(f"{folder} cannot be read: {getattr(error, 'strerror', None) or error}") from error
     if len(entries) > _MOST_FILES:
         raise DraftFault(f"{folder} holds more than {_MOST_FILES} files", "put the tasks into a folder of their own")
-    return sorted(path for path in entries if path.suffix.upper() == ".BLK")
+    return sorted(path for path in entries if is_task_file(path))
 
 
 def _take(found: Draft, path: Path, folder: Path, inner: Path) -> None:

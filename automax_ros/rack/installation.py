@@ -8,6 +8,7 @@ from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.language.program import Program
+from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.modules.kind import ModuleConfig, cost_model
 from automax_ros.rack.task_rules import findings_by_task
@@ -72,6 +73,10 @@ class Installation:
             self._refuse_misfit(task, source, found)
         if result.program is None or has_errors(result.diagnostics):
             raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
+        kind = self._compiled[task].program.kind
+        if result.program.kind is not kind:
+            what = "a BASIC task" if kind is TaskKind.BASIC else "a control-block task"
+            raise RackError(f"task {task} is {what}: {source.name} is another kind of task, restart the rack with it")
         self._programs[task] = result.program
         return self._compile(task, result.program)
 

@@ -19,6 +19,7 @@ from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.standing import OperationsState, PowerReturn, StopCause
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.carry_over import carry_over
+from automax_ros.running.channels import Channels
 from automax_ros.running.events import Events
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
@@ -48,10 +49,11 @@ class Operations:
         memory: CommonMemory,
         scheduler: Scheduler,
         events: Events,
+        channels: Channels,
         observers: Observers,
     ) -> None:
         """Take the parts of a rack that is built and not yet started."""
-        self._events = events
+        self._events, self._channels = events, channels
         self._config, self._modules, self._installation = config, modules, installation
         self._memory, self._scheduler, self._observers = memory, scheduler, observers
         self._tasks = {item.task.name: item for module in modules for item in module.tasks}
@@ -139,6 +141,7 @@ class Operations:
         self.stopped = StopCause(self._scheduler.now_ns, reason, code, task)
         self.stop_tasks()
         self._events.clear()
+        self._channels.clear()
         self._clear_memory(keep_non_volatile=True)
         for module in self._modules:
             module.stopped_all()
@@ -228,6 +231,7 @@ class Operations:
         for module in self._modules:
             module.power_off()
         self._events.clear()
+        self._channels.clear()
         self._clear_memory(keep_non_volatile=True)
         self._tell("power_off")
 

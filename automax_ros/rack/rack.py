@@ -13,12 +13,14 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.adjusting import Adjustments
+from automax_ros.rack.background_task import WaitTrigger
 from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.forcing import Force, Forcing
 from automax_ros.rack.installation import Finding, Installation
@@ -32,6 +34,8 @@ from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.triggers import MakeTrigger, Trigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
+from automax_ros.running.basic_task import BasicTask, make_task
+from automax_ros.running.channels import Channels
 from automax_ros.running.common_clock import CommonClock
 from automax_ros.running.events import Events
 from automax_ros.running.execution import IDEAL, Execution
@@ -56,6 +60,7 @@ class RackState:
     image: tuple[tuple[int, int, Value], ...]
     forced: frozenset[tuple[int, int]]
     events: tuple[str, ...]
+    channels: tuple[Any, ...]
     operations: OperationsState
     clock_since_ns: int | None
     modules: Mapping[int, ModuleState]
@@ -82,6 +87,7 @@ class Rack:
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
         self.events = Events()
+        self.channels = Channels()
         self._interrupts = Interrupts(self.memory, self.events)
         self._inputs = ProcessInputs(self.memory, self.scheduler)
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
@@ -100,7 +106,14 @@ class Rack:
         )
         self.modules: list[Module] = [module.build(parts) for module in config.modules]
         self.operations = Operations(
-            config, self.modules, self._installation, self.memory, self.scheduler, self.events, self.observers
+            config,
+            self.modules,
+            self._installation,
+            self.memory,
+            self.scheduler,
+            self.events,
+            self.channels,
+            self.observers,
         )
         self.adjust = Adjustments(
             config, self.operations, self.memory, self._forcing, self.scheduler, self.observers, self.tune
@@ -276,6 +289,7 @@ class Rack:
             image=tuple(self.memory.image()),
             forced=self.memory.forced,
             events=self.events.pending,
+            channels=self.channels.state(),
             operations=self.operations.state(),
             clock_since_ns=self._clock.since_ns,
             modules={module.config.slot: module.state() for module in self.modules},
@@ -296,6 +310,7 @@ class Rack:
         self.memory.hold(state.forced)
         self.operations.load(state.operations)
         self._clock.resume(state.clock_since_ns)
+        self.channels.load(state.channels)
         for module in self.modules:
             module.load(state.modules[module.config.slot])
         self.events.load(state.events)
@@ -312,13 +327,15 @@ class Rack:
         trigger: MakeTrigger | None = None,
         then: Callable[[Task], None] | None = None,
     ) -> ScheduledTask:
-        installed = Task(
+        installed = make_task(
             self._installation.compiled(task.name),
             memory or self.memory,
             writer=self._ids[task.name],
             slot=self._slots[task.name],
             priority=task.priority,
             backplane=self.backplane,
+            events=self.events,
+            channels=self.channels,
         )
         return ScheduledTask(
             installed,
@@ -333,6 +350,8 @@ class Rack:
     def _usual_trigger(self, task: Task) -> Trigger:
         """Return the trigger of a task as it is installed; the interrupts that it waits for are connected."""
         self._interrupts.bind(task)
+        if isinstance(task, BasicTask):
+            return WaitTrigger(task, self.events, self.channels, self.scheduler)
         return usual_trigger(task, self.events, self.scheduler)
 
     def _clock_fault(self, reason: str, code: str) -> None:
@@ -355,4 +374,4 @@ class Rack:
 
 def scans_per_second(rack: Rack) -> float:
     """Return how many scans the rack's tasks execute in a second of rack time."""
-    return sum(NS_PER_S / task.period_ns for task in rack.tasks)
+    return sum(NS_PER_S / task.period_ns for task in rack.tasks if task.period_ns)

@@ -95,6 +95,7 @@ class ScheduledTask:
             "status": task.status.name,
             "scan": task.scan_number,
             "values": task.snapshot(),
+            "waiting": task.waiting(),
             "next_ns": self.trigger.next_ns,
         }
 
@@ -110,6 +111,7 @@ class ScheduledTask:
             raise ValueError(f"task {self.task.name} cannot be {state['status']!r}")
         self.stop()
         self.task.restore(list(state["values"]))
+        self.task.wait_again(state["waiting"])
         self.task.status, self.task.scan_number = Status[state["status"]], state["scan"]
         if state["next_ns"] is not None:
             self.scan_from(state["next_ns"])

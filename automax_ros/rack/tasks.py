@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Protocol, TypeGuard
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.language.syntax.task_kind import TASK_SUFFIXES, NotATask, is_task_file, kind_of_file
 from automax_ros.rack.files import FileFault, read_bytes, stays_next_to
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import DeclarationFault, check_task_name
@@ -16,12 +17,6 @@ from automax_ros.rack.scalars import boolean_value, integer_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 from automax_ros.rack.task_config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
 
-_OTHER_TASKS = {
-    ".BAS": "BASIC tasks",
-    ".PC": "ladder tasks",
-    ".CNF": "configuration tasks",
-    ".INC": "include files",
-}
 _PATH_LIMIT = 200
 _LISTED_FILES = 1000
 
@@ -126,20 +121,28 @@ class TaskReader:
         return name
 
     def _file(self, node: Node | None, key: Scalar, name: str | None, what: str) -> Path | None:
-        """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1)."""
+        """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1).
+
+        Where there is no such file, but one with .BAS, that is it (decision).
+        """
         if self.rack_file is None:
             return Path(f"{name}.BLK") if name is not None else None
         if node is None:
-            return self._usable(f"{name}.BLK", key.span) if name is not None else None
+            return self._usable(self._usual(name), key.span) if name is not None else None
         text = text_value(node, f"file of {what}", self.findings, limit=_PATH_LIMIT)
         return self._usable(text, node.span) if text is not None else None
 
+    def _usual(self, name: str) -> str:
+        """Return the name of the source of a task whose entry does not give one."""
+        assert self.rack_file is not None
+        names = [f"{name}{suffix}" for suffix in TASK_SUFFIXES]
+        return next((item for item in names if (self.rack_file.parent / item).is_file()), names[0])
+
     def _usable(self, text: str, span: Span) -> Path | None:
-        suffix = PurePosixPath(text).suffix.upper()
-        if suffix != ".BLK":
-            other = _OTHER_TASKS.get(suffix)
-            message = f"{other} ({suffix}) are not supported yet" if other else "a task's source is a .BLK file"
-            self.findings.add("AMX6304", f"{quoted(text)}: {message}", span)
+        try:
+            kind_of_file(text)
+        except NotATask as fault:
+            self.findings.add("AMX6304", f"{quoted(text)}: {fault}", span)
             return None
         assert self.rack_file is not None
         path = self.rack_file.parent / text
@@ -162,13 +165,13 @@ class TaskReader:
 
 
 def _is_file_name(node: Node) -> TypeGuard[Scalar]:
-    return isinstance(node, Scalar) and len(node.text) <= 40 and PurePosixPath(node.text).suffix.upper() == ".BLK"
+    return isinstance(node, Scalar) and len(node.text) <= 40 and is_task_file(node.text)
 
 
 def _names_in(folder: Path) -> list[str]:
     """Return the sources in a folder, in a fixed order."""
     try:
-        names = sorted(item.name for item in folder.iterdir() if item.suffix.upper() == ".BLK")
+        names = sorted(item.name for item in folder.iterdir() if is_task_file(item))
     except (OSError, ValueError):
         return []
     return names[:_LISTED_FILES]

@@ -8,7 +8,7 @@ from core.problem_pages import PAGES, Fence, read_page
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.running.task import Status
 
-from .support import basic_task_of, task_of
+from .support import TICK, basic_task_of, task_of
 
 SCANS = 20
 CODES = [code for code in PROBLEMS if code.startswith("AMX7")]
@@ -20,7 +20,7 @@ def codes_of(fence: Fence) -> tuple[set[int], bool]:
     """What a task logs over some scans, or bursts of a BASIC task, and whether it is faulted then."""
     task, _ = task_of(fence.text) if fence.language == "blk" else basic_task_of(fence.text)
     task.record_scans()
-    records = [task.run(), *(task.scan(number * task.period_ns) for number in range(1, SCANS + 1))]
+    records = [task.run(), *(task.scan(number * TICK) for number in range(1, SCANS + 1))]
     return {
         code for record in records if record is not None for _, code in record.errors
     }, task.status is Status.FAULTED

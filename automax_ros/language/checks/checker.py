@@ -135,7 +135,7 @@ def _program(context: Context, layout: TaskLayout, name: str, source: SourceText
         symbols=context.symbols,
         startup=_executed(layout.startup),
         scan=_executed(layout.scan),
-        ticks=context.ticks or 1,
+        ticks=context.ticks or 0,
         tick_ns=context.tick_ns,
         calls=context.calls,
         data=data,
