@@ -16,6 +16,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 from collections.abc import Mapping
+from typing import cast
 
 from automax_ros.compile import build
 from automax_ros.compile.assembly import called, local_field, made, stores
@@ -24,7 +25,7 @@ from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.flow import PC
 from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.compile.pynames import variable_name
-from automax_ros.compile.scan_io import Suspension
+from automax_ros.compile.scan_io import LineForm, ScanLines, Suspension
 from automax_ros.compile.waiting import EVERY, GOSUB, WaitingLowering
 from automax_ros.core.types import DataType
 from automax_ros.language.program import Program
@@ -57,10 +58,19 @@ class BackgroundCompilation:
 
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
         """Return the functions as trees."""
-        return [self._function(name, modeled=name == "burst_steps") for name in names]
+        return [self._function(name)[0] for name in names]
 
-    def _function(self, name: str, *, modeled: bool) -> ast.FunctionDef:
-        emitter = Emitter(self._program, self._views, modeled, self._cost)
+    def line_form(self) -> LineForm:
+        """Compile the form that yields before each BASIC line."""
+        name = "burst_lines"
+        function, lines = self._function(name)
+        functions = made([function], self._program.name, self._globals)
+        return LineForm(cast(ScanLines, functions[name]), lines)
+
+    def _function(self, name: str) -> tuple[ast.FunctionDef, frozenset[int]]:
+        """Return a function, and the lines that it yields if it does."""
+        modeled = name == "burst_steps"
+        emitter = Emitter(self._program, self._views, modeled, self._cost, by_lines=name == "burst_lines")
         lowering = WaitingLowering(emitter, {})
         lowering.lower_all(self._program.scan)
         self._fields.update(lowering.fields)
@@ -72,7 +82,8 @@ class BackgroundCompilation:
         if modeled:
             opening.append(build.assign("cost", build.constant(0)))
         kept = stores(list(self._fields), body)
-        return build.function(name, ["state", "io"], [*opening, build.finally_do(body, kept)])
+        emitter.shown.elts += [build.name(known) for known in self._fields]
+        return build.function(name, ["state", "io"], [*opening, build.finally_do(body, kept)]), frozenset(emitter.lines)
 
     def _end(self, emitter: Emitter) -> list[ast.stmt]:
         """Return END: a subroutine is left with it; the next run begins after the START EVERY, if there is one."""

@@ -34,7 +34,7 @@ from automax_ros.compile.cost import CostModel
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.layout import Layout, StateField
 from automax_ros.compile.pynames import block_prefix, forced_name, latched_name, variable_name
-from automax_ros.compile.scan_io import BackgroundIo, ScanIo, ScanTooLong, StateValues, Wish
+from automax_ros.compile.scan_io import BackgroundIo, LineForm, ScanIo, ScanLines, ScanTooLong, StateValues, Wish
 from automax_ros.compile.statements import STOPPED, StatementLowering
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Call, For, If, Reference, Scope, Statement
@@ -57,6 +57,10 @@ class Compilation(Protocol):
 
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
         """Return some of the functions as trees."""
+        ...
+
+    def line_form(self) -> LineForm:
+        """Compile the form that yields before each BASIC line."""
         ...
 
 
@@ -99,6 +103,11 @@ class CompiledTask:
     def burst_steps(self) -> BurstSteps:
         """The same in steps of modeled time."""
         return cast(BurstSteps, self._compilation.functions("burst_steps")["burst_steps"])
+
+    @cached_property
+    def scan_lines(self) -> LineForm:
+        """One scan, or a BASIC task's burst, line by line, for stepping."""
+        return self._compilation.line_form()
 
     @cached_property
     def source(self) -> str:
@@ -167,11 +176,19 @@ class _Compilation:
         parts = [self._function(name) for name in names]
         return [self._wrapped(*part) for part in parts]
 
+    def line_form(self) -> LineForm:
+        """Compile the form that yields before each line; it heeds forces."""
+        name = "scan_lines_forced"
+        part = self._function(name)
+        functions = made([self._wrapped(*part)], self._program.name, self._globals)
+        return LineForm(cast(ScanLines, functions[name]), frozenset(part[2].lines))
+
     def _function(self, name: str) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
         scans = name != "startup"
         statements = self._program.scan if scans else self._program.startup
         emitter = Emitter(self._program, self._views, name.startswith("scan_steps"), self._cost)
         emitter.forces = frozenset(self._written()) if name.endswith("_forced") else frozenset()
+        emitter.by_lines = name.startswith("scan_lines")
         lowering = StatementLowering(emitter, dict(self._instances.items()))
         if scans:
             emitter.line = self._program.scan_loop_line
@@ -251,7 +268,8 @@ class _Compilation:
             body.append(build.do(ast.Yield(stopped)))
             forever = build.loop(build.constant(True), body)
             return build.function(name, ["state", "io"], [*opening, build.finally_do([forever], stored)])
-        if lowering.counts_steps or emitter.modeled:
+        emitter.shown.elts += [build.name(known) for known in (*self._fields, *map(variable_name, self._latched))]
+        if lowering.counts_steps or emitter.modeled or emitter.by_lines:
             body = [build.finally_do(body, stored)]
         else:
             body += stored

@@ -41,6 +41,9 @@ class Emitter:
     pending_ns: int = 0
     in_block: bool = False
     forces: frozenset[str] = frozenset()
+    by_lines: bool = False
+    lines: set[int] = field(default_factory=set)
+    shown: ast.Tuple = field(default_factory=lambda: build.names(()))
     _temporaries: int = 0
     _overflows: bool = False
 
@@ -160,6 +163,12 @@ class Emitter:
         if element is not None:
             arguments.append(element)
         self.emit(build.do(build.call(self.member("write_now"), *arguments)))
+
+    def mark_line(self, line: int | None) -> None:
+        """Emit the yield of a BASIC line that begins; ``shown`` gets its names when all of them are known."""
+        if self.by_lines and line is not None:
+            self.lines.add(line)
+            self.emit(build.do(ast.Yield(ast.Tuple([build.constant(line), self.shown], build.LOAD))))
 
     def add_cost(self, nanoseconds: int) -> None:
         """Add modeled execution time to what is not yet booked."""

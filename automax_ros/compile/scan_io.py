@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import enum
-from typing import Protocol
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 from automax_ros.compile.layout import StateValue
 from automax_ros.core.types import Latched, Value
@@ -124,3 +126,16 @@ class BackgroundIo(ScanIo, Protocol):
     def send(self, number: int, message: tuple[Value, ...]) -> int:
         """Put a message into a channel; return 0, the problem, or MUST_WAIT where it is full."""
         ...
+
+
+LineValues = tuple[int, tuple[StateValue, ...]]
+"""A BASIC line that is about to be executed, and the values by then: the state's fields, then the latched commons."""
+ScanLines = Callable[[StateValues, Any], Generator[LineValues, None, bool]]
+
+
+@dataclass(frozen=True)
+class LineForm:
+    """A scan or a burst as a generator that yields before each BASIC line; ``lines`` are all that it can yield."""
+
+    scan: ScanLines
+    lines: frozenset[int]

@@ -84,6 +84,7 @@ class StatementLowering:
     def _lower_straight(self, statements: tuple[Statement, ...]) -> None:
         for statement in statements:
             self._note_line(statement)
+            self.emitter.mark_line(statement.number)
             if isinstance(statement, If):
                 self._straight_if(statement)
             elif isinstance(statement, For):
@@ -182,6 +183,7 @@ class StatementLowering:
                 continue
             flow.count()
             if self._jumps(statement):
+                self.emitter.mark_line(statement.number)
                 self._flow_one(flow, statement)
             else:
                 self._lower_straight((statement,))

@@ -7,8 +7,9 @@ reads of its record (``CHANNEL_VIEWS``), so that the burst can be executed again
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from typing import Any
 
-from automax_ros.compile.compiler import CompiledTask
+from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.compile.scan_io import Suspension, Wish
 from automax_ros.core.types import DataType
 from automax_ros.language.program import OpenedFile
@@ -176,12 +177,14 @@ class BasicTask(Task):
         self._over(self.compiled.burst(self.state, self._io), now_ns)
         return record
 
-    def scan_modeled(self, now_ns: int, skipped: int = 0) -> Generator[int, int | None, ScanRecord | None]:
+    def scan_modeled(
+        self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None
+    ) -> Generator[int, int | None, ScanRecord | None]:
         """Execute one burst in steps, as ``Task`` does a scan. Returns its record, if kept."""
         if self.status is not Status.RUNNING:
             return None
         record = self._begin(now_ns, skipped)
-        steps = self.compiled.burst_steps(self.state, self._io)
+        steps: Generator[int, None, Any] = (form or self.compiled.burst_steps)(self.state, self._io)
         try:
             while True:
                 later = yield next(steps)

@@ -131,6 +131,19 @@ class Scheduler:
             event.action(instant, 0)
         self.now_ns = max(self.now_ns, end_ns)
 
+    def step(self, end_ns: int) -> bool:
+        """Carry out the next event before ``end_ns``, alone; where there is none it is ``end_ns``, and FALSE."""
+        due = self.next_ns
+        if due is None or due >= end_ns:
+            self.now_ns = max(self.now_ns, end_ns)
+            return False
+        self.now_ns = self._end_ns = due
+        event = heapq.heappop(self._queue)[5]
+        if event.period_ns:
+            heapq.heappush(self._queue, self._queued(due + event.period_ns, event))
+        event.action(due, 0)
+        return True
+
     def run_due(self, now_ns: int) -> None:
         """Carry out, in order, what is due at a time of the wall clock, and what becomes due up to then meanwhile.
 

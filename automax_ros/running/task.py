@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import cast
 
-from automax_ros.compile.compiler import CompiledTask
+from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.kinds import WriteKind
@@ -266,19 +266,22 @@ class Task:
             self._too_long(error)
         return record
 
-    def scan_modeled(self, now_ns: int, skipped: int = 0) -> Generator[int, int | None, ScanRecord | None]:
+    def scan_modeled(
+        self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None
+    ) -> Generator[int, int | None, ScanRecord | None]:
         """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
 
-        Yields the ns that pass before the next memory access and is sent the time then, None for the time it is. The
-        state is whole again when the generator has ended.
+        Yields the ns that pass before the next memory access and is sent the time then, None for the time it is; with
+        another ``form`` of the scan, what that yields. The state is whole again when the generator has ended.
         """
         if self.status is not Status.RUNNING:
             return None
         self.scan_number += 1
         record = self._begin_record(now_ns, skipped)
         self.memory.now_ns = now_ns
-        scan_steps = self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
-        steps = scan_steps(self.state, self._io)
+        if form is None:
+            form = self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
+        steps = form(self.state, self._io)
         try:
             while True:
                 later = yield next(steps)
