@@ -67,9 +67,14 @@ class RackState:
 
 
 class Rack:
-    """A rack that runs. ``stopwatch`` (ns, monotonic) measures execution times; without one they count as 0."""
+    """A rack that runs. ``stopwatch`` (ns, monotonic) measures execution times; without one they count as 0.
 
-    def __init__(self, config: RackConfig, *, stopwatch: Callable[[], int] | None = None) -> None:
+    ``execution`` executes the scans of all modules in place of what the configuration says (``rack/stepping``).
+    """
+
+    def __init__(
+        self, config: RackConfig, *, stopwatch: Callable[[], int] | None = None, execution: Execution | None = None
+    ) -> None:
         """Compile all tasks against the rack's common memory and build the modules.
 
         Raises:
@@ -100,7 +105,7 @@ class Rack:
             interrupts=self._interrupts,
             inputs=self._inputs,
             install=self._install,
-            execution=self._execution,
+            execution=self._execution if execution is None else lambda _: execution,
             tell_writes=self.observers.tell_writes,
             writer={item.name: item.id for item in self.writers if item.kind is WriterKind.IO}.__getitem__,
         )

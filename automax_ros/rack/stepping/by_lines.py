@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping
 from typing import cast
 
-from automax_ros.compile.compiler import LineValues, ScanSteps
+from automax_ros.compile.compiler import ScanSteps
+from automax_ros.compile.scan_io import LineValues
 from automax_ros.core.types import Value
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.running.execution import Job
