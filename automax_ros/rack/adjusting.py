@@ -27,6 +27,8 @@ from automax_ros.running.tuning_steps import stepped
 from automax_ros.running.views import MemoryValueError
 
 Tune = Callable[[Task, str, object], None]
+_UNTOLD = ""
+"""The name of an operation that observers are not told of."""
 
 
 class Adjustments:
@@ -83,18 +85,16 @@ class Adjustments:
             OperationRefused: there is no such common, it is forced (J2-3093 p. 5-17) or written by the rack itself, the
                 value does not fit, or the power is off.
         """
-        found = self._common("set", name)
-        view = self._memory.view(found.name)
-        if found.name in PREDEFINED:
-            self._refuse("set", f"{found.name} cannot be set: the rack itself writes it")
-        if (view, found.index) in self._memory.forced:
-            held = source_text(self._memory.read_now(view, found.index))
-            self._refuse(
-                "set", f"{found.name} cannot be set: it is forced at {held}; force another value or release it"
-            )
-        write = self._memory.write_from_outside
-        self._carry_out("set", lambda: write(view, value, OPERATOR_WRITER, found.index))
-        self._tell("set", detail=_assignment(found.label, value))
+        label = self._write("set", name, value)
+        self._tell("set", detail=_assignment(label, value))
+
+    def write(self, name: str, value: Value) -> None:
+        """Do what ``set`` does as one of many samples: nobody is told of an operation, the write log has it (decision).
+
+        Raises:
+            OperationRefused: as ``set``.
+        """
+        self._write(_UNTOLD, name, value)
 
     def tune(self, name: str, value: float) -> None:
         """Set a tunable, ``TASK.NAME``, to any value within its limits (decision: STEP binds only ``tune_step``).
@@ -114,6 +114,19 @@ class Adjustments:
         """
         task, tunable = self._tunable("tune", name)
         self._change("tune", task, tunable, stepped(task, tunable, steps))
+
+    def _write(self, what: str, name: str, value: Value) -> str:
+        """Write a common or an element; return its full name."""
+        found = self._common(what, name)
+        view = self._memory.view(found.name)
+        if found.name in PREDEFINED:
+            self._refuse(what, f"{found.name} cannot be set: the rack itself writes it")
+        if (view, found.index) in self._memory.forced:
+            held = source_text(self._memory.read_now(view, found.index))
+            self._refuse(what, f"{found.name} cannot be set: it is forced at {held}; force another value or release it")
+        write = self._memory.write_from_outside
+        self._carry_out(what, lambda: write(view, value, OPERATOR_WRITER, found.index))
+        return found.label
 
     def _change(self, what: str, task: Task, tunable: str, value: float) -> None:
         try:
@@ -157,12 +170,14 @@ class Adjustments:
             call()
         except MemoryValueError as error:
             self._refuse(what, str(error))
+        self._observers.tell_writes()
 
     def _tell(self, what: str, task: str = "", *, ok: bool = True, reason: str = "", detail: str = "") -> None:
         self._observers.operated(Operation(self._scheduler.now_ns, what, task, ok, reason, detail))
 
     def _refuse(self, what: str, reason: str, task: str = "") -> NoReturn:
-        self._tell(what, task, ok=False, reason=reason)
+        if what != _UNTOLD:
+            self._tell(what, task, ok=False, reason=reason)
         raise OperationRefused(reason)
 
 

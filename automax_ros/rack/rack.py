@@ -360,7 +360,8 @@ class Rack:
         return usual_trigger(task, self.events, self.scheduler)
 
     def _clock_fault(self, reason: str, code: str) -> None:
-        self.operations.stop_all(reason, code)
+        if self.operations.powered:
+            self.operations.stop_all(reason, code)
 
     def _after_and(self, then: Callable[[Task], None], task: Task, record: ScanRecord | None) -> None:
         self._after(task, record)

@@ -137,6 +137,18 @@ def test_a_forced_variable_cannot_be_set(made):
     assert (rack.value("REF%"), rack.value("TABLE%", 2)) == (60, 9)
 
 
+def test_a_sample_is_written_like_a_set_but_nobody_is_told_of_an_operation(made):
+    rack, told = made
+    writes = rack.memory.sequence
+    rack.adjust.write("table%(2)", 5)
+    assert (rack.value("TABLE%", 2), rack.memory.sequence) == (5, writes + 1)
+    rack.adjust.force("REF%", 60)
+    for name, value in (("REF%", 1), ("FORCINGSTATUS@", True), ("NONE%", 1), ("TABLE%(1)", 40000)):
+        with pytest.raises(OperationRefused):
+            rack.adjust.write(name, value)
+    assert [(item.what, item.ok) for item in told] == [("force", True)]
+
+
 def test_what_is_not_forced_cannot_be_released_and_nothing_else_is(made):
     rack, _ = made
     rack.adjust.force("REF%", 60)

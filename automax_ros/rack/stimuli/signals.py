@@ -74,7 +74,7 @@ class RackSignals:
             variable.length,
             *variable.type.range,
             partial(self.rack.memory.read_now, view, meant.index),
-            partial(self.rack.adjust.set, meant.label),
+            partial(self.rack.adjust.write, meant.label),
             partial(self._write, view, meant.index),
         )
 
