@@ -27,6 +27,7 @@ SUBCOMMANDS: dict[str, str] = {
     "convert": "make tasks of an old plant acceptable",
     "run": "run a rack",
     "record": "record a rack that runs",
+    "ctl": "operate a rack that runs: RUN, STOP, force, set, tune",
     "replay": "execute a recording again and show the first scan that differs",
     "play": "send the messages of a recording again, with /clock",
     "bag": "tell what a recording holds, repair one",

@@ -8,7 +8,6 @@ on; the recorder asks the rack for both. Ctrl-C ends it.
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 import time
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.writer import StorageOptions
+from automax_ros.cli.rack_space import config_of, names_file, space_of
 from automax_ros.cli.record_options import split_seconds, storage_options
 from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
 from automax_ros.cli.ros import prepare_ros
@@ -26,20 +26,18 @@ from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds_above_0
-from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.text import count_of, did_you_mean, quoted
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.ros_names import namespace
+from automax_ros.rack.tasks_check import check_tasks
 from automax_ros.wire.cdr import CdrError
 from automax_ros.wire.messages import VariableTable
-from automax_ros.wire.rack_files import RACK_FILE, RackFile, RackFilesError
+from automax_ros.wire.rack_files import RACK_FILE, RackFile, RackFilesError, source_name
 
 if TYPE_CHECKING:
     from automax_ros.nodes.recorder import LiveRecorder
 
 DEFAULT_WAIT_S = "10"
-_SPACE = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*){0,7}")
 _PATIENCE_S = 3.0
 """A rack that is gone for so long is reported."""
 _GAPS_SHOWN = 20
@@ -268,26 +266,11 @@ class _Session:
 
 def _rack(text: str) -> tuple[str, list[RackFile]]:
     """Return the namespace with its slash, and the files where RACK is a YAML file."""
-    path = Path(text)
-    if path.suffix.lower() in {".yaml", ".yml"} or path.is_file():
-        return _from_file(path)
-    space = text.strip().rstrip("/")
-    if space and "/" not in space:
-        space = namespace(space)
-    if not _SPACE.fullmatch(space):
-        raise UsageError(f"{quoted(text)} is neither a rack's name or namespace nor a YAML file")
-    return f"/{space.lstrip('/')}", []
-
-
-def _from_file(path: Path) -> tuple[str, list[RackFile]]:
-    from automax_ros.rack.loader import load
-    from automax_ros.rack.tasks_check import check_tasks
-
-    result = load(path, allow_outside=True)
-    if result.config is None or has_errors(result.diagnostics):
-        raise UsageError(f"{path} is not a sound rack file", f"`automax check {path}` shows what is wrong")
-    sources = [RackFile(f"{task.name}.BLK", source.text) for task, source, _ in check_tasks(result.config)]
-    return f"/{result.config.namespace}", [RackFile(RACK_FILE, result.config.text), *sources]
+    if not names_file(text):
+        return space_of(text), []
+    config = config_of(Path(text))
+    sources = [RackFile(source_name(task.name, task.file.name), source.text) for task, source, _ in check_tasks(config)]
+    return f"/{config.namespace}", [RackFile(RACK_FILE, config.text), *sources]
 
 
 def _tasks(table: VariableTable) -> list[str]:

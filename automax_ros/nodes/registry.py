@@ -10,6 +10,7 @@ from collections.abc import Callable
 from automax_ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.nodes.io_module import IoModuleNode
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.operator import OperatorNode
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.nodes.udc import UdcNode
 from automax_ros.rack.modules.analog_io import ANALOG_IO
@@ -37,8 +38,10 @@ NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
 
 
 def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
-    """Create the nodes of a rack: that of common memory, then those of its modules by slot."""
+    """Create the nodes of a rack: that of common memory, an operator's if it has one, those of its modules by slot."""
     made: list[ModuleNode] = [CommonMemoryNode(site)]
+    if site.rack.config.operator:
+        made.append(OperatorNode(site))
     for module in site.rack.modules:
         node = NODES[SUPPORTED[module.config.model]]
         if node is not None:

@@ -83,6 +83,7 @@ class RackStream:
         """Prepare the topics; nothing flows before ``begin``."""
         space = f"/{rack.config.namespace}"
         self._rack = rack
+        self.run_id = run_id
         self._messages = RackMessages(rack, run_id)
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)

@@ -1,0 +1,102 @@
+"""Operate a rack that runs, from any process of its ROS 2 domain.
+
+RACK is the rack's name or namespace, or its YAML file. The rack must say `operator: true`; what is asked happens
+between two scans and is recorded. Exit code 0: done; 1: the rack refused something; 2: wrong usage, or no such rack.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from automax_ros.cli.ctl_actions import ACTIONS, Action, Ask
+from automax_ros.cli.rack_space import space_of
+from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.usage import UsageError
+from automax_ros.cli.window import seconds_above_0
+
+if TYPE_CHECKING:
+    from automax_ros.nodes.operating import RackClient
+
+DEFAULT_TIMEOUT_S = "5"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax ctl`` and of its actions."""
+    parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file")
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
+    for name, action in ACTIONS.items():
+        own = actions.add_parser(name, help=action.help, description=action.help)
+        action.add_arguments(own)
+        own.add_argument("--json", action="store_true", help="print the answers for programs to read")
+        own.add_argument(
+            "--timeout",
+            type=seconds_above_0,
+            metavar="S",
+            default=DEFAULT_TIMEOUT_S,
+            help=f"seconds to look for the rack, and to wait for each answer (default: {DEFAULT_TIMEOUT_S})",
+        )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Ask the rack; 1 where it refused something, 2 where it could not be asked."""
+    action = ACTIONS[arguments.action]
+    domain = prepare_ros()
+    space = space_of(arguments.rack)
+    asks = action.asks(arguments)
+    from automax_ros.nodes.operating import NotOperable, RackClient
+
+    try:
+        with RackClient(space) as client:
+            client.find(arguments.timeout)
+            answers = [(ask, _answer(client, ask, arguments.timeout)) for ask in asks]
+    except NotOperable as fault:
+        raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault
+    if arguments.json:
+        _print_json(action, arguments.action, answers)
+    else:
+        _print(action, arguments.action, answers)
+    return 0 if all(_ok(answer) for _, answer in answers) else 1
+
+
+def _answer(client: RackClient, ask: Ask, wait_ns: int) -> Any:
+    package, _, name = ask.type_name.partition("/")
+    kind = getattr(importlib.import_module(f"{package}.srv"), name)
+    return client.call(kind, ask.service, kind.Request(**ask.fields), wait_ns)
+
+
+def _ok(answer: Any) -> bool:
+    """Return whether the rack did what was asked: the readings that cannot be refused do not say."""
+    return bool(getattr(answer, "ok", getattr(answer, "success", True)))
+
+
+def _reason(answer: Any) -> str:
+    return str(getattr(answer, "reason", getattr(answer, "message", "")))
+
+
+def _print(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
+    for ask, answer in answers:
+        for text in getattr(answer, "findings", ()):
+            print(text, file=sys.stderr)
+        if not _ok(answer):
+            print(f"automax ctl: {' '.join((what, ask.of)).strip()}: refused: {_reason(answer)}", file=sys.stderr)
+        elif action.read is None:
+            print(f"{what} {ask.of}: done" if ask.of else f"{what}: done")
+        else:
+            for line in action.lines(action.read(answer)):
+                print(line)
+
+
+def _print_json(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
+    found = []
+    for ask, answer in answers:
+        entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": _ok(answer), "reason": _reason(answer)}
+        if getattr(answer, "findings", ()):
+            entry["findings"] = list(answer.findings)
+        if action.read is not None and _ok(answer):
+            entry["answer"] = action.read(answer)
+        found.append(entry)
+    print(json.dumps(found, indent=2))

@@ -1,0 +1,197 @@
+"""What `automax ctl` can ask of a rack: each action's arguments, the requests that they make, the answers as lines.
+
+Each action is one entry of ACTIONS; requests are built here, sent by ``ctl``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.text import quoted
+from automax_ros.rack.files import FileFault
+from automax_ros.rack.task_source import read_task_source
+
+
+@dataclass(frozen=True)
+class Ask:
+    """One request: the service, its type as ``package/Type``, the request's fields, and what it is about."""
+
+    service: str
+    type_name: str
+    fields: Mapping[str, Any] = field(default_factory=dict)
+    of: str = ""
+
+
+@dataclass(frozen=True)
+class Action:
+    """An action: its line of help, its arguments, its requests, and for a reading what an answer holds.
+
+    ``read`` returns data for JSON, ``lines`` how a person reads them.
+    """
+
+    help: str
+    asks: Callable[[argparse.Namespace], list[Ask]]
+    add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
+    read: Callable[[Any], Any] | None = None
+    lines: Callable[[Any], Iterable[str]] = lambda _: ()
+
+
+def _tasks(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tasks", nargs="+", metavar="TASK", help="a task of the rack")
+
+
+def _some_tasks(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tasks", nargs="*", metavar="TASK", help="a task of the rack (default: all)")
+
+
+def _assignments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "assignments", nargs="+", metavar="NAME=VALUE", help="REF%%=1500, TABLE%%(3)=7, RUN@=ON; tune: SPEED.KP=1.2"
+    )
+
+
+def _names(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("names", nargs="+", metavar="NAME", help="REF%%, TABLE%%(3), SPEED.ERROR%%")
+
+
+def _released(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("names", nargs="*", metavar="NAME", help="what is forced")
+    parser.add_argument("--all", action="store_true", help="end all forces")
+
+
+def _reloaded(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("task", metavar="TASK", help="the task")
+    parser.add_argument("file", type=Path, metavar="FILE", help="its new source, on this computer")
+    parser.add_argument(
+        "--keep-state", action="store_true", help="carry values over by name (default: locals 0, tunables as written)"
+    )
+
+
+def _each_task(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    return lambda given: [Ask(service, "automax_msgs/OperateTask", {"task": name}, name) for name in given.tasks]
+
+
+def _each_assignment(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    def asks(given: argparse.Namespace) -> list[Ask]:
+        found = []
+        for text in given.assignments:
+            name, equals, value = text.partition("=")
+            if not (name.strip() and equals):
+                raise UsageError(f"{quoted(text)} is not NAME=VALUE")
+            fields = {"name": name.strip(), "value": value}
+            found.append(Ask(service, "automax_msgs/SetValue", fields, f"{name.strip()} = {value}"))
+        return found
+
+    return asks
+
+
+def _release(given: argparse.Namespace) -> list[Ask]:
+    if bool(given.names) == given.all:
+        raise UsageError("unforce takes names, or --all")
+    return [Ask("unforce", "automax_msgs/Unforce", {"names": given.names}, " ".join(given.names) or "all")]
+
+
+def _reload(given: argparse.Namespace) -> list[Ask]:
+    try:
+        source = read_task_source(given.file)
+    except FileFault as fault:
+        raise UsageError(f"{given.file} {fault}") from fault
+    fields = {"task": given.task, "source": source.text, "keep_state": given.keep_state}
+    return [Ask("reload", "automax_msgs/Reload", fields, f"{given.task} with {given.file}")]
+
+
+def _clear(given: argparse.Namespace) -> list[Ask]:
+    tasks = given.tasks or [""]
+    return [Ask("clear_errors", "automax_msgs/OperateTask", {"task": name}, name or "all tasks") for name in tasks]
+
+
+def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    return lambda _: [Ask(service, type_name)]
+
+
+def _values(answer: Any) -> list[dict[str, str]]:
+    return [{"name": name, "value": text} for name, text in zip(answer.found, answer.values, strict=True)]
+
+
+def _value_lines(data: Any) -> Iterable[str]:
+    return (f"{item['name']} = {item['value']}" for item in data)
+
+
+def _fields(item: Any) -> dict[str, Any]:
+    """Return the fields of a message of plain values."""
+    return {name: getattr(item, name) for name in item.get_fields_and_field_types()}
+
+
+def _task_lines(data: Any) -> Iterable[str]:
+    yield f"{'task':8} {'module':14} {'status':14} {'prio':>4} {'ms':>8} {'scans':>10} {'skipped':>8} {'errors':>7}"
+    for item in data:
+        period = f"{item['period_ms']:g}" if item["period_ms"] else "event"
+        yield (
+            f"{item['task']:8} {item['module']:14} {item['status']:14} {item['priority']:4} {period:>8} "
+            f"{item['scans']:10} {item['skipped']:8} {item['errors']:7}"
+        )
+
+
+def _error_lines(data: Any) -> Iterable[str]:
+    for item in data:
+        place = f"scan {item['scan']}, line {item['line']}"
+        yield f"{item['task']:8} {item['place']:6} {place}: {item['code']} {item['text']}"
+    if not data:
+        yield "no errors are logged"
+
+
+def _status_lines(data: Any) -> Iterable[str]:
+    power = "" if data["powered"] else ", the power is off"
+    yield f"rack {data['rack']}: {data['time_s']:.3f} s, {data['running']} of {data['tasks']} tasks run{power}"
+    if data["stopped"]:
+        code = f" (code {data['stopped_code']})" if data["stopped_code"] else ""
+        yield f"stopped at {data['stopped_at_s']:.3f} s{code}: {data['stopped_reason']}"
+    if data["forced"]:
+        yield f"forced: {data['forced']}"
+
+
+ACTIONS: Mapping[str, Action] = {
+    "run": Action("put tasks into RUN", _each_task("run"), _tasks),
+    "stop": Action("stop tasks", _each_task("stop"), _tasks),
+    "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger")),
+    "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger")),
+    "set": Action("write commons once", _each_assignment("set"), _assignments),
+    "get": Action(
+        "read commons, array elements, variables of tasks",
+        lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names})],
+        _names,
+        _values,
+        _value_lines,
+    ),
+    "force": Action("hold commons at values against every write", _each_assignment("force"), _assignments),
+    "unforce": Action("end forces", _release, _released),
+    "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=_values, lines=_value_lines),
+    "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments),
+    "reload": Action("replace the source of a task while the others run", _reload, _reloaded),
+    "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),
+    "errors": Action(
+        "the error logs",
+        lambda given: [Ask("errors", "automax_msgs/ReadErrors", {"task": name}) for name in given.tasks or [""]],
+        _some_tasks,
+        lambda answer: [_fields(item) for item in answer.errors],
+        _error_lines,
+    ),
+    "tasks": Action(
+        "how the tasks stand",
+        _one("tasks", "automax_msgs/ReadTasks"),
+        read=lambda answer: [_fields(item) for item in answer.tasks],
+        lines=_task_lines,
+    ),
+    "status": Action(
+        "how the rack stands, and what stopped it",
+        _one("status", "automax_msgs/ReadStatus"),
+        read=_fields,
+        lines=_status_lines,
+    ),
+}
+"""What can be asked, by the word for it."""

@@ -1,0 +1,126 @@
+"""Operates a rack that runs in another process, through the services of its node ``operator``."""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.nodes.environment import RosUnavailable
+
+_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
+_LOOK_S = 0.05
+_SETTLED_NS = 2 * NS_PER_S
+"""A rack whose table has been seen for so long without its operator has none (decision)."""
+_TABLE_TYPE = "automax_msgs/msg/VariableTable"
+_OPERATOR = "operator"
+
+
+class NotOperable(Fault):
+    """There is no such rack, it has no operator, there are several of the name, or it does not answer."""
+
+
+class RackClient:
+    """One program's access to the operator of a rack; a context manager. ``space`` is the namespace with its slash.
+
+    Raises:
+        RosUnavailable: ROS cannot be initialised.
+    """
+
+    def __init__(self, space: str) -> None:
+        """Join the graph."""
+        self._space = space
+        self._context = Context()
+        try:
+            self._context.init(args=_NO_CONSOLE)
+        except RuntimeError as error:
+            raise RosUnavailable(f"ROS 2 does not start: {error}") from error
+        quiet = [Parameter("start_type_description_service", value=False)]
+        self._node = Node(
+            f"ctl_{os.getpid()}",
+            context=self._context,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=quiet,
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._clients: dict[str, Any] = {}
+
+    def __enter__(self) -> RackClient:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def find(self, wait_ns: int) -> None:
+        """Wait until the rack is seen with its operator.
+
+        Raises:
+            NotOperable: no such rack within the time, one without an operator, or several of the name.
+        """
+        deadline = time.monotonic_ns() + wait_ns
+        seen: int | None = None
+        while True:
+            now = time.monotonic_ns()
+            racks, operators = self._racks(), self._operators()
+            if seen is None and racks:
+                seen = now
+            if racks > 1 or operators > 1:
+                hint = "stop one of them, or give one another ROS_DOMAIN_ID"
+                raise NotOperable(f"{max(racks, operators)} racks are called {self._space}", hint)
+            if operators:
+                return
+            if seen is not None and (now - seen > _SETTLED_NS or now > deadline):
+                hint = "say `operator: true` in its YAML file and start it again"
+                raise NotOperable(f"rack {self._space} has no operator's services", hint)
+            if now > deadline:
+                raise self._absent(wait_ns)
+            time.sleep(_LOOK_S)
+
+    def call(self, kind: Any, name: str, request: Any, wait_ns: int) -> Any:
+        """Ask a service of the rack and return its answer.
+
+        Raises:
+            NotOperable: no answer within the time.
+        """
+        asking = self._clients.get(name)
+        if asking is None:
+            asking = self._clients[name] = self._node.create_client(kind, f"{self._space}/{name}")
+        deadline = time.monotonic_ns() + wait_ns
+        while not asking.service_is_ready():
+            self._spin(deadline, name)
+        future = asking.call_async(request)
+        while not future.done():
+            self._spin(deadline, name)
+        return future.result()
+
+    def _spin(self, deadline: int, name: str) -> None:
+        if time.monotonic_ns() > deadline:
+            hint = "it may be busy or gone; --timeout waits longer. What was asked may still happen"
+            raise NotOperable(f"rack {self._space} does not answer on {name}", hint)
+        self._executor.spin_once(timeout_sec=_LOOK_S)
+
+    def _racks(self) -> int:
+        return int(self._node.count_publishers(f"{self._space}/variables"))
+
+    def _operators(self) -> int:
+        nodes = self._node.get_node_names_and_namespaces()
+        return sum(name == _OPERATOR and space == self._space for name, space in nodes)
+
+    def _absent(self, wait_ns: int) -> NotOperable:
+        tables = [name for name, types in self._node.get_topic_names_and_types() if _TABLE_TYPE in types]
+        there = sorted(name.removesuffix("/variables") for name in tables if self._node.count_publishers(name))
+        hint = f"there are {', '.join(there)}" if there else "start it first, or set its ROS_DOMAIN_ID"
+        return NotOperable(f"no rack {self._space} is seen within {wait_ns / NS_PER_S:g} s", hint)

@@ -1,0 +1,187 @@
+"""What an operator asks of a rack in words: names and values as texts, as services and commands bring them.
+
+A text that means nothing is refused with a reason, and the refusal is told to observers, as the rack's own refusals
+are. Everything happens between two scans: whoever calls has seen to that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NoReturn
+
+from automax_ros.core.diagnostics import SourceText, render
+from automax_ros.core.faults import Fault
+from automax_ros.core.names import NameFault
+from automax_ros.core.text import printable, quoted
+from automax_ros.core.types import DataType, Value, type_of_name
+from automax_ros.core.values import source_text, value_of, wanted
+from automax_ros.rack.files import MAX_BYTES
+from automax_ros.rack.installation import RackError
+from automax_ros.rack.observers import Operation
+from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.settings import common_named
+
+MAX_NAME = 100
+"""Longest name that is looked at, in characters (decision: a bound on what strangers send)."""
+MAX_VALUE = 1000
+"""Longest text of a value that is looked at, in characters (decision: likewise)."""
+MAX_NAMES = 1000
+"""Most names in one request (decision: likewise)."""
+_MOST_FINDINGS = 100
+
+
+class ReloadRefused(OperationRefused):
+    """A source was not taken; ``findings`` are what its check found, each as a text of several lines."""
+
+    def __init__(self, reason: str, findings: Sequence[str]) -> None:
+        super().__init__(reason)
+        self.findings = tuple(findings)
+
+
+class Orders:
+    """Carries out what is asked of one rack.
+
+    Raises:
+        OperationRefused: all methods, where the rack refuses or a text means nothing.
+    """
+
+    def __init__(self, rack: Rack) -> None:
+        self._rack = rack
+
+    def run(self, task: str) -> None:
+        """Put a task into RUN."""
+        self._rack.operations.run(self._task("run", task))
+
+    def stop(self, task: str) -> None:
+        """Stop a task."""
+        self._rack.operations.stop(self._task("stop", task))
+
+    def run_all(self) -> None:
+        """Put all tasks into RUN."""
+        self._rack.operations.run_all()
+
+    def stop_all(self) -> None:
+        """Stop the rack."""
+        self._rack.operations.stop_all("STOP ALL by the operator")
+
+    def clear_errors(self, task: str = "") -> None:
+        """Clear the error log of a task, of all without a name."""
+        self._rack.operations.clear_errors(self._task("clear_errors", task) if task.strip() else None)
+
+    def set(self, name: str, value: str) -> None:
+        """Write a common or an array's element once."""
+        self._rack.adjust.set(name, self._common_value("set", name, value))
+
+    def force(self, name: str, value: str) -> None:
+        """Hold a common at a value."""
+        self._rack.adjust.force(name, self._common_value("force", name, value))
+
+    def unforce(self, names: Sequence[str]) -> None:
+        """End forces, all of them without names."""
+        for name in self._few("unforce", names):
+            self._short("unforce", name, MAX_NAME)
+        self._rack.adjust.unforce(list(names) or None)
+
+    def tune(self, name: str, value: str) -> None:
+        """Set a tunable, ``TASK.NAME``."""
+        self._short("tune", name, MAX_NAME)
+        kind = type_of_name("".join(name.split()).upper())
+        held = self._value("tune", name, value, kind, 0)
+        self._rack.adjust.tune(name, 0 if isinstance(held, str) else held)
+
+    def reload(self, task: str, source: str, *, keep_state: bool = False) -> list[str]:
+        """Replace a task's source by a text; return what its check found, short of errors.
+
+        Raises:
+            ReloadRefused: the source has errors; the old one goes on.
+        """
+        name = self._task("reload", task)
+        if len(source) > MAX_BYTES:
+            self._refuse("reload", f"a source of {len(source)} characters: at most {MAX_BYTES} are read", name)
+        present = self._rack.sources.get(name)
+        text = SourceText(present.name if present else name, source)
+        try:
+            self._rack.operations.reload(name, text, keep_state=keep_state)
+        except RackError as error:
+            found = [render(item, where) for where, items in error.findings for item in items]
+            raise ReloadRefused(str(error), found[:_MOST_FINDINGS]) from error
+        return []
+
+    def get(self, names: Sequence[str]) -> list[tuple[str, str]]:
+        """Return commons, their elements, and variables of tasks (``TASK.NAME``): each name with its value's text."""
+        return [self._shown(name) for name in self._few("get", names)]
+
+    def forces(self) -> list[tuple[str, str]]:
+        """Return the force table."""
+        return [(item.name, source_text(item.value)) for item in self._rack.forces()]
+
+    def tasks_named(self, task: str) -> list[str]:
+        """Return a task, all of the rack without a name."""
+        return [self._known(task)] if task.strip() else [item.name for item in self._rack.tasks]
+
+    def _shown(self, name: str) -> tuple[str, str]:
+        if len(name) > MAX_NAME:
+            raise OperationRefused(f"a name of {len(name)} characters: the longest has {MAX_NAME}")
+        plain = "".join(name.split()).upper()
+        owner, dot, local = plain.partition(".")
+        if dot:
+            return plain, self._local(self._known(owner), local)
+        try:
+            found = common_named(self._rack.config, name)
+        except NameFault as fault:
+            raise OperationRefused(_reason(fault)) from fault
+        return found.label, source_text(self._rack.value(found.name, found.index))
+
+    def _local(self, task: str, name: str) -> str:
+        try:
+            value = self._rack.task(task).value(name)
+        except KeyError as error:
+            raise OperationRefused(f"task {task} has no variable {quoted(name)} of its own") from error
+        return ", ".join(map(source_text, value)) if isinstance(value, list) else source_text(value)
+
+    def _common_value(self, what: str, name: str, text: str) -> Value:
+        """Return the value that a text writes for a common; a name that is none is left for the rack to refuse."""
+        self._short(what, name, MAX_NAME)
+        try:
+            variable = common_named(self._rack.config, name).variable
+        except NameFault:
+            return 0
+        return self._value(what, name, text, variable.type, variable.length)
+
+    def _value(self, what: str, name: str, text: str, kind: DataType, length: int) -> Value:
+        self._short(what, text, MAX_VALUE)
+        value = value_of(text if kind is DataType.STRING else text.strip(), kind, length)
+        if value is None:
+            reason = f"{quoted(text)} is not a value for {printable(name)}: it takes {wanted(kind, length)}"
+            self._refuse(what, reason)
+        return value
+
+    def _task(self, what: str, name: str) -> str:
+        self._short(what, name, MAX_NAME)
+        return name.strip().upper()
+
+    def _known(self, name: str) -> str:
+        """Return a task's name; a question is not an operation, so nobody is told of its refusal."""
+        known = {item.name for item in self._rack.tasks}
+        plain = name.strip().upper()
+        if plain not in known:
+            raise OperationRefused(f"the rack has no task {quoted(name)}: it has {', '.join(sorted(known))}")
+        return plain
+
+    def _few(self, what: str, names: Sequence[str]) -> Sequence[str]:
+        if len(names) > MAX_NAMES:
+            self._refuse(what, f"{len(names)} names: at most {MAX_NAMES} are taken at once")
+        return names
+
+    def _short(self, what: str, text: str, most: int) -> None:
+        if len(text) > most:
+            self._refuse(what, f"a text of {len(text)} characters: at most {most} are read")
+
+    def _refuse(self, what: str, reason: str, task: str = "") -> NoReturn:
+        self._rack.observers.operated(Operation(self._rack.now_ns, what, task, ok=False, reason=reason))
+        raise OperationRefused(reason)
+
+
+def _reason(fault: Fault) -> str:
+    return f"{fault.message}: {fault.hint}" if fault.hint else fault.message

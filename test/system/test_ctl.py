@@ -1,0 +1,137 @@
+"""`automax ctl` and the services of a running rack, over real DDS; what was done is recorded and replayed."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+
+from automax_ros.bags.reader import BagReader
+from automax_ros.replay.engine import ReplayOptions, replay
+
+from .support import RACKS, TYPES, Automax, Client, automax
+
+OPERATED = RACKS / "operated" / "rack.yaml"
+READY = "Ctrl-C ends the run"
+PATIENT = ("--timeout", "30")
+
+
+@pytest.fixture(scope="module")
+def rack(module_domain_id, tmp_path_factory):
+    """A rack that runs for all tests of the module, and its recording."""
+    bag = tmp_path_factory.mktemp("operated") / "bag"
+    with Automax("run", OPERATED, "--record", bag) as process:
+        process.wait_for_line(READY)
+        process.bag = bag
+        yield process
+
+
+def ctl(*arguments: str | Path):
+    return automax("ctl", "OPERATED", *arguments, *PATIENT)
+
+
+def test_a_rack_is_operated_from_another_process(rack, tmp_path):
+    assert ctl("stop", "LINE").out == "stop LINE: done\n"
+    refused = ctl("stop", "SPEED")
+    assert (refused.code, refused.out) == (1, "")
+    assert "automax ctl: stop SPEED: refused: task SPEED is critical" in refused.err
+    ended = ctl("set", "REF%=200", "NIL%=1", "--json")
+    assert ended.code == 1
+    good, bad = json.loads(ended.out)
+    assert good == {"what": "set", "of": "REF% = 200", "ok": True, "reason": ""}
+    assert bad["ok"] is False
+    assert "no common variable" in bad["reason"]
+    assert ctl("tune", "SPEED.TRIM%=5").code == 0
+    assert ctl("get", "REF%", "SPEED.TRIM%", "OUT%").out == "REF% = 200\nSPEED.TRIM% = 5\nOUT% = 205\n"
+    assert ctl("force", "OUT%=-1").code == 0
+    assert ctl("forces").out == "OUT% = -1\n"
+    errors = ctl("errors").out
+    assert errors.startswith("LINE     first  scan 3, line 120: AMX")
+    tasks = json.loads(ctl("tasks", "--json").out)[0]["answer"]
+    assert [(item["task"], item["module"], item["status"], item["priority"]) for item in tasks] == [
+        ("LINE", "processor_1", "stopped", 4),
+        ("SPEED", "processor_1", "running", 5),
+    ]
+    assert tasks[1]["period_ms"] == 11.0
+    edited = tmp_path / "LINE.BLK"
+    edited.write_text(OPERATED.with_name("LINE.BLK").read_text().replace("COUNT! + 1", "COUNT! + NIL!"))
+    wrong = ctl("reload", "LINE", edited)
+    assert wrong.code == 1
+    assert "LINE.BLK:4:" in wrong.err
+    edited.write_text(OPERATED.with_name("LINE.BLK").read_text().replace("COUNT! + 1", "COUNT! + 10"))
+    assert ctl("reload", "LINE", edited).code == 0
+    assert ctl("run", "LINE").code == 0
+    assert ctl("stop-all").code == 0
+    status = json.loads(ctl("status", "--json").out)[0]["answer"]
+    assert (status["rack"], status["running"], status["tasks"], status["forced"]) == ("OPERATED", 0, 2, 1)
+    assert (status["stopped"], status["stopped_reason"]) == (True, "STOP ALL by the operator")
+    assert ctl("unforce", "--all").code == 0
+    assert ctl("run-all").code == 0
+    assert "stopped" not in ctl("status").out
+
+
+def test_what_was_done_is_told_to_late_joiners_and_recorded_and_the_recording_replays(rack):
+    from automax_msgs.msg import Operation
+
+    with Client() as client:
+        told = client.listen(Operation, "/operated/operations", latched=True, depth=100)
+        client.until(lambda: bool(told) and told[-1].what == "run_all", "the last operation")
+    assert rack.end(signal.SIGINT).code == 0
+    recorded = [item.message for item in BagReader(rack.bag).messages(types={"automax_msgs/msg/Operation"})]
+    assert [(item.what, item.task, item.ok) for item in told] == [(item.what, item.task, item.ok) for item in recorded]
+    assert [(item.what, item.ok) for item in recorded] == [
+        ("stop", True),
+        ("stop", False),
+        ("set", True),
+        ("set", False),
+        ("tune", True),
+        ("force", True),
+        ("reload", False),
+        ("reload", True),
+        ("run", True),
+        ("stop_all", True),
+        ("unforce", True),
+        ("run_all", True),
+    ]
+    report = replay(rack.bag, {}, ReplayOptions())
+    assert report.identical
+    notes = {task.name: task.notes for task in report.tasks}
+    assert any(note.startswith("reloaded at") for note in notes["LINE"])
+    assert not any("not stored" in note or "could not" in note for task in report.tasks for note in task.notes)
+
+
+def test_without_an_operator_nothing_can_be_operated(ros_domain_id):
+    absent = automax("ctl", "TYPES", "status", "--timeout", "0.5")
+    assert absent.code == 2
+    assert "no rack /types is seen within 0.5 s" in absent.err
+    with Automax("run", TYPES) as rack:
+        rack.wait_for_line(READY)
+        closed = automax("ctl", TYPES, "stop-all", *PATIENT)
+        with Client() as client:
+            names = [name for name, _ in client.node.get_service_names_and_types()]
+        assert not [name for name in names if name in ("/types/stop_all", "/types/run", "/types/set")]
+    assert closed.code == 2
+    assert "rack /types has no operator's services" in closed.err
+    assert "operator: true" in closed.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("PM 1!", "status"), "neither a rack's name"),
+        (("PM1", "set", "REF%"), "is not NAME=VALUE"),
+        (("PM1", "unforce"), "takes names, or --all"),
+        (("PM1", "reload", "LINE", "missing.BLK"), "missing.BLK"),
+        (("PM1", "fly"), "invalid choice"),
+        (("PM1", "status", "--timeout", "0"), "too short"),
+    ],
+)
+def test_wrong_usage(automax_cli, arguments, reason):
+    result = automax_cli("ctl", *arguments)
+    assert result.code == 2
+    assert reason in result.err
+
+
+@pytest.fixture
+def automax_cli(ros_domain_id):
+    return automax
