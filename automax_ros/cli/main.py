@@ -24,6 +24,7 @@ SUBCOMMANDS: dict[str, str] = {
     "response": "step response and Bode diagram of a dynamic block",
     "load": "CPU load of each module by the manual's execution times",
     "new": "make a rack file from a folder of tasks",
+    "import": "make a rack file from a configuration task",
     "convert": "make tasks of an old plant acceptable",
     "run": "run a rack",
     "record": "record a rack that runs",
@@ -40,7 +41,7 @@ SUBCOMMANDS: dict[str, str] = {
 }
 """Every subcommand and its line of help; the module of that name in this folder is imported when it is asked for.
 
-A dash in the name is an underscore in the module's."""
+A dash in the name is an underscore in the module's; a word of Python has one at its end."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
@@ -140,8 +141,10 @@ def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.Arg
 
 def _module(name: str) -> ModuleType:
     import importlib
+    import keyword
 
-    return importlib.import_module(f"automax_ros.cli.{name.replace('-', '_')}")
+    word = f"{name}_" if keyword.iskeyword(name) else name.replace("-", "_")
+    return importlib.import_module(f"automax_ros.cli.{word}")
 
 
 def _unknown(name: str) -> Exception:

@@ -47,10 +47,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError(f"{folder} is not a folder", "name the folder of the tasks")
     output = arguments.output if arguments.output is not None else folder / DEFAULT_RACK_FILE
     tick_ns = tick_option(arguments.tick_ms)
-    _require_free(output, force=arguments.force)
+    require_free(output, force=arguments.force)
     try:
         drafted = draft(folder, output.parent, tick_ns)
-        _write(output, drafted.text(arguments.processors), force=arguments.force)
+        write_rack_file(output, drafted.text(arguments.processors), force=arguments.force)
     except DraftFault as fault:
         raise UsageError(fault.message, fault.hint) from fault
     counts = ((arguments.processors, "Processor"), (len(drafted.tasks), "task"), (len(drafted.commons), "common"))
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _require_free(output: Path, *, force: bool) -> None:
+def require_free(output: Path, *, force: bool) -> None:
     """Refuse a place where no rack file may be written, before the work begins."""
     if output.is_dir():
         raise UsageError(f"{output} is a folder", f"name the file: --output {output / DEFAULT_RACK_FILE}")
@@ -74,7 +74,7 @@ def _require_free(output: Path, *, force: bool) -> None:
         raise UsageError(f"{output} exists already", "--force writes over it")
 
 
-def _write(output: Path, text: str, *, force: bool) -> None:
+def write_rack_file(output: Path, text: str, *, force: bool) -> None:
     """Write the whole file or nothing; without ``force`` never over another that came in between."""
     try:
         if force:

@@ -91,7 +91,7 @@ class Draft:
             "# common, `preset:` gives it a value at the start, `unit:` and `description:` say what it is.",
             f"rack: {self.name}",
             "slots:",
-            _commented(f"  0: {{module: {self._memory_module()}}}", "common memory"),
+            commented(f"  0: {{module: {self._memory_module()}}}", "common memory"),
             *self._processor_lines(processors),
             "common:" if self.commons else "common: {}",
             *self._common_lines(),
@@ -117,7 +117,7 @@ class Draft:
                 period = periods[task.name]
                 scanned = period < _UNKNOWN_NS
                 comment = f"a scan every {period / NS_PER_MS:g} ms" if scanned else _without_period(task)
-                yield _commented(f"      {task.name}: {{{file}priority: {priority}}}", comment)
+                yield commented(f"      {task.name}: {{{file}priority: {priority}}}", comment)
 
     def _period_ns(self, task: DraftedTask) -> int:
         program = self.results[task.name].program
@@ -131,7 +131,7 @@ class Draft:
             users = self.users[spec.name]
             more = ", ..." if len(users) > _MOST_NAMED else ""
             text = declaration_text(spec.name, spec.dimensions, spec.length)
-            yield _commented(f"  {text}: {closed}", ", ".join(users[:_MOST_NAMED]) + more)
+            yield commented(f"  {text}: {closed}", ", ".join(users[:_MOST_NAMED]) + more)
 
     def _memory_module(self) -> str:
         """Return the smallest common memory that holds the commons, else the largest."""
@@ -160,7 +160,7 @@ def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
     except (OSError, ValueError, RuntimeError):
         message = f"{rack_folder} is not the folder of the tasks, nor above it"
         raise DraftFault(message, f"put the rack file into {folder}") from None
-    found = Draft(_rack_name(folder), tick_ns)
+    found = Draft(rack_name(folder.resolve().name), tick_ns)
     for path in _sources(folder):
         _take(found, path, folder, inner)
     if not found.tasks:
@@ -231,12 +231,14 @@ def _task_name(stem: str, taken: set[str]) -> str:
     return name
 
 
-def _rack_name(folder: Path) -> str:
-    plain = re.sub(r"[^A-Z0-9]", "", folder.resolve().name.upper())
+def rack_name(title: str) -> str:
+    """Return a rack's name made of what can stand in one."""
+    plain = re.sub(r"[^A-Z0-9]", "", title.upper())
     return plain[:_RACK_NAME_LIMIT] or "RACK1"
 
 
-def _commented(line: str, comment: str) -> str:
+def commented(line: str, comment: str) -> str:
+    """Return a line of a rack file with a comment."""
     return f"{line:<{_COMMENT_COLUMN}} # {comment}"
 
 

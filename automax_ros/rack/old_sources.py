@@ -106,7 +106,7 @@ def _stable(text: str, check: Check, counts: _Counts) -> str:
 
 
 def _without_control(text: str, counts: _Counts) -> str:
-    """Return the text with control characters as blanks, and tabs outside of quotes as so many of them."""
+    """Return the text with control characters and tabs outside of quotes as blanks."""
     lines = text.split("\n")
     quoted, _ = _ranges(text)
     for row, line in enumerate(lines):
