@@ -13,11 +13,11 @@ import sys
 from pathlib import Path
 
 from automax_ros.cli.new import require_free, write_rack_file
-from automax_ros.cli.task_files import TASK_SUFFIXES
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import SourceText, has_errors
 from automax_ros.core.text import count_of, quoted
+from automax_ros.language.syntax.task_kind import TASK_SUFFIXES
 from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.configuration_task import read_configuration
 from automax_ros.rack.files import FileFault

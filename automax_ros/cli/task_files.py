@@ -19,8 +19,6 @@ from automax_ros.rack.names import DeclarationFault, check_task_name
 from automax_ros.rack.task_source import read_task_source
 
 TASK_SUFFIX = ".BLK"
-TASK_SUFFIXES = (TASK_SUFFIX,)
-"""Of the files that are run as tasks."""
 _RACK_SUFFIXES = (".YAML", ".YML")
 _MILLISECONDS = re.compile(r"[0-9]{1,6}(\.[0-9]{0,6})?|\.[0-9]{1,6}")
 """Bounded: an exponent of many digits would take for ever to become an exact number."""
