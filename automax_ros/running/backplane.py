@@ -6,7 +6,10 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 BUS_ERROR = 7031
-"""The run-time error of a register that does not answer (hardware code 31, J-3650 p. 5-3)."""
+"""The run-time error of a register that does not answer (hardware code 31, J-3650 p. 5-3).
+
+It is logged, IOREAD% gives 0, IOWRITE writes nothing, and the task goes on (decision: none says that it stops all).
+"""
 
 
 @dataclass(frozen=True)

@@ -144,6 +144,11 @@ class BasicTask(Task):
         """Whether it waits for ``wake_ns`` alone."""
         return self.wish[0] in _TIMED
 
+    def awaits(self, event: str) -> bool:
+        """Return whether the task waits for an event now (WAIT ON)."""
+        kind, number = self.wish
+        return kind == Suspension.EVENT and self.compiled.program.events[number].name == event
+
     def make_ready(self) -> None:
         """What it waited for is there."""
         self.wish = (_READY, 0)

@@ -48,13 +48,9 @@ class Interrupts:
         return bool(self._bound.get((bank, register)))
 
     def waiting(self, bank: int, register: int) -> list[str]:
-        """Return the tasks in RUN whose scans an interrupt starts, in the order of priority and name."""
+        """Return the tasks in RUN that an interrupt lets go on, in the order of priority and name."""
         bound = sorted(self._bound.get((bank, register), {}).items())
-        return [
-            task.name
-            for (*_, event), (task, _) in bound
-            if task.status is Status.RUNNING and task.compiled.program.event == event
-        ]
+        return [task.name for (*_, event), (task, _) in bound if task.status is Status.RUNNING and task.awaits(event)]
 
     def post(self, bank: int, register: int, now_ns: int) -> None:
         """Set the events of an ISCR, each once, in the order of priority and name of their tasks."""

@@ -360,3 +360,45 @@ def test_writes_that_waited_are_the_writers_own(tmp_path):
     rack.scheduler.at(22 * MS, EventKey(EventClass.IO, 15, "after the interrupt"), move)
     rack.run(0.03)
     assert told == [(1, WriteKind.OUTSIDE)]
+
+
+def test_what_waits_in_a_basic_task_freezes_too():
+    """A BASIC task waits for the event now, or it does not: what SCAN_LOOP names is always waited for."""
+    from automax_ros.blocks.catalogue import CATALOGUE
+    from automax_ros.compile.compiler import compile_program
+    from automax_ros.core.diagnostics import SourceText
+    from automax_ros.core.types import DataType
+    from automax_ros.language.checks.checker import check
+    from automax_ros.language.program import CommonSpec
+    from automax_ros.running.basic_task import BasicTask
+    from automax_ros.running.events import Events
+    from automax_ros.running.interrupts import Interrupts
+    from automax_ros.running.memory import CommonMemory
+    from automax_ros.running.views import Place, ViewSpec
+
+    text = """\
+10 COMMON ISCR%
+20 EVENT NAME=GO, INTERRUPT_STATUS=ISCR%, TIMEOUT=6
+30 DELAY 2 TICKS
+40 WAIT ON GO
+50 END
+"""
+    spec = CommonSpec("ISCR%", DataType.INTEGER, "rack.yaml:1")
+    program = check(
+        SourceText("B.BAS", text), name="B", catalogue=CATALOGUE, tick_ns=MS, commons={"ISCR%": spec}
+    ).program
+    assert program is not None
+    views = (
+        ViewSpec("SLOT:6%", DataType.INTEGER, 5, is_array=True),
+        ViewSpec("ISCR%", DataType.INTEGER, place=Place(0, 3)),
+    )
+    memory, events = CommonMemory(views), Events()
+    task = BasicTask(compile_program(program, {"SLOT:6%": 0, "ISCR%": 1}), memory, events=events)
+    interrupts = Interrupts(memory, events)
+    interrupts.bind(task)
+    task.run(0)
+    found = [interrupts.waiting(0, 3)]
+    for time_ns in (0, 2 * MS, 3 * MS):
+        task.scan(time_ns)
+        found.append(interrupts.waiting(0, 3))
+    assert found == [[], [], ["B"], []]
