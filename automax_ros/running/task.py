@@ -176,8 +176,7 @@ class Task:
         """Install the task: its state is as at installation (2.4.5)."""
         self.memory = memory
         self.writer = writer
-        self.slot = slot
-        self.priority = priority
+        self.slot, self.priority = slot, priority
         self.backplane = backplane
         self.events = Events() if events is None else events
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
