@@ -144,11 +144,6 @@ class BasicTask(Task):
         """Whether it waits for ``wake_ns`` alone."""
         return self.wish[0] in _TIMED
 
-    def awaits(self, event: str) -> bool:
-        """Return whether the task waits for an event now (WAIT ON)."""
-        kind, number = self.wish
-        return kind == Suspension.EVENT and self.compiled.program.events[number].name == event
-
     def make_ready(self) -> None:
         """What it waited for is there."""
         self.wish = (_READY, 0)
@@ -257,6 +252,14 @@ class BasicTask(Task):
 
     def _make_io(self) -> TaskIo:
         return RecordingBasicIo(self) if self._recording else BasicIo(self)
+
+
+def awaits(task: Task, event: str) -> bool:
+    """Return whether a task in RUN waits for an event: SCAN_LOOP names it (4.0), or a BASIC task waits on it now."""
+    if not isinstance(task, BasicTask):
+        return task.compiled.program.event == event
+    kind, number = task.wish
+    return kind == Suspension.EVENT and task.compiled.program.events[number].name == event
 
 
 def make_task(

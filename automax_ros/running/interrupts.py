@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from automax_ros.running.basic_task import awaits
 from automax_ros.running.events import Event, Events
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Status, Task
@@ -50,7 +51,7 @@ class Interrupts:
     def waiting(self, bank: int, register: int) -> list[str]:
         """Return the tasks in RUN that an interrupt lets go on, in the order of priority and name."""
         bound = sorted(self._bound.get((bank, register), {}).items())
-        return [task.name for (*_, event), (task, _) in bound if task.status is Status.RUNNING and task.awaits(event)]
+        return [task.name for (*_, event), (task, _) in bound if task.status is Status.RUNNING and awaits(task, event)]
 
     def post(self, bank: int, register: int, now_ns: int) -> None:
         """Set the events of an ISCR, each once, in the order of priority and name of their tasks."""

@@ -228,10 +228,6 @@ class Task:
         self._recording = on
         self._io = self._make_io()
 
-    def awaits(self, event: str) -> bool:
-        """Return whether the task waits for an event of its own, once it is in RUN: SCAN_LOOP names it (4.0)."""
-        return self.compiled.program.event == event
-
     def run(self, now_ns: int = 0) -> ScanRecord | None:
         """Put the task into RUN: blocks start again, the statements before SCAN_LOOP execute once.
 
