@@ -20,6 +20,7 @@ slots:
   5: {module: 57C419}
   6: {module: 57C403}
   7: {module: 57C403}
+  10: {module: 57552, tasks: {DRIVE: {drive: A}}}
 common:
   V_INT%: {preset: 7}
   V_DOUBLE!:
@@ -41,6 +42,14 @@ common:
   IN_WORD%: {slot: 5, register: 1}
   USER%: {slot: 4, register: 8}
   FAULT@: {ros: in}
+  SWITCH%: {slot: 10, register: 1000, ros: in}
+  STATUS%: {slot: 10, register: 80, ros: in}
+  COMMAND%: {slot: 10, register: 100}
+  FEEDBACK%: {slot: 10, register: 200, ros: in}
+  EVERY%: {slot: 10, register: 300}
+  NTH%: {slot: 10, register: 1300}
+  ISCR%: {slot: 10, register: 2000}
+  SCANS%: {slot: 10, register: 2001}
   AUTORUNSTATUS@:
   FORCINGSTATUS@:
   BATTERYSTATUS0@:
@@ -66,6 +75,13 @@ BREAK = """\
 130 NEXT I%
 140 END
 """
+DRIVE = """\
+10 LOCAL L%, K% [CURRENT=3, LOW=0, HIGH=9], NIL%
+20 L% = 5
+30 NIL% = 1 / NIL%
+100 CALL SCAN_LOOP(TICKS=10)
+110 END
+"""
 GIVEN: dict[str, Value] = {
     "V_INT%": -5,
     "V_DOUBLE!": 70000,
@@ -80,6 +96,14 @@ GIVEN: dict[str, Value] = {
     "IN_BIT@": True,
     "IN_WORD%": 77,
     "USER%": 55,
+    "SWITCH%": 2,
+    "STATUS%": 3,
+    "COMMAND%": 4,
+    "FEEDBACK%": 5,
+    "EVERY%": 6,
+    "NTH%": 7,
+    "ISCR%": 64,
+    "SCANS%": 8,
 }
 """What commons hold before."""
 
@@ -121,8 +145,12 @@ def local(name: str) -> Callable[[Rack], object]:
     return lambda rack: rack.task("LINE").value(name)
 
 
-def log(rack: Rack) -> object:
-    return [entry.line for entry in rack.task("LINE").errors.entries]
+def udc(name: str) -> Callable[[Rack], object]:
+    return lambda rack: rack.task("DRIVE").value(name)
+
+
+def log(task: str) -> Callable[[Rack], object]:
+    return lambda rack: [entry.line for entry in rack.task(task).errors.entries]
 
 
 def status(rack: Rack) -> object:
@@ -148,7 +176,18 @@ CELLS: dict[str, tuple[Callable[[Rack], object], object, object, object, object,
     "local BOOLEAN": (local("B@"), True, True, True, True, False),
     "local STRING": (local("T$"), "KEPT", "KEPT", "KEPT", "KEPT", ""),
     "local array": (local("A%"), [0, 0, 9], [0, 0, 9], [0, 0, 9], [0, 0, 9], [0, 0, 0]),
-    "error log": (log, [120, 120], [120, 120], [120, 120], [120, 120], []),
+    "error log": (log("LINE"), [120, 120], [120, 120], [120, 120], [120, 120], []),
+    "tunable of a UDC": (udc("K%"), 8, 8, 8, 8, 3),
+    "UDC local": (udc("L%"), 5, 0, 0, 0, 0),
+    "error log of a UDC": (log("DRIVE"), [30, 30], [30, 30], [30, 30], [30, 30], []),
+    "UDC test switch": (common("SWITCH%"), 2, 2, 2, 2, 2),
+    "UDC communication status": (common("STATUS%"), 3, 3, 3, 3, 3),
+    "UDC command register": (common("COMMAND%"), 4, 0, 0, 0, 0),
+    "UDC feedback register": (common("FEEDBACK%"), 5, 5, 5, 5, 5),
+    "UDC register of every scan": (common("EVERY%"), 6, 0, 0, 0, 0),
+    "UDC register of every Nth scan": (common("NTH%"), 7, 0, 0, 0, 0),
+    "UDC ISCR": (common("ISCR%"), 64, 0, 0, 0, 0),
+    "UDC scans per interrupt": (common("SCANS%"), 8, 0, 0, 0, 0),
     "volatile INTEGER": (common("V_INT%"), -5, 0, 0, 0, 0),
     "volatile DOUBLE INTEGER": (common("V_DOUBLE!"), 70000, 0, 0, 0, 0),
     "volatile REAL": (common("V_REAL"), 0.5, 0.0, 0.0, 0.0, 0.0),
@@ -181,6 +220,7 @@ CELLS: dict[str, tuple[Callable[[Rack], object], object, object, object, object,
 def made(folder: Path) -> tuple[Rack, Retention]:
     (folder / "LINE.BLK").write_text(LINE)
     (folder / "BREAK.BLK").write_text(BREAK)
+    (folder / "DRIVE.BLK").write_text(DRIVE)
     (folder / "rack.yaml").write_text(YAML)
     result = load(folder / "rack.yaml")
     assert result.config is not None, result.diagnostics
@@ -197,6 +237,7 @@ def made(folder: Path) -> tuple[Rack, Retention]:
         rack.force(name, value)
     rack.tune(rack.task("LINE"), "K%", 8)
     rack.tune(rack.task("LINE"), "G", 0.75)
+    rack.tune(rack.task("DRIVE"), "K%", 8)
     rack.events.event("GO").set(rack.now_ns)
     return rack, retention
 
@@ -224,7 +265,7 @@ def test_all_of_it_survives_the_process_as_it_survives_power(tmp_path, way):
     index = list(WAYS).index(way)
     for what, (read, _, *after) in CELLS.items():
         kind = what.split()[0]
-        if kind in ("tunable", "forced", "non-volatile", "force", "error"):
+        if kind in ("tunable", "forced", "non-volatile", "force") or what == "error log":
             assert read(again) == after[index], what
     begun = rack.task("LINE").value("BEGUN%")
     assert again.task("LINE").value("BEGUN%") == begun + 1, (
