@@ -41,6 +41,18 @@ def ways_out(edges: Edges, entry: int) -> dict[Hashable, Span]:
     return {way: Span(least[way], most[way]) for way in most}
 
 
+def longest_turn(edges: Edges, entry: int) -> int:
+    """Return the most time on ways from a node on that need not leave the graph, each node once."""
+    longest = 0
+    arrivals: dict[Hashable, int] = {entry: 0}
+    for circle in reversed(_circles(edges, entry)):
+        begin = max(arrivals[node] for node in circle if node in arrivals)
+        end = begin + sum(max((span.most for span in edges[node].values()), default=0) for node in circle)
+        longest = max(longest, end)
+        arrivals.update({to: max(arrivals.get(to, 0), end) for node in circle for to in edges[node]})
+    return longest
+
+
 def _is_node(name: Hashable) -> bool:
     return type(name) is int
 

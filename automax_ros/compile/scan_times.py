@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from automax_ros.compile.cost import CostModel
 from automax_ros.compile.flow import jump_targets
 from automax_ros.compile.loops import counts_alone
-from automax_ros.compile.paths import NOTHING, Span, ways_out
+from automax_ros.compile.paths import NOTHING, Span, longest_turn, ways_out
 from automax_ros.compile.statements import GOSUB_DEPTH
 from automax_ros.language.checks.constant_values import constant_value
 from automax_ros.language.program import Program
@@ -32,6 +32,8 @@ from automax_ros.language.syntax.tree import (
     Statement,
     Stop,
 )
+from automax_ros.language.syntax.waiting_tree import StartEvery
+from automax_ros.language.syntax.walk import jumps_of
 
 
 @dataclass(frozen=True)
@@ -57,21 +59,48 @@ _Ways = dict[Hashable, Span]
 
 
 def scan_times(program: Program, model: CostModel) -> ScanTimes:
-    """Return the bounds of a scan's time, SCAN_LOOP and END included."""
+    """Return the bounds of a scan's time, SCAN_LOOP and END included.
+
+    Of a BASIC task it is the part that START EVERY repeats, or the whole task to its END, waiting left out; of one that
+    never ends the least is 0 and the most one turn (decision).
+    """
     subroutines: dict[int, _Ways] = {}
     for _ in range(GOSUB_DEPTH):
         found = _subroutines(program, model, subroutines)
         if found == subroutines:
             break
         subroutines = found
-    ways = _Suite(program, model, subroutines, inside=False).ways(program.scan)
-    ways = _to_the_end(ways)
-    if _Way.END in ways:
-        times = ways[_Way.END].plus(Span(model.end_ns(program), model.end_ns(program)))
-    else:
-        times = ways.get(_Way.STOP, NOTHING)
-    scan_loop = model.scan_loop_ns(program)
-    return ScanTimes(scan_loop + times.least, scan_loop + times.most, is_estimated(program.scan, model))
+    suite = _Suite(program, model, subroutines, inside=False)
+    first = _first_repeated(program)
+    edges = suite.edges(program.scan)
+    ways = _to_the_end(ways_out(edges, first))
+    times = ways.get(_Way.END) or ways.get(_Way.STOP) or Span(0, longest_turn(edges, first))
+    around = NOTHING if program.is_basic else _around(program, model, ended=_Way.END in ways)
+    times = times.plus(around)
+    return ScanTimes(times.least, times.most, is_estimated(program.scan[first:], model))
+
+
+def period_ns(program: Program) -> int | None:
+    """Return the time from scan to scan; of a BASIC task that of its START EVERY, None without a constant one."""
+    if not program.is_basic:
+        return program.period_ns
+    for statement in program.scan:
+        if isinstance(statement, StartEvery):
+            count = constant_value(statement.count)
+            return round(count * statement.unit.ns(program.tick_ns)) if isinstance(count, (int, float)) else None
+    return None
+
+
+def _first_repeated(program: Program) -> int:
+    """Return the place of the first statement of each scan; of a BASIC task that after START EVERY."""
+    places = (place for place, statement in enumerate(program.scan) if isinstance(statement, StartEvery))
+    return next(places, -1) + 1 if program.is_basic else 0
+
+
+def _around(program: Program, model: CostModel, ended: bool) -> Span:
+    """Return the time of SCAN_LOOP, and of END where the scan comes to it."""
+    time = model.scan_loop_ns(program) + (model.end_ns(program) if ended else 0)
+    return Span(time, time)
 
 
 def is_estimated(statements: tuple[Statement, ...], model: CostModel) -> bool:
@@ -99,9 +128,12 @@ def _either(ways: _Ways, *names: _Way) -> Span | None:
 
 def _subroutines(program: Program, model: CostModel, inner: dict[int, _Ways]) -> dict[int, _Ways]:
     """Return the ways out of each subroutine, where those that it calls have the ways ``inner``."""
-    called = sorted(_called(program.scan))
-    suite = _Suite(program, model, inner, inside=True)
-    return {line: _to_the_end(suite.ways(program.scan, line)) for line in called}
+    called = _called(program.scan)
+    if not called:
+        return {}
+    edges = _Suite(program, model, inner, inside=True).edges(program.scan)
+    places = {statement.number: place for place, statement in enumerate(program.scan) if statement.number in called}
+    return {line: _to_the_end(ways_out(edges, places[line])) for line in sorted(called) if line in places}
 
 
 def _to_the_end(ways: _Ways) -> _Ways:
@@ -129,10 +161,13 @@ class _Suite:
     subroutines: dict[int, _Ways]
     inside: bool
 
-    def ways(self, statements: tuple[Statement, ...], line: int | None = None) -> _Ways:
-        """Return the ways out of statements, from the first on or from a line on; a line that is not there: none."""
+    def ways(self, statements: tuple[Statement, ...], first: int = 0) -> _Ways:
+        """Return the ways out of statements, from one of them on."""
+        return ways_out(self.edges(statements), first)
+
+    def edges(self, statements: tuple[Statement, ...]) -> list[_Ways]:
+        """Return where each statement leads, by its place, and what follows the last."""
         labels = {statement.number: place for place, statement in reversed(list(enumerate(statements)))}
-        end = len(statements)
 
         def place_of(way: Hashable, place: int) -> Hashable:
             if way is _Way.NEXT:
@@ -146,9 +181,7 @@ class _Suite:
                 to = place_of(way, place)
                 leading[to] = span.joined(leading.get(to))
             edges.append(leading)
-        edges.append({_Way.NEXT: NOTHING})
-        entry = 0 if line is None else labels.get(line, end)
-        return ways_out(edges, entry)
+        return [*edges, {_Way.NEXT: NOTHING}]
 
     def _statement(self, statement: Statement) -> _Ways:
         own = self.model.statement_ns(statement)
@@ -180,7 +213,8 @@ class _Suite:
             return {_Way.RETURN: NOTHING}
         if isinstance(statement, (End, Stop)):
             return {_Way.END if isinstance(statement, End) else _Way.STOP: NOTHING}
-        return {_Way.NEXT: NOTHING}
+        past = {_Way.NEXT: NOTHING}
+        return _joined(past, *(self._to_line(line, gosub=False) for line in jumps_of(statement)))
 
     def _to_line(self, line: int, gosub: bool) -> _Ways:
         """Return the ways out of a jump or a GOSUB; one that nests too deep is skipped."""

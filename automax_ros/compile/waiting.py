@@ -19,7 +19,6 @@ from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.scan_io import MUST_WAIT, Suspension
 from automax_ros.compile.statements import GOSUB_DEPTH, StatementLowering
 from automax_ros.compile.stores import converted_to, printable, store
-from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
 from automax_ros.language.program import OpenedFile
 from automax_ros.language.syntax.tree import For, If, Statement, Stop
@@ -34,7 +33,6 @@ from automax_ros.language.syntax.waiting_tree import (
     PrintFile,
     Put,
     StartEvery,
-    Unit,
     WaitOn,
 )
 
@@ -44,7 +42,6 @@ FILE_NOT_OPEN, NEGATIVE_TIME = 7050, 7054
 EVERY, GOSUB, GOSUB_LINES = "every_block", "gosub_depth", "gosub_lines"
 MAX_TEXT = 132
 """Longest text of a message's string (J-3675 p. 5-4: temporary strings)."""
-_SECONDS = {Unit.SECONDS: 1, Unit.MINUTES: 60, Unit.HOURS: 3600}
 
 
 @dataclass
@@ -132,8 +129,7 @@ class WaitingLowering(StatementLowering):
 
     def _time(self, statement: Delay | StartEvery) -> ast.expr:
         """Emit the time of a statement in ns; a negative one of DELAY is logged."""
-        seconds = _SECONDS.get(statement.unit)
-        unit_ns = self.emitter.program.tick_ns if seconds is None else seconds * NS_PER_S
+        unit_ns = statement.unit.ns(self.emitter.program.tick_ns)
         with self.emitter.statement(self.emitter.line):
             count = lower(self.emitter, statement.count).node
             name = "wait_ns"

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from automax_ros.compile.cost import MOST_SHARED_TICKS
-from automax_ros.compile.scan_times import ScanTimes, scan_times
+from automax_ros.compile.scan_times import ScanTimes, period_ns, scan_times
 from automax_ros.core.diagnostics import Diagnostic, Span
 from automax_ros.core.ticks import NS_PER_US
 from automax_ros.language.program import Program
@@ -65,7 +65,7 @@ def loads_of(config: RackConfig, checked: Iterable[CheckedTask]) -> list[ModuleL
 def _load_of(module: ModuleConfig, programs: Mapping[str, Program | None]) -> ModuleLoad:
     model = cost_model(module)
     tasks = tuple(
-        TaskLoad(task.name, scan_times(program, model), program.period_ns or None)
+        TaskLoad(task.name, scan_times(program, model), period_ns(program))
         for task in module.tasks
         if (program := programs[task.name]) is not None
     )

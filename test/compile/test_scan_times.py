@@ -6,11 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Platform
 from automax_ros.compile.cost import STATEMENT_ESTIMATES_US, CostModel, Model
-from automax_ros.compile.scan_times import scan_times
+from automax_ros.compile.scan_times import period_ns, scan_times
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.language.checks.checker import check
 
-from .support import lines, program_of, repeatable, scan_in_steps, task_of
+from .support import TICK, lines, program_of, repeatable, scan_in_steps, task_of
 
 SUMMER = "CALL SUMMER(INPUT1=A%, INPUT2=B%, OUTPUT=B%)"
 LAG = "CALL LAG(INPUT=A%, WLG=2.0, OUTPUT=C%)"
@@ -257,3 +260,39 @@ def test_scans_of_random_tasks_stay_between_least_and_most(statements, history):
         memory.write_from_outside(memory.view("KA%"), value, 9)
         memory.write_from_outside(memory.view("KX@"), flag, 9)
         assert times.least_ns <= sum(scan_in_steps(task, now)) <= times.most_ns
+
+
+BASIC = """10 COMMON KA%
+20 LOCAL A%
+30 OPEN CHANNEL FOR INPUT AS FILE #1, TYPE=(I), DEPTH=4
+40 START EVERY 2 SECONDS
+50 A% = A% + 1
+60 INPUT:EMPTY=80 #1, A%
+70 KA% = A%
+80 PRINT A%
+90 END
+"""
+
+
+def basic(text: str):
+    result = check(SourceText("DIAG.BAS", text), name="DIAG", catalogue=CATALOGUE, tick_ns=TICK)
+    assert result.program is not None, result.diagnostics
+    return result.program
+
+
+def test_a_basic_task_is_what_start_every_repeats():
+    times = scan_times(basic(BASIC), CostModel(Model.MODEL_7010))
+    least = sum(STATEMENT_ESTIMATES_US[name] for name in ("Assignment", "InputFile", "Print"))
+    assert times.least_ns / 1000 == pytest.approx(least)
+    assert times.most_ns / 1000 == pytest.approx(least + ASSIGN)
+    assert times.estimated
+    assert period_ns(basic(BASIC)) == 2_000_000_000
+    assert period_ns(basic(BASIC.replace("2 SECONDS", "3 TICKS"))) == 3 * TICK
+    assert period_ns(basic(BASIC.replace("2 SECONDS", "KA% SECONDS"))) is None
+
+
+def test_a_basic_task_that_never_ends_counts_one_turn():
+    times = scan_times(
+        basic("10 COMMON KA%\n20 KA% = 1\n30 DELAY 2 SECONDS\n40 GOTO 20\n50 END\n"), CostModel(Model.PC3000)
+    )
+    assert (times.least_ns, times.most_ns) == (0, round(0.7 * (ASSIGN + STATEMENT_ESTIMATES_US["Delay"] + GOTO) * 1000))

@@ -6,6 +6,7 @@ import enum
 from dataclasses import dataclass, field
 
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
 from automax_ros.language.syntax.expression_tree import Expression, Target, span_field
 
@@ -17,6 +18,11 @@ class Unit(enum.Enum):
     SECONDS = "SECONDS"
     MINUTES = "MINUTES"
     HOURS = "HOURS"
+
+    def ns(self, tick_ns: int) -> int:
+        """Return one of it in ns, on a Processor with this tick."""
+        seconds = {Unit.SECONDS: 1, Unit.MINUTES: 60, Unit.HOURS: 3600}
+        return tick_ns if self is Unit.TICKS else seconds[self] * NS_PER_S
 
 
 class Direction(enum.Enum):
