@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 from automax_ros.cli.task_files import TASK_SUFFIX
@@ -9,6 +10,7 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import count_of
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import LoadResult, load
+from automax_ros.rack.modules.registry import SUPPORTED
 
 DEFAULT_RACK_FILE = "rack.yaml"
 """What a folder means where a rack file is asked for."""
@@ -37,8 +39,9 @@ def is_text(result: LoadResult) -> bool:
 
 def size_of(rack: RackConfig) -> str:
     """Return what a rack consists of, in words."""
-    processors, tasks, commons = len(rack.task_modules), len(rack.placed_tasks), len(rack.declared)
-    counts = ((processors, "Processor"), (tasks, "task"), (commons, "common"))
+    modules = Counter(SUPPORTED[module.model].word for module in rack.task_modules)
+    counts = [(number, f"{word[0].upper()}{word[1:]}") for word, number in modules.items()]
+    counts += [(len(rack.placed_tasks), "task"), (len(rack.declared), "common")]
     return ", ".join(count_of(number, thing) for number, thing in counts)
 
 

@@ -42,7 +42,7 @@ def test_example_is_a_rack_without_problems(tmp_path):
 def test_page_has_every_key():
     assert table_keys("The file") == list(loader.KEYS)
     assert table_keys("Slots") == ["module", *dict.fromkeys(key for kind in KINDS for key in kind.options)]
-    assert sorted(table_keys("Tasks")) == ["critical", "file", "priority"]
+    assert sorted(table_keys("Tasks")) == ["critical", "drive", "file", "priority"]
     text = PAGE.read_text(encoding="utf-8")
     tables = text.split("| option |")
     options = re.findall(r"^\| `(\w+)` \|", tables[1].split("\n###")[0] + tables[2].split("\n###")[0], re.M)

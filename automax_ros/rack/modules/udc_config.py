@@ -87,6 +87,8 @@ class UdcKind:
         """Read tasks and plants."""
         node = found.section.get("tasks")
         tasks = found.tasks.read(node, found.where, _Drives()) if node else ()
+        for task in tasks:
+            _check_source_kind(task, found)
         in_order = tuple(sorted(tasks, key=lambda task: task.priority))
         return UdcConfig(found.slot, found.model, in_order, _plants(found), found.span.line)
 
@@ -99,6 +101,14 @@ class UdcKind:
 
 
 UDC = UdcKind()
+
+
+def _check_source_kind(task: TaskConfig, found: FoundModule) -> None:
+    """Report a task in a language that a UDC does not have (J2-3106-1 p. 2-5)."""
+    suffix = task.file.suffix.upper()
+    if suffix != ".BLK":
+        message = f"task {task.name} of {found.where} is a {suffix} file; a UDC runs control-block tasks (.BLK) only"
+        found.findings.add("AMX6304", message, Span(task.line, 1, 2))
 
 
 def _plants(found: FoundModule) -> Mapping[str, PlantConfig]:

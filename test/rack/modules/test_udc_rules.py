@@ -152,3 +152,42 @@ def test_lim_bar_is_the_motor_overload_ratio_of_the_drive(tmp_path, ratio, lim, 
     (checked,) = (item for item in check_tasks(load(path).config) if item.task.name == "WIND_A")
     found = [(item.code, item.statement) for item in checked.result.diagnostics]
     assert found == ([("AMX6485", 200)] if wrong else [])
+
+
+@pytest.mark.parametrize(
+    ("tasks", "code"),
+    [
+        ("WIND_A: {drive: A, priority: 4}", "AMX6007"),
+        ("WIND_A: {priority: 4}", "AMX6007"),
+        ("WIND_A: {}", "AMX6009"),
+        ("WIND_A: {drive: a}", "AMX6470"),
+        ("WIND_A: {drive: [A]}", "AMX6008"),
+        ("WIND_A: {drive: A}, LINE2: {drive: A, file: LINE.BLK}", "AMX6470"),
+        ("WIND_A: {drive: A}, X: {drive: B, file: LINE.BLK}, Y: {drive: B, file: LINE.BLK}", "AMX6303"),
+        ("WIND_A: {drive: A, file: WIND_A.BAS}", "AMX6304"),
+        ("LINE: {drive: A}", "AMX6301"),
+    ],
+)
+def test_tasks_of_a_udc_have_a_drive_each(tmp_path, tasks, code):
+    (tmp_path / "WIND_A.BAS").write_text("10 END\n")
+    result = load(written(tmp_path, "", tasks=tasks, WIND_A=task()))
+    assert code in [item.code for item in result.diagnostics]
+    assert result.config is None
+
+
+def test_a_processors_task_has_no_drive(tmp_path):
+    path = written(tmp_path, "", tasks="WIND_A: {drive: A}", WIND_A=task())
+    path.write_text(path.read_text().replace("{priority: 5}", "{priority: 5, drive: A}"))
+    assert [item.code for item in load(path).diagnostics] == ["AMX6007"]
+
+
+@pytest.mark.parametrize("register", [24, 79, 90, 99, 600, 999, 1018, 1079, 1600, 1999, 2003, 2047])
+def test_registers_of_the_module_itself_take_no_points(tmp_path, register):
+    path = written(tmp_path, f"  X%: {{slot: 10, register: {register}}}\n", tasks="WIND_A: {drive: A}", WIND_A=task())
+    assert [item.code for item in load(path).diagnostics] == ["AMX6421"]
+
+
+@pytest.mark.parametrize(("register", "code"), [(300, None), (1598, None), (599, "AMX6421"), (100, "AMX6422")])
+def test_a_real_stands_on_application_registers_alone(tmp_path, register, code):
+    path = written(tmp_path, f"  GAIN: {{slot: 10, register: {register}}}\n", tasks="WIND_A: {drive: A}", WIND_A=task())
+    assert [item.code for item in load(path).diagnostics] == ([code] if code else [])

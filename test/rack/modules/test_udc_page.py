@@ -1,0 +1,56 @@
+"""docs/udc.md says what a UDC is: its table of registers, its example."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from automax_ros.rack.loader import load
+from automax_ros.rack.modules.udc_registers import RETAINED, UDC_REGISTERS
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks_check import check_tasks
+
+PAGE = (Path(__file__).parents[3] / "docs" / "udc.md").read_text(encoding="utf-8")
+WHO = {"the process": "input", "tasks": "output", "the module": "input"}
+
+
+def rows() -> dict[int, tuple[str, bool]]:
+    """The direction of each register in the table, and whether it stays."""
+    found: dict[int, tuple[str, bool]] = {}
+    for line in PAGE.splitlines():
+        cells = [cell.strip(" †") for cell in line.strip("|").split("|")]
+        if len(cells) != 4 or cells[3] not in ("stay", "0"):
+            continue
+        direction = WHO.get(cells[2], "either")
+        for first, last in re.findall(r"(\d+)(?: to (\d+))?", cells[0]):
+            for number in range(int(first), int(last or first) + 1):
+                found[number] = direction, cells[3] == "stay"
+    return found
+
+
+def test_the_table_has_every_register_that_is_not_the_modules_own():
+    table = rows()
+    assert set(table) == set(range(UDC_REGISTERS.count)) - set(UDC_REGISTERS.reserved)
+    assert {number: direction for number, (direction, _) in table.items()} == {
+        number: UDC_REGISTERS.direction(number) for number in table
+    }
+    assert {number for number, (_, stays) in table.items() if stays} == RETAINED
+
+
+def test_the_example_runs(tmp_path):
+    udc, line = re.findall(r"```basic\n(.*?)```", PAGE, re.S)
+    (tmp_path / "WIND_A.BLK").write_text(udc)
+    (tmp_path / "LINE.BLK").write_text(line)
+    (tmp_path / "rack.yaml").write_text(re.search(r"```yaml\n(.*?)```", PAGE, re.S)[1])
+    config = load(tmp_path / "rack.yaml").config
+    assert config is not None
+    assert [item.result.diagnostics for item in check_tasks(config)] == [[], []]
+    rack = Rack(config)
+    rack.start()
+    rack.write("S10A_PMI_FB%", 1000)
+    rack.run(1.0)
+    assert rack.operations.stopped is None
+    assert rack.value("TORQUE%") == 700
+    assert rack.value("SHOWN%") == 1000
+    # Of its 500 scans the 10th, the 21st ... are followed by an interrupt.
+    assert rack.task("LINE").scan_number == len(range(10, 501, 11)) == 45
