@@ -1,7 +1,8 @@
 """What a rack keeps over a power cycle, in a folder between two runs (2.4.5, J2-3106-1 p. 10-6).
 
-Kept are non-volatile commons, forces, and of each task tunables, locals and the error log; with ``auto_run`` also which
-tasks ran. The folder holds one file, ``state.json``, replaced as a whole.
+Kept are non-volatile commons, forces, what a module keeps in registers that are not the process's inputs, such as the
+test switches of a UDC, and of each task tunables, locals and the error log; with ``auto_run`` also which tasks ran.
+The folder holds one file, ``state.json``, replaced as a whole.
 
 To start from it is a power-up: what a module loses without power is lost. A task whose source was edited begins as
 installed, since to load it again is an installation (decision). With ``auto_run`` the tasks that ran are put into RUN;
@@ -69,6 +70,7 @@ class Retention:
         self._rack = rack
         self.path = folder / _FILE
         self._views = [view for view, variable in enumerate(rack.config.variables) if variable.non_volatile]
+        self._registers = list(_kept_registers(rack))
         self._saved: Document = self._installed()
 
     def restore(self) -> Restored:
@@ -102,6 +104,7 @@ class Retention:
             }
         tasks = {item.name: kept_task(item.task, hash_of(item.source.text)) for item in rack.scheduled}
         document: Document = {"format": FORMAT, "rack": rack.config.name, "commons": commons}
+        document["registers"] = {name: value for name, value in self._present_registers() if value}
         document |= {"forced": {item.name: item.value for item in rack.forces()}, "tasks": tasks}
         if rack.config.auto_run:
             document["status"] = self._statuses()
@@ -126,6 +129,11 @@ class Retention:
         self._saved = present
         return True
 
+    def _present_registers(self) -> Iterator[tuple[str, Value]]:
+        variables, memory = self._rack.config.variables, self._rack.memory
+        for view, element in self._registers:
+            yield element_name(variables[view], element), memory.read_now(view, element)
+
     def _installed(self) -> Document:
         """Return the state at the start of a rack that has kept nothing: there is no need to write that."""
         document = self.present()
@@ -149,6 +157,7 @@ class Retention:
         notes: list[str] = []
         settings = list(self._settings(document["commons"], notes))
         commons = len({name.partition("(")[0] for name, _ in settings})
+        settings += self._register_settings(document["registers"])
         tunables = self._restore_tasks(document["tasks"], notes)
         forces = self._force(document["forced"], notes)
         if self._rack.config.auto_run:
@@ -175,6 +184,13 @@ class Retention:
                 fitting = self._rack.memory.accepted(view, value, index)
                 if fitting != (variable.presets[index] if variable.presets else variable.type.zero):
                     yield element_name(variable, index), fitting
+
+    def _register_settings(self, kept: Mapping[str, Value]) -> Iterator[tuple[str, Value]]:
+        variables, memory = self._rack.config.variables, self._rack.memory
+        for view, element in self._registers:
+            name = element_name(variables[view], element)
+            if name in kept:
+                yield name, memory.accepted(view, kept[name], element)
 
     def _compare_shapes(self, variable: CommonVariable, kept: Document) -> None:
         if kept != _shape(variable):
@@ -226,6 +242,15 @@ class Retention:
     def _fault(self, code: str, message: str) -> RetentionFault:
         hint = "remove it to start the rack as installed, or name another folder with --state"
         return RetentionFault(f"the kept state {message}", hint, code=code, place=str(self.path))
+
+
+def _kept_registers(rack: Rack) -> Iterator[tuple[int, int]]:
+    """Yield view and element of the registers that a module keeps and that are not inputs of the process."""
+    variables = rack.config.variables
+    for module in rack.modules:
+        for view, element in sorted(module.kept):
+            if variables[view].bank is not None and module.config.registers.direction(element) != "input":
+                yield view, element
 
 
 def hash_of(text: str) -> str:

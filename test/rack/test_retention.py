@@ -266,7 +266,7 @@ HOSTILE = {
     "deep": b"[" * 100_000,
     "digits": b"1" * 100_000,
     "nothing in it": b"{}",
-    "another format": b'{"format": 3, "rack": "KEEP", "commons": {}, "forced": {}, "tasks": {}}',
+    "another format": b'{"format": 3, "rack": "KEEP", "commons": {}, "forced": {}, "registers": {}, "tasks": {}}',
     "another rack": b'{"format": 2, "forced": {}, "rack": "OTHER", "commons": {}, "tasks": {}}',
     "commons are a list": b'{"format": 2, "forced": {}, "rack": "KEEP", "commons": [], "tasks": {}}',
     "tasks are a text": b'{"format": 2, "forced": {}, "rack": "KEEP", "commons": {}, "tasks": "x"}',
