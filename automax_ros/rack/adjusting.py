@@ -21,6 +21,7 @@ from automax_ros.rack.operations import OperationRefused, Operations
 from automax_ros.rack.settings import CommonElement, common_named
 from automax_ros.rack.writers import OPERATOR_WRITER
 from automax_ros.running.memory import CommonMemory
+from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import Task
 from automax_ros.running.tuning_steps import stepped
@@ -39,13 +40,15 @@ class Adjustments:
         config: RackConfig,
         operations: Operations,
         memory: CommonMemory,
+        inputs: ProcessInputs,
         forcing: Forcing,
         scheduler: Scheduler,
         observers: Observers,
         tune: Tune,
     ) -> None:
         """Take the parts of a rack; ``tune`` is how it sets a tunable."""
-        self._config, self._operations, self._memory = config, operations, memory
+        self._config, self._operations = config, operations
+        self._memory, self._inputs = memory, inputs
         self._forcing, self._scheduler, self._observers, self._tune = forcing, scheduler, observers, tune
 
     def force(self, name: str, value: Value) -> None:
@@ -124,7 +127,7 @@ class Adjustments:
         if (view, found.index) in self._memory.forced:
             held = source_text(self._memory.read_now(view, found.index))
             self._refuse(what, f"{found.name} cannot be set: it is forced at {held}; force another value or release it")
-        write = self._memory.write_from_outside
+        write = self._inputs.write_from_outside
         self._carry_out(what, lambda: write(view, value, OPERATOR_WRITER, found.index))
         return found.label
 

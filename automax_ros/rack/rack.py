@@ -121,7 +121,7 @@ class Rack:
             self.observers,
         )
         self.adjust = Adjustments(
-            config, self.operations, self.memory, self._forcing, self.scheduler, self.observers, self.tune
+            config, self.operations, self.memory, self._inputs, self._forcing, self.scheduler, self.observers, self.tune
         )
 
     @property
@@ -197,11 +197,11 @@ class Rack:
         self.memory.now_ns = self.now_ns
         for view, variable in enumerate(self.config.variables):
             for element, value in enumerate(variable.presets):
-                self.memory.write_from_outside(view, value, PRESET_WRITER, element)
+                self._inputs.write_from_outside(view, value, PRESET_WRITER, element)
         self.operations.write_status()
         for name, value in settings:
             found = common_named(self.config, name)
-            self.memory.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
+            self._inputs.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
         self.observers.tell_writes()
         self.operations.start()
 

@@ -68,6 +68,14 @@ class ProcessInputs:
             freezer.kept.pop(key, None)
             freezer.kept[key] = value, writer
 
+    def write_from_outside(self, view: int, value: Value, writer: int, element: int = 0) -> None:
+        """Write a value as ROS, a preset or an operator gives it.
+
+        Raises:
+            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
+        """
+        self.write(view, element, self._memory.accepted(view, value, element), writer)
+
     def freeze(self, freezer: Freezer, tasks: Iterable[str]) -> None:
         """Take in what the process has done until now, and hold it until all of ``tasks`` have scanned."""
         self.free(freezer)

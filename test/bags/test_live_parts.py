@@ -170,6 +170,25 @@ def test_topics_outside_of_the_rack_are_left_alone() -> None:
     assert list(LiveTopics("/line1", TABLE._replace(variables=variables)).values) == ["/line1/common/B"]
 
 
+def test_a_variable_with_a_scale_has_the_type_that_ros_offers() -> None:
+    """The table does not say which variables have a scale; only a simple one can, and only a Float32 comes of it."""
+    variables = [
+        Variable(
+            n, f"{name}%", DataType.INTEGER.number, dimensions, direction=Direction.OUT, topic=f"/line1/common/{name}"
+        )
+        for n, (name, dimensions) in enumerate((("A", ()), ("B", ()), ("C", (3,)), ("D", ())))
+    ]
+    scaled, hostile = ["std_msgs/msg/Float32"], ["geometry_msgs/msg/Twist"]
+    offered = {f"/line1/common/{name}": types for name, types in (("A", scaled), ("C", scaled), ("D", hostile))}
+    found = LiveTopics("/line1", TABLE._replace(variables=variables), offered).values
+    assert [kind.type_name.removeprefix("std_msgs/msg/") for kind in found.values()] == [
+        "Float32",
+        "Int16",
+        "Int16MultiArray",
+        "Int16",
+    ]
+
+
 def test_number_of_topics_is_bounded_and_told() -> None:
     variables = [
         Variable(n, f"V{n}%", DataType.INTEGER.number, direction=Direction.OUT, topic=f"/line1/common/V{n}")

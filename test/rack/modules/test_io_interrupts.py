@@ -172,6 +172,21 @@ def test_each_channel_of_an_analog_module_has_its_own_interrupt(tmp_path):
     ]
 
 
+def test_scans_of_one_instant_come_by_priority_and_name_whatever_the_slots(tmp_path):
+    common = "".join(f"  I{n}%: {{slot: {n}, register: 2}}\n  P{n}%: {{slot: {n}, register: 3}}\n" for n in (5, 6, 7))
+    slots = "".join(f"  {n}: {{module: 57C419}}\n" for n in (5, 6, 7))
+    task = "10 COMMON P{n}%, I{n}%\n20 EVENT NAME=GO{n}, INTERRUPT_STATUS=I{n}%, TIMEOUT=9\n30 P{n}% = 10\n"
+    task += "40 CALL SCAN_LOOP(TICKS=1, EVENT=GO{n})\n50 END\n"
+    tasks = {"LAST": (9, task.format(n=5)), "B": (5, task.format(n=6)), "A": (5, task.format(n=7))}
+    tasks["CLOCK"] = (4, "10 COMMON I6%\n20 I6% = 64\n30 CALL SCAN_LOOP(TICKS=1)\n40 END\n")
+    rack = built(tmp_path, common, slots, **tasks)
+    seen = Watching(rack)
+    rack.start()
+    rack.run(0.012)
+    order = [name for name, time_ns in seen.scans if time_ns == 5_500_000]
+    assert order == ["CLOCK", "A", "B", "LAST"]
+
+
 def test_a_pulsetach_needs_its_timer_enabled_and_counts_24_bits(tmp_path):
     common = """\
   COUNT!: {slot: 6, register: 0, ros: in}
@@ -249,6 +264,20 @@ def test_a_frozen_word_and_its_bits_keep_the_order_of_writes(tmp_path):
     assert shown == [0]
     assert rack.value("SEEN%") == 0
     assert (rack.value("POSITION%"), rack.value("BIT@")) == (9, True)
+
+
+def test_what_an_operator_sets_waits_too(tmp_path):
+    rack = built(tmp_path, FOLLOW=(5, FOLLOW))
+    rack.start()
+    shown: list[object] = []
+
+    def move(_: int) -> None:
+        rack.adjust.set("POSITION%", 6)
+        shown.append(rack.value("POSITION%"))
+
+    rack.scheduler.at(22 * MS, EventKey(EventClass.IO, 15, "after the interrupt"), move)
+    rack.run(0.023)
+    assert (shown, rack.value("SEEN%"), rack.value("POSITION%")) == ([0], 0, 6)
 
 
 def test_inputs_that_nobody_waits_for_follow_the_process(tmp_path):
