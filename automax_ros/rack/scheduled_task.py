@@ -10,22 +10,35 @@ from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.triggers import Due, MakeTrigger
 from automax_ros.running.execution import Execution, Ideal, Steps
+from automax_ros.running.modeled_scan import Progress
 from automax_ros.running.scheduler import Scheduler
-from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.running.task import OVERLAP, ScanRecord, Status, Task
 
+_LONGEST_NS = 2**32 - 1
+"""Longest execution time that a message of a scan can hold."""
 After = Callable[[Task, ScanRecord | None], None]
 """Is told of each scan, and of what stands before SCAN_LOOP, right after it."""
 
 
 @dataclass
 class TaskStatistics:
-    """Counts of one task since the rack was started; times in ns, measured only where the rack has a stopwatch."""
+    """Counts of one task since the rack was started; times in ns, of the host's where the rack has a stopwatch.
+
+    In modeled execution they are modeled times, from a scan's beginning to its end.
+    """
 
     scans: int = 0
     skipped: int = 0
     last_ns: int = 0
     longest_ns: int = 0
     total_ns: int = 0
+
+    def add(self, taken_ns: int) -> None:
+        """Count a scan and its time."""
+        self.scans += 1
+        self.last_ns = taken_ns
+        self.total_ns += taken_ns
+        self.longest_ns = max(self.longest_ns, taken_ns)
 
 
 class ScheduledTask:
@@ -49,6 +62,7 @@ class ScheduledTask:
         self._scheduler, self._execution = scheduler, execution
         self._after, self._stopwatch = after, stopwatch
         self._make_trigger = trigger
+        self._began_ns: int | None = None
         self.trigger = trigger(task)
         self.due: Due = self.whole if isinstance(execution, Ideal) else self._begin
 
@@ -88,7 +102,7 @@ class ScheduledTask:
         self.source = source
 
     def state(self) -> dict[str, Any]:
-        """Return what the task keeps, and when its next scan is due (ns)."""
+        """Return what the task keeps, when its next scan is due (ns), and how far one is that is under way."""
         task = self.task
         return {
             "source": task.compiled.program.source_hash,
@@ -97,10 +111,12 @@ class ScheduledTask:
             "values": task.snapshot(),
             "waiting": task.waiting(),
             "next_ns": self.trigger.next_ns,
+            "place": self._execution.place(self),
+            "progress": task.progress,
         }
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Take over a state; a task that ran goes on with its next scan.
+        """Take over a state; a task that ran goes on with the scan that was under way, or with its next one.
 
         Raises:
             ValueError: the state does not fit the task, or another source ran.
@@ -115,6 +131,10 @@ class ScheduledTask:
         self.task.status, self.task.scan_number = Status[state["status"]], state["scan"]
         if state["next_ns"] is not None:
             self.scan_from(state["next_ns"])
+        place, progress = state["place"], state["progress"]
+        if place is not None:
+            self._execution.resume(self, place, None if progress is None else self._resumed(progress))
+            self.task.wait_again(state["waiting"])
 
     def whole(self, now_ns: int, skipped: int) -> None:
         """Execute a scan at one instant."""
@@ -123,34 +143,45 @@ class ScheduledTask:
             return
         began = stopwatch() if stopwatch else 0
         record = task.scan(now_ns, skipped)
-        statistics.scans += 1
         statistics.skipped += skipped
         if stopwatch:
             taken = stopwatch() - began
-            statistics.last_ns = taken
-            statistics.total_ns += taken
-            statistics.longest_ns = max(statistics.longest_ns, taken)
+            statistics.add(taken)
             if record is not None:
                 record.duration_ns = taken
+        else:
+            statistics.scans += 1
         self._after(task, record)
 
     def steps(self, now_ns: int, skipped: int) -> Steps:
         """Return a scan in steps."""
         self.statistics.skipped += skipped
+        self._began_ns = now_ns
         return self.task.scan_modeled(now_ns, skipped)
 
     def done(self, record: ScanRecord | None) -> None:
-        """Tell of a scan whose last step was made."""
-        self.statistics.scans += 1
+        """Tell of a scan whose last step was made; its time is the modeled one."""
+        taken = 0 if self._began_ns is None else self._scheduler.now_ns - self._began_ns
+        self._began_ns = None
+        self.statistics.add(taken)
+        if record is not None:
+            record.duration_ns = min(taken, _LONGEST_NS)
         self._after(self.task, record)
+
+    def fault(self, code: int) -> None:
+        """Fault the task for a scan that cannot be; one under way is given up."""
+        self._execution.drop(self)
+        self._after(self.task, self.task.fault(code, self._scheduler.now_ns))
 
     def _begin(self, now_ns: int, skipped: int) -> None:
         """Let a scan be executed, unless the last one is still under way: that is an overlap (J2-3106-1 p. C-1)."""
         if self.task.status is not Status.RUNNING:
             return
         if self._execution.busy(self):
-            self._execution.drop(self)
-            self.task.overlap()
-            self._after(self.task, None)
+            self.fault(OVERLAP)
         else:
             self._execution.begin(self, now_ns, skipped)
+
+    def _resumed(self, progress: Progress) -> Steps:
+        self._began_ns = progress["began_ns"]
+        return self.task.resume_scan(progress)

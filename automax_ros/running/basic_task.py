@@ -6,8 +6,8 @@ reads of its record (``CHANNEL_VIEWS``), so that the burst can be executed again
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import cast
 
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.compile.scan_io import Suspension, Wish
@@ -16,7 +16,8 @@ from automax_ros.language.program import OpenedFile
 from automax_ros.running.backplane import NO_MODULES, Backplane
 from automax_ros.running.channels import CHANNEL_VIEWS, Channels, Message
 from automax_ros.running.events import Events
-from automax_ros.running.task import RecordingIo, ScanRecord, Status, Task, TaskIo
+from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory
 
 BURSTS_AT_ONCE = 100
@@ -30,31 +31,40 @@ _READY, _GOING = -1, -2
 class BasicIo(TaskIo):
     """What a burst touches."""
 
-    def __init__(self, task: BasicTask) -> None:
-        """Bind a task's memory and channels."""
-        super().__init__(task)
+    def __init__(self, task: BasicTask, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task, the memory that its bursts work on, and channels."""
+        super().__init__(task, memory, hear)
         self._basic = task
         self._channels = task.channels
 
     def start_every(self, period_ns: int) -> None:
         """Register that the task goes on each period from now (START EVERY)."""
-        self._basic.every = (period_ns, self._memory.now_ns, 0)
+        self._hear(lambda: self._basic.start_every(period_ns, self._memory.now_ns))
 
     def open_reader(self, number: int, types: str, depth: int) -> int:
         """Make the task the reader of a channel; return the problem or 0."""
-        return self._channels.open_reader(number, types, depth, self._basic.name, self._memory.now_ns)
+        name = self._basic.name
+        outcome: int = self._hear(lambda: self._channels.open_reader(number, types, depth, name, self._memory.now_ns))
+        return outcome
 
     def open_writer(self, number: int, types: str) -> int:
         """Find a channel; return 0, the problem, or MUST_WAIT while nobody reads it."""
-        return self._channels.open_writer(number, types)
+        outcome: int = self._hear(lambda: self._channels.open_writer(number, types))
+        return outcome
 
     def receive(self, number: int) -> tuple[Message, int]:
         """Take the oldest message of a channel; return it and 0, or nothing and the problem or MUST_WAIT."""
-        return self._channels.receive(number, self._basic.types(number), self._basic.name, self._memory.now_ns)
+        types, name = self._basic.types(number), self._basic.name
+        received: tuple[Message, int] = self._hear(
+            lambda: self._channels.receive(number, types, name, self._memory.now_ns)
+        )
+        return received
 
     def send(self, number: int, message: Message) -> int:
         """Put a message into a channel; return 0, the problem, or MUST_WAIT where it is full."""
-        return self._channels.send(number, self._basic.types(number), message, self._memory.now_ns)
+        types = self._basic.types(number)
+        outcome: int = self._hear(lambda: self._channels.send(number, types, message, self._memory.now_ns))
+        return outcome
 
 
 class RecordingBasicIo(BasicIo, RecordingIo):
@@ -95,6 +105,7 @@ class BasicTask(Task):
     """
 
     _io: BasicIo
+    _heard_io: BasicIo
     wish: Wish
     every: tuple[int, int, int] | None
 
@@ -167,32 +178,21 @@ class BasicTask(Task):
         self.status, self.scan_number = Status.RUNNING, 0
         self._fresh()
         self.memory.now_ns = now_ns
-        return self._begin_record(now_ns, 0)
+        return self._begin_record(now_ns, 0, self._io)
 
     def scan(self, now_ns: int, skipped: int = 0) -> ScanRecord | None:
         """Execute one burst at an instant. Returns its record, if kept."""
         if self.status is not Status.RUNNING:
             return None
-        record = self._begin(now_ns, skipped)
+        self.scan_number += 1
+        self._begins(now_ns)
+        record = self._begin_record(now_ns, skipped, self._io) if self._recording else None
         self._over(self.compiled.burst(self.state, self._io), now_ns)
         return record
 
-    def scan_modeled(
-        self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None
-    ) -> Generator[int, int | None, ScanRecord | None]:
-        """Execute one burst in steps, as ``Task`` does a scan. Returns its record, if kept."""
-        if self.status is not Status.RUNNING:
-            return None
-        record = self._begin(now_ns, skipped)
-        steps: Generator[int, None, Any] = (form or self.compiled.burst_steps)(self.state, self._io)
-        try:
-            while True:
-                later = yield next(steps)
-                if later is not None:
-                    self.memory.now_ns = later
-        except StopIteration as end:
-            self._over(end.value, now_ns)
-        return record
+    def start_every(self, period_ns: int, now_ns: int) -> None:
+        """Let it go on each period from now on (START EVERY)."""
+        self.every = (period_ns, now_ns, 0)
 
     def waiting(self) -> list[int]:
         """Return, as numbers, what it waits for and its START EVERY."""
@@ -218,16 +218,17 @@ class BasicTask(Task):
         self.every = None
         self._instant, self._bursts = -1, 0
 
-    def _begin(self, now_ns: int, skipped: int) -> ScanRecord | None:
-        self.scan_number += 1
+    def _begins(self, now_ns: int) -> None:
+        super()._begins(now_ns)
         self._bursts = self._bursts + 1 if now_ns == self._instant else 1
         self._instant = now_ns
-        self.memory.now_ns = now_ns
-        return self._begin_record(now_ns, skipped) if self._recording else None
 
-    def _over(self, wish: Wish, began_ns: int) -> None:
+    def _form_in_steps(self) -> ScanSteps:
+        return cast(ScanSteps, self.compiled.burst_steps)
+
+    def _over(self, outcome: Wish, began_ns: int) -> None:
         """End a burst: note what the task waits for."""
-        self.wish, (kind, number), now_ns = wish, wish, self.memory.now_ns
+        self.wish, (kind, number), now_ns = outcome, outcome, self.memory.now_ns
         if kind == Suspension.STOP or (kind == Suspension.END and self.every is None):
             self.status = Status.ENDED
         elif kind == Suspension.END:
@@ -250,8 +251,8 @@ class BasicTask(Task):
         tick = self.compiled.program.tick_ns
         return (now_ns // tick + 1) * tick
 
-    def _make_io(self) -> TaskIo:
-        return RecordingBasicIo(self) if self._recording else BasicIo(self)
+    def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
+        return RecordingBasicIo(self, memory, hear) if self._recording else BasicIo(self, memory, hear)
 
 
 def awaits(task: Task, event: str) -> bool:

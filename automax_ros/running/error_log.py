@@ -65,6 +65,10 @@ class ErrorLog:
             kept.append(self.last)
         return kept
 
+    def copy(self) -> ErrorLog:
+        """Return a log of its own with the same entries."""
+        return ErrorLog(self.first, self.second, self.last, self.count)
+
     def flatten(self) -> list[int]:
         """Return the log as numbers for a snapshot: count, then line, code and scan of first, second and last."""
         numbers = [self.count]

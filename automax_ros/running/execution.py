@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Any, Protocol
 
-from automax_ros.running.task import ScanRecord
+from automax_ros.running.scan_record import ScanRecord, Steps
 
-Steps = Generator[int, int | None, ScanRecord | None]
-"""A scan in steps: yields the ns of execution before each access to actual memory, and is sent the time it is then.
+__all__ = ["IDEAL", "Execution", "Ideal", "Job", "Place", "ScanRecord", "Steps"]
 
-Sent None, the time is what it was. Returns the record of the scan, if one is kept.
-"""
+Place = Mapping[str, Any]
+"""How far a job is that is under way, in numbers: ``left_ns`` before its next step, what it ``skipped``."""
 
 
 class Job(Protocol):
@@ -52,7 +51,15 @@ class Execution(Protocol):
         ...
 
     def drop(self, job: Job) -> None:
-        """Give a job up, wherever it is."""
+        """Give a job up, wherever it is; nothing is executed by this."""
+        ...
+
+    def place(self, job: Job) -> Place | None:
+        """Return how far a job is, None where it is not under way."""
+        ...
+
+    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
+        """Go on with a job from the place where it was; ``steps`` have come as far, None if it had not begun."""
         ...
 
 
@@ -69,6 +76,18 @@ class Ideal:
 
     def drop(self, job: Job) -> None:
         """Nothing is under way."""
+
+    def place(self, job: Job) -> Place | None:  # noqa: ARG002
+        """Return None: nothing is under way."""
+        return None
+
+    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:  # noqa: ARG002
+        """Refuse: nothing takes time.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError(f"task {job.name} was in the middle of a scan: the state is that of modeled execution")
 
 
 IDEAL = Ideal()

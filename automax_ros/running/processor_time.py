@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from automax_ros.running.execution import Job, Steps
+from automax_ros.running.execution import Job, Place, Steps
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
 
@@ -38,26 +38,52 @@ class ProcessorTime:
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
         """Let a job be executed as soon as nothing goes before it."""
         self._book(now_ns)
-        frames = self._frames
-        place = 0
-        while place < len(frames) and not _goes_before(job, frames[place]):
-            place += 1
-        frames.insert(place, _Frame(job, skipped))
+        self._insert(_Frame(job, skipped))
         self._go(now_ns)
 
     def busy(self, job: Job) -> bool:
         """Return whether a job that was begun is not done yet."""
-        return any(frame.job is job for frame in self._frames)
+        return bool(self._frames) and self._frame(job) is not None
 
     def drop(self, job: Job) -> None:
-        """Give a job up; what it has written so far stays written."""
-        self._book(self._scheduler.now_ns)
-        dropped = [frame for frame in self._frames if frame.job is job]
-        self._frames = [frame for frame in self._frames if frame.job is not job]
-        for frame in dropped:
-            if frame.steps is not None and frame is not self._stepping:
-                frame.steps.close()
-        self._go(self._scheduler.now_ns)
+        """Give a job up; what it has written so far stays written. Nothing is executed by this."""
+        frame = self._frame(job)
+        if frame is None:
+            return
+        now_ns = self._scheduler.now_ns
+        self._book(now_ns)
+        self._frames.remove(frame)
+        self._wait(now_ns)
+        if frame.steps is not None and frame is not self._stepping:
+            frame.steps.close()
+
+    def place(self, job: Job) -> Place | None:
+        """Return how far a job is, None where it is not under way."""
+        frame = self._frame(job)
+        if frame is None:
+            return None
+        used_ns = self._scheduler.now_ns - self._since_ns if self._event is not None and frame is self._frames[0] else 0
+        return {"left_ns": frame.remaining_ns - used_ns, "skipped": frame.skipped}
+
+    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
+        """Go on with a job from the place where it was; ``steps`` have come as far, None if it had not begun."""
+        now_ns = self._scheduler.now_ns
+        self._book(now_ns)
+        self._insert(_Frame(job, place["skipped"], steps, place["left_ns"]))
+        self._wait(now_ns)
+
+    def _frame(self, job: Job) -> _Frame | None:
+        for frame in self._frames:
+            if frame.job is job:
+                return frame
+        return None
+
+    def _insert(self, frame: _Frame) -> None:
+        frames = self._frames
+        place = 0
+        while place < len(frames) and not _goes_before(frame, frames[place]):
+            place += 1
+        frames.insert(place, frame)
 
     def _book(self, now_ns: int) -> None:
         """Suspend the job that is executed: it has used the time up to now."""
@@ -77,13 +103,18 @@ class ProcessorTime:
                 if frame.remaining_ns:
                     end_ns = now_ns + frame.remaining_ns
                     if not self._scheduler.advance_to(end_ns, self._key):
-                        self._since_ns = now_ns
-                        self._event = self._scheduler.at(end_ns, self._key, self._goes_on)
-                        return
+                        break
                     now_ns, frame.remaining_ns = end_ns, 0
                 self._step(frame, now_ns)
         finally:
             self._going = False
+        self._wait(now_ns)
+
+    def _wait(self, now_ns: int) -> None:
+        """Go on with what is first when it has had its time, unless it goes on by itself."""
+        if self._frames and not self._going:
+            self._since_ns = now_ns
+            self._event = self._scheduler.at(now_ns + self._frames[0].remaining_ns, self._key, self._goes_on)
 
     def _goes_on(self, now_ns: int) -> None:
         self._event = None
@@ -103,10 +134,16 @@ class ProcessorTime:
             if frame in self._frames:
                 self._frames.remove(frame)
                 frame.job.done(end.value)
+        else:
+            self._stepping = None
+            if frame not in self._frames:
+                frame.steps.close()
 
 
-def _goes_before(job: Job, frame: _Frame) -> bool:
+def _goes_before(new: _Frame, other: _Frame) -> bool:
     """Return whether a new job is executed before one that is under way or waits."""
-    if job.priority != frame.job.priority:
-        return job.priority < frame.job.priority
-    return frame.steps is None and job.name < frame.job.name
+    if new.job.priority != other.job.priority:
+        return new.job.priority < other.job.priority
+    if new.steps is not None or other.steps is not None:
+        return new.steps is not None
+    return new.job.name < other.job.name

@@ -2,158 +2,32 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import cast
+from collections.abc import Generator, Sequence
+from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.compile.scan_io import ScanTooLong, StateValues
-from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import stored_real
-from automax_ros.core.types import DataType, Latched, Value
-from automax_ros.running.backplane import BUS_ERROR, NO_MODULES, Backplane
-from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog, LogEntry
+from automax_ros.core.types import DataType, Value
+from automax_ros.running.backplane import NO_MODULES, Backplane
+from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog
 from automax_ros.running.events import Events
-from automax_ros.running.printing import format_print
+from automax_ros.running.modeled_scan import HeardMemory, Progress, ScanUnderWay, copied
+from automax_ros.running.scan_record import ScanRecord, Status, Steps
+from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory
+
+__all__ = ["OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task", "snapshot_layout"]
 
 SCAN_TOO_LONG = 7040
 OVERLAP = 7070
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
-
-
-class Status(enum.Enum):
-    """What a task is doing."""
-
-    STOPPED = "stopped"
-    RUNNING = "running"
-    ENDED = "ended by STOP"
-    FAULTED = "faulted"
-
-
 _RUNNING = Status.RUNNING
 """A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
-
-
-@dataclass
-class ScanRecord:
-    """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value)."""
-
-    time_ns: int
-    scan: int
-    latched: Latched = ()
-    reads: list[tuple[int, int, Value]] = field(default_factory=list)
-    writes: list[tuple[int, int, Value]] = field(default_factory=list)
-    commits: list[tuple[int, Value]] = field(default_factory=list)
-    errors: list[tuple[int, int]] = field(default_factory=list)
-    skipped: int = 0
-    duration_ns: int = 0
-
-
-class TaskIo:
-    """What a compiled scan touches: common memory through one task, its error log and its printed lines.
-
-    The members are bound once, so that a scan pays for no more than the memory itself.
-    """
-
-    def __init__(self, task: Task) -> None:
-        """Bind a task's memory."""
-        memory = task.memory
-        self.latch: Callable[[], Latched] = partial(memory.latch, task.plan)
-        self.read_now = memory.read_now
-        self._memory, self._writer, self._task = memory, task.writer, task
-        self._backplane = task.backplane
-
-    def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Write back what blocks changed."""
-        if changes:
-            self._memory.commit(changes, self._writer)
-
-    def write_now(self, view: int, value: Value, element: int = 0) -> None:
-        """Write actual memory for a BASIC statement."""
-        self._memory.write_now(view, value, self._writer, element, WriteKind.BASIC)
-
-    def forces(self) -> tuple[bool, ...]:
-        """Return which of the commons that blocks write a force holds."""
-        return tuple(map(self._memory.is_forced, self._task.written))
-
-    def log(self, line: int, code: int) -> None:
-        """Log a run-time error of this scan."""
-        self._task.errors.add(LogEntry(line, code, self._task.scan_number))
-
-    def print_line(self, values: tuple[Value, ...], separators: str) -> None:
-        """Print to the task's log."""
-        self._task.printed.append(format_print(values, separators))
-
-    def set_event(self, name: str) -> None:
-        """Set a software event (SET)."""
-        self._task.events.event(name).set(self._memory.now_ns)
-
-    def errors_logged(self) -> bool:
-        """Return whether the error log holds an entry (TST_ERRLOG@)."""
-        return self._task.errors.count > 0
-
-    def clear_errors(self) -> None:
-        """Clear the error log (CLR_ERRLOG)."""
-        self._task.errors.clear()
-
-    def io_read(self, slot: int, register: int) -> tuple[int, int]:
-        """Return a register's word and 0, or 0 and the bus error of a register that does not answer."""
-        place = self._backplane.readable(slot, register)
-        if place is None:
-            return 0, BUS_ERROR
-        return cast(int, self.read_now(*place)), 0
-
-    def io_write(self, slot: int, register: int, value: int) -> int:
-        """Write a register's word; return 0, or the bus error of a register that does not answer or take it."""
-        place = self._backplane.writable(slot, register)
-        if place is None:
-            return BUS_ERROR
-        view, element = place
-        self.write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
-        return 0
-
-
-class RecordingIo(TaskIo):
-    """The same, noting everything in ``record``."""
-
-    def __init__(self, task: Task) -> None:
-        """Bind a task's memory and begin with an empty record."""
-        super().__init__(task)
-        self.record = ScanRecord(0, 0)
-        self.latch = self._latch
-        self.read_now = self._read_now
-        self._plan = task.plan
-
-    def _latch(self) -> Latched:
-        self.record.latched = latched = self._memory.latch(self._plan)
-        return latched
-
-    def _read_now(self, view: int, element: int = 0) -> Value:
-        value = self._memory.read_now(view, element)
-        self.record.reads.append((view, element, value))
-        return value
-
-    def write_now(self, view: int, value: Value, element: int = 0) -> None:
-        """Write actual memory and note it."""
-        self.record.writes.append((view, element, value))
-        super().write_now(view, value, element)
-
-    def commit(self, changes: list[tuple[int, Value]]) -> None:
-        """Write back what blocks changed and note it."""
-        self.record.commits = changes
-        super().commit(changes)
-
-    def log(self, line: int, code: int) -> None:
-        """Log a run-time error and note it."""
-        self.record.errors.append((line, code))
-        super().log(line, code)
 
 
 class Task:
@@ -182,6 +56,8 @@ class Task:
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
         self._recording = False
         self._scans: Generator[bool, None, None] | None = None
+        self._heard = HeardMemory(memory)
+        self._under_way: ScanUnderWay | None = None
         self.install(compiled)
         memory.watch_forces(self._look_at_forces)
 
@@ -196,7 +72,8 @@ class Task:
         self.status = Status.STOPPED
         self.scan_number = 0
         self._forced = any(map(self.memory.is_forced, self.written))
-        self._io: TaskIo = self._make_io()
+        self._under_way = None
+        self._bind()
 
     @property
     def name(self) -> str:
@@ -217,7 +94,8 @@ class Task:
     def state(self) -> StateValues:
         """The state, field by field as ``compiled.layout`` has it.
 
-        Between scans the compiled scan holds it, so ask again after each scan: a list got earlier is out of date.
+        Between scans the compiled scan holds it, so ask again after each scan: a list got earlier is out of date. While
+        a modeled scan is under way it is that of the scan before.
         """
         self._put_down()
         return self._state
@@ -226,7 +104,7 @@ class Task:
         """Begin or end to keep a record of each scan."""
         self._put_down()
         self._recording = on
-        self._io = self._make_io()
+        self._bind()
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
         """Put the task into RUN: blocks start again, the statements before SCAN_LOOP execute once.
@@ -235,7 +113,7 @@ class Task:
         """
         self.compiled.layout.restart(self.state)
         self.status, self.scan_number = Status.RUNNING, 0
-        record = self._begin_record(now_ns, 0)
+        record = self._begin_record(now_ns, 0, self._io)
         self.memory.now_ns = now_ns
         try:
             if self.compiled.startup(self.state, self._io):
@@ -249,7 +127,7 @@ class Task:
         if self.status is not _RUNNING:
             return None
         self.scan_number += 1
-        record = self._begin_record(now_ns, skipped) if self._recording else None
+        record = self._begin_record(now_ns, skipped, self._io) if self._recording else None
         self.memory.now_ns = now_ns
         if self._scans is None:
             scans = self.compiled.scans_forced if self._forced else self.compiled.scans
@@ -265,47 +143,81 @@ class Task:
             self._too_long(error)
         return record
 
-    def scan_modeled(
-        self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None
-    ) -> Generator[int, int | None, ScanRecord | None]:
+    @property
+    def present_scan(self) -> int:
+        """The number of the scan under way, or of the last one."""
+        return self.scan_number + (self._under_way is not None)
+
+    @property
+    def progress(self) -> Progress | None:
+        """How far the scan is that is under way in modeled time, None where none is."""
+        return None if self._under_way is None else self._under_way.progress
+
+    def scan_modeled(self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None) -> Steps:
         """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
 
         Yields the ns that pass before the next memory access and is sent the time then, None for the time it is; with
-        another ``form`` of the scan, what that yields. The state is whole again when the generator has ended.
+        another ``form`` of the scan, what that yields. State and number of the scan are the task's when the generator
+        has ended; closed before that, it leaves them as they were (decision: what it has written stays written).
         """
         if self.status is not Status.RUNNING:
             return None
-        self.scan_number += 1
-        record = self._begin_record(now_ns, skipped)
-        self.memory.now_ns = now_ns
-        if form is None:
-            form = self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
-        steps = form(self.state, self._io)
+        self._put_down()
+        self._heard.begin()
+        self._under_way = scan = ScanUnderWay(now_ns, skipped, copied(self._state), self.errors.copy(), self._heard)
+        record = self._begin_record(now_ns, skipped, self._heard_io)
+        self._begins(now_ns)
+        steps = (form or self._form_in_steps())(scan.state, self._heard_io)
+        outcome: Any = False
         try:
             while True:
-                later = yield next(steps)
+                cost = next(steps)
+                scan.steps += 1
+                later = yield cost
                 if later is not None:
                     self.memory.now_ns = later
         except StopIteration as end:
-            if end.value:
-                self.status = Status.ENDED
+            outcome = end.value
         except ScanTooLong as error:
             self._too_long(error)
+        except BaseException:
+            self.errors, self._under_way = scan.log, None
+            raise
+        self.scan_number += 1
+        self._state, self._under_way = scan.state, None
+        if self.status is _RUNNING:
+            self._over(outcome, now_ns)
         return record
+
+    def resume_scan(self, progress: Progress) -> Steps:
+        """Return a scan in steps that is as far as another was: it has announced its last step (see ``progress``)."""
+        steps = self.scan_modeled(progress["began_ns"], progress["skipped"])
+        now_ns = self.memory.now_ns
+        for number in range(progress["steps"]):
+            next(steps)
+            if not number:
+                self._heard.tell(progress["heard"], progress["latched_ns"])
+        self._heard.live()
+        self.memory.now_ns = now_ns
+        return steps
 
     def stop(self) -> None:
         """Stop the task; its locals keep their values."""
         if self.status is Status.RUNNING:
             self.status = Status.STOPPED
 
-    def overlap(self) -> None:
-        """Fault the task: a scan was still under way when the next one was due (code 14, J2-3106-1 p. C-1)."""
-        self.errors.add(LogEntry(self.compiled.program.scan_loop_line, OVERLAP, self.scan_number))
+    def fault(self, code: int, now_ns: int) -> ScanRecord | None:
+        """Fault the task for a scan that cannot be: logged at SCAN_LOOP. Returns a record of that alone, if kept."""
+        self.scan_number += 1
+        record = self._begin_record(now_ns, 0, self._io)
+        self._io.log(self.compiled.program.scan_loop_line, code)
         self.status = Status.FAULTED
+        return record
 
     def snapshot(self) -> list[Value]:
         """Return the task's state as flat values, in the order of ``layout``."""
-        return [*self.compiled.layout.flatten(self.state), *self.errors.flatten()]
+        errors = self.errors if self._under_way is None else self._under_way.log
+        return [*self.compiled.layout.flatten(self.state), *errors.flatten()]
 
     def restore(self, values: list[Value]) -> None:
         """Take a snapshot over.
@@ -333,7 +245,10 @@ class Task:
             KeyError: the task has no tunable of that name.
             ValueError: the value lies outside its limits or is not of its type.
         """
-        self.state[self.compiled.layout.index(name)] = self.tuning(name, value)
+        position, fitting = self.compiled.layout.index(name), self.tuning(name, value)
+        self.state[position] = fitting
+        if self._under_way is not None:
+            self._under_way.state[position] = fitting
 
     def tuning(self, name: str, value: object) -> int | float:
         """Return what a tunable would hold if it were set to a value; nothing is set.
@@ -372,24 +287,42 @@ class Task:
         if numbers:
             raise ValueError(f"task {self.name} cannot wait: it is no BASIC task")
 
-    def _make_io(self) -> TaskIo:
-        return RecordingIo(self) if self._recording else TaskIo(self)
-
     def _put_down(self) -> None:
         """Let the compiled scan store the state that it holds."""
         if self._scans is not None:
             self._scans.close()
             self._scans = None
 
-    def _begin_record(self, now_ns: int, skipped: int) -> ScanRecord | None:
+    def _begins(self, now_ns: int) -> None:
+        """Begin a scan at an instant."""
+        self.memory.now_ns = now_ns
+
+    def _form_in_steps(self) -> ScanSteps:
+        """Return the compiled form of a scan in steps."""
+        return self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
+
+    def _over(self, outcome: Any, began_ns: int) -> None:  # noqa: ARG002
+        """End a scan with what its compiled form returned: TRUE if the task executed STOP."""
+        if outcome:
+            self.status = Status.ENDED
+
+    def _bind(self) -> None:
+        """Bind what scans touch: memory itself, or for modeled scans what is noted meanwhile."""
+        self._io, self._heard_io = self._make_io(self.memory, at_once), self._make_io(self._heard, self._heard.hear)
+
+    def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
+        return RecordingIo(self, memory, hear) if self._recording else TaskIo(self, memory, hear)
+
+    def _begin_record(self, now_ns: int, skipped: int, io: TaskIo) -> ScanRecord | None:
         """Return the new record of a scan, or None if none is kept."""
-        if not isinstance(self._io, RecordingIo):
+        if not isinstance(io, RecordingIo):
             return None
-        self._io.record = ScanRecord(now_ns, self.scan_number, skipped=skipped)
-        return self._io.record
+        io.record = ScanRecord(now_ns, self.present_scan, skipped=skipped)
+        return io.record
 
     def _too_long(self, error: ScanTooLong) -> None:
-        self._io.log(error.line, SCAN_TOO_LONG)
+        io = self._io if self._under_way is None else self._heard_io
+        io.log(error.line, SCAN_TOO_LONG)
         self.status = Status.FAULTED
 
 

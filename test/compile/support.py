@@ -15,7 +15,7 @@ from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.running.basic_task import BasicTask
 from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
+from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import ViewSpec
 
 TICK = 5_500_000
@@ -111,4 +111,14 @@ def logged(task: Task) -> list[tuple[int, int]]:
 
 def scan_in_steps(task: Task, now_ns: int) -> list[int]:
     """Execute one modeled scan without pre-emption and return the costs that it yielded."""
-    return list(task.scan_modeled(now_ns))
+    return scan_and_record(task, now_ns)[0]
+
+
+def scan_and_record(task: Task, now_ns: int) -> tuple[list[int], ScanRecord | None]:
+    """Execute one modeled scan without pre-emption and return the costs that it yielded and its record."""
+    costs, steps = [], task.scan_modeled(now_ns)
+    while True:
+        try:
+            costs.append(next(steps))
+        except StopIteration as end:
+            return costs, end.value

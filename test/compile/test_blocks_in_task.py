@@ -17,7 +17,7 @@ from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, type_of_name
 
 from .block_model import SIZE, TICKS, Model, ModelBlock, Programmed
-from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_in_steps, task_of
+from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_and_record, task_of
 
 BLOCKS = [block for block in CATALOGUE.values() if block.step is not None]
 ON_A_RACK = [block for block in BLOCKS if Platform.AUTOMAX in block.runs_on]
@@ -216,16 +216,13 @@ def compare(programmed: list[Programmed], changes, in_steps: bool) -> None:
         model.codes.clear()
         for block in blocks:
             block.scan(model)
-        if in_steps:
-            scan_in_steps(task, now)
-        else:
-            task.scan(now)
+        record = scan_and_record(task, now)[1] if in_steps else task.scan(now)
         actual = actual_values(task, memory)
         assert actual == model.values
         assert {name: type_of(value) for name, value in actual.items()} == {
             name: type_of(value) for name, value in model.values.items()
         }
-        assert Counter(code for _, code in task._io.record.errors) == Counter(model.codes)
+        assert Counter(code for _, code in record.errors) == Counter(model.codes)
 
 
 def fill_tables(task, memory, model: Model) -> None:

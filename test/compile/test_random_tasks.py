@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +13,7 @@ from automax_ros.running.task import Task
 
 from .interpreter import Interpreter
 from .programs import checked, outside_writes, tasks
-from .support import OTHER, WRITER, repeatable, scan_in_steps, views_of
+from .support import OTHER, WRITER, repeatable, scan_and_record, scan_in_steps, views_of
 
 HISTORY = st.lists(outside_writes(), min_size=3, max_size=3)
 TUNINGS = {"G%", "H"}
@@ -81,8 +79,9 @@ def agree_in_both_forms(text: str, history) -> None:
             memory.write_from_outside(memory.view(name), value, OTHER)
             other.write_from_outside(other.view(name), value, OTHER)
         record = at_once.scan(now)
-        assert sum(scan_in_steps(in_steps, now)) == 0
-        assert copy.deepcopy(in_steps._io.record) == record
+        costs, record_in_steps = scan_and_record(in_steps, now)
+        assert sum(costs) == 0
+        assert record_in_steps == record
         assert other.drain() == memory.drain()
         assert list(map(bits, in_steps.snapshot())) == list(map(bits, at_once.snapshot()))
         assert (in_steps.printed, in_steps.status) == (at_once.printed, at_once.status)

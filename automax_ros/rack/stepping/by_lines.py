@@ -9,7 +9,7 @@ from automax_ros.compile.compiler import ScanSteps
 from automax_ros.compile.scan_io import LineValues
 from automax_ros.core.types import Value
 from automax_ros.rack.scheduled_task import ScheduledTask
-from automax_ros.running.execution import Job
+from automax_ros.running.execution import IDEAL, Job, Place, Steps
 from automax_ros.running.task import ScanRecord
 
 
@@ -73,3 +73,15 @@ class ByLines:
         if self.held is not None and self.held.item is job:
             self.held.close()
             self.held = None
+
+    def place(self, job: Job) -> Place | None:
+        """Return None: a held scan has no place that another rack could go on from."""
+        return IDEAL.place(job)
+
+    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
+        """Refuse, as ideal execution does.
+
+        Raises:
+            ValueError: always.
+        """
+        IDEAL.resume(job, place, steps)

@@ -1,0 +1,164 @@
+"""What a task's compiled functions touch: common memory, registers, the error log, printed lines."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any, Protocol, cast
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.types import Latched, Value
+from automax_ros.running.backplane import BUS_ERROR, Backplane
+from automax_ros.running.error_log import ErrorLog, LogEntry
+from automax_ros.running.events import Events
+from automax_ros.running.printing import format_print
+from automax_ros.running.scan_record import ScanRecord
+from automax_ros.running.views import LatchPlan
+
+Call = Callable[[], Any]
+Hear = Callable[[Call], Any]
+"""Returns what a call outside the task returns, or what it returned when the scan was executed first."""
+
+
+def at_once(call: Call) -> Any:
+    """Return what a call returns."""
+    return call()
+
+
+class Host(Protocol):
+    """The task that a ``TaskIo`` works for.
+
+    ``plan`` are the views that a scan latches, ``written`` those that its blocks write; ``present_scan`` is the number
+    of the scan that logs errors.
+    """
+
+    writer: int
+    backplane: Backplane
+    events: Events
+    plan: LatchPlan
+    written: tuple[int, ...]
+    errors: ErrorLog
+    printed: deque[str]
+
+    @property
+    def present_scan(self) -> int: ...  # noqa: D102
+
+
+class ScanMemory(Protocol):
+    """What a scan does with memory: the four operations of ``Memory``."""
+
+    @property
+    def now_ns(self) -> int: ...  # noqa: D102
+
+    def latch(self, plan: LatchPlan) -> Latched: ...  # noqa: D102
+
+    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None: ...  # noqa: D102
+
+    def read_now(self, view: int, element: int = 0) -> Value: ...  # noqa: D102
+
+    def write_now(  # noqa: D102
+        self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
+    ) -> None: ...
+
+    def is_forced(self, view: int) -> bool: ...  # noqa: D102
+
+
+class TaskIo:
+    """What a compiled scan touches: common memory through one task, its error log and its printed lines.
+
+    The members are bound once, so that a scan pays for no more than the memory itself.
+    """
+
+    def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task and the memory that its scans work on."""
+        self.latch: Callable[[], Latched] = partial(memory.latch, task.plan)
+        self.read_now = memory.read_now
+        self._memory, self._writer, self._task = memory, task.writer, task
+        self._backplane, self._hear = task.backplane, hear
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Write back what blocks changed."""
+        if changes:
+            self._memory.commit(changes, self._writer)
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Write actual memory for a BASIC statement."""
+        self._memory.write_now(view, value, self._writer, element, WriteKind.BASIC)
+
+    def forces(self) -> tuple[bool, ...]:
+        """Return which of the commons that blocks write a force holds."""
+        return tuple(map(self._memory.is_forced, self._task.written))
+
+    def log(self, line: int, code: int) -> None:
+        """Log a run-time error of this scan."""
+        self._task.errors.add(LogEntry(line, code, self._task.present_scan))
+
+    def print_line(self, values: tuple[Value, ...], separators: str) -> None:
+        """Print to the task's log."""
+        self._task.printed.append(format_print(values, separators))
+
+    def set_event(self, name: str) -> None:
+        """Set a software event (SET)."""
+        self._hear(lambda: self._task.events.event(name).set(self._memory.now_ns))
+
+    def errors_logged(self) -> bool:
+        """Return whether the error log holds an entry (TST_ERRLOG@)."""
+        return self._task.errors.count > 0
+
+    def clear_errors(self) -> None:
+        """Clear the error log (CLR_ERRLOG)."""
+        self._task.errors.clear()
+
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+        """Return a register's word and 0, or 0 and the bus error of a register that does not answer."""
+        place = self._backplane.readable(slot, register)
+        if place is None:
+            return 0, BUS_ERROR
+        return cast(int, self.read_now(*place)), 0
+
+    def io_write(self, slot: int, register: int, value: int) -> int:
+        """Write a register's word; return 0, or the bus error of a register that does not answer or take it."""
+        place = self._backplane.writable(slot, register)
+        if place is None:
+            return BUS_ERROR
+        view, element = place
+        self.write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
+        return 0
+
+
+class RecordingIo(TaskIo):
+    """The same, noting everything in ``record``."""
+
+    def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task and its memory and begin with an empty record."""
+        super().__init__(task, memory, hear)
+        self.record = ScanRecord(0, 0)
+        self.latch = self._latch
+        self.read_now = self._read_now
+        self._plan = task.plan
+
+    def _latch(self) -> Latched:
+        self.record.time_ns = self._memory.now_ns
+        self.record.latched = latched = self._memory.latch(self._plan)
+        return latched
+
+    def _read_now(self, view: int, element: int = 0) -> Value:
+        value = self._memory.read_now(view, element)
+        self.record.reads.append((view, element, value))
+        return value
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Write actual memory and note it."""
+        self.record.writes.append((view, element, value))
+        super().write_now(view, value, element)
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Write back what blocks changed and note it."""
+        self.record.commits = changes
+        super().commit(changes)
+
+    def log(self, line: int, code: int) -> None:
+        """Log a run-time error and note it."""
+        self.record.errors.append((line, code))
+        super().log(line, code)
