@@ -44,7 +44,7 @@ class HeldScan:
         return True
 
     def close(self) -> None:
-        """Give the scan up; what it has done stays."""
+        """Give the scan up: the task is as before it; what it has written to memory stays."""
         self._steps.close()
 
 
