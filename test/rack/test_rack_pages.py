@@ -14,12 +14,12 @@ from automax_ros.rack.tasks_check import check_tasks
 from .helpers import write
 
 PAGES = Path(automax_ros.core.__file__).parent / "pages"
-AMONG_TASKS = range(6480, 6490)
-"""Problems that only the tasks of a rack show, not its file."""
+TOO_LONG = ("AMX6481",)
+"""Problems whose examples would not fit on a page."""
 CODES = [
     code
-    for code, problem in PROBLEMS.items()
-    if ("AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710") and problem.number not in AMONG_TASKS
+    for code in PROBLEMS
+    if ("AMX6000" <= code < "AMX6700" or "AMX6701" <= code < "AMX6710") and code not in TOO_LONG
 ]
 
 

@@ -213,3 +213,15 @@ def test_a_reload_with_other_ticks_than_the_other_task_is_refused(tmp_path):
     assert rack.value("A_OUT%") == 5
     with pytest.raises(OperationRefused):
         rack.operations.run("WIND_A")
+
+
+def test_on_the_wall_clock_scans_that_are_late_are_skipped_and_counted(tmp_path):
+    """At 20.2 ms the scans of 0.5, 1.5 ... 19.5 ms are due: the last one happens, 19 are skipped, the grid stays."""
+    rack = plain(tmp_path)
+    rack.start()
+    for now_ns in (0, 1, 20_200_000, 20_400_000, 20_500_000):
+        rack.scheduler.run_due(now_ns)
+    assert [rack.statistics[name].skipped for name in ("WIND_A", "WIND_B")] == [19, 19]
+    assert [rack.statistics[name].scans for name in ("WIND_A", "WIND_B")] == [2, 2]
+    assert rack.scheduler.next_ns is not None
+    assert rack.value("B_SEES%") == 1002
