@@ -1,4 +1,4 @@
-"""Check tasks (.BLK) and rack files (.yaml, .yml) and print everything that is wrong with them.
+"""Check tasks (.BLK, .BAS) and rack files (.yaml, .yml) and print everything that is wrong with them.
 
 A task given by itself is checked as if the rack defined its commons as it declares them. A rack file is checked with
 every task it names, against the commons and the ticks it defines.
@@ -50,7 +50,7 @@ class _Findings:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax check``."""
     parser.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="a task (.BLK) or a rack file (.yaml, .yml)"
+        "files", nargs="+", type=Path, metavar="FILE", help="a task (.BLK, .BAS) or a rack file (.yaml, .yml)"
     )
     add_target_arguments(parser)
     parser.add_argument(

@@ -1,4 +1,7 @@
-"""Print the Python functions that a task (.BLK) becomes: the part before SCAN_LOOP, a scan, and a scan in steps."""
+"""Print the Python functions that a task (.BLK, .BAS) becomes: the part before SCAN_LOOP, a scan, and a scan in steps.
+
+A BASIC task becomes what it does from one wait to the next, at once and in steps.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from automax_ros.running.lone_task import compiled_alone
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax compile``."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="a task (.BLK)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="a task (.BLK, .BAS)")
     add_target_arguments(parser)
 
 

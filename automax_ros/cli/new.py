@@ -1,4 +1,4 @@
-"""Make a rack file (.yaml) from a folder of tasks (.BLK), then check it.
+"""Make a rack file (.yaml) from a folder of tasks (.BLK, .BAS), then check it.
 
 Every COMMON of the tasks becomes a common variable of the rack, with its type, dimensions and length of strings; where
 two tasks differ both places are named. Common memory stands in slot 0, the tasks share the Processors evenly, and the

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from automax_ros.cli.task_files import TASK_SUFFIX
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import count_of
+from automax_ros.language.syntax.task_kind import is_task_file
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import LoadResult, load
 from automax_ros.rack.modules.registry import SUPPORTED
@@ -51,7 +51,7 @@ def _meant(path: Path) -> Path:
     Raises:
         UsageError: it is a task, or a folder without a rack file.
     """
-    if path.suffix.upper() == TASK_SUFFIX:
+    if is_task_file(path):
         hint = f"`automax trace {path} --input IN.csv` runs a task alone; `automax new {path.parent}` makes a rack file"
         raise UsageError(f"{path} is a task, and a rack is made of its rack file (.yaml)", hint)
     if not path.is_dir():

@@ -14,15 +14,14 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
 from automax_ros.language.checks.checker import CheckResult, check
+from automax_ros.language.syntax.task_kind import NotATask, is_task_file, kind_of_file
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.names import DeclarationFault, check_task_name
 from automax_ros.rack.task_source import read_task_source
 
-TASK_SUFFIX = ".BLK"
 _RACK_SUFFIXES = (".YAML", ".YML")
 _MILLISECONDS = re.compile(r"[0-9]{1,6}(\.[0-9]{0,6})?|\.[0-9]{1,6}")
 """Bounded: an exponent of many digits would take for ever to become an exact number."""
-_OTHER_TASKS = {".BAS": "BASIC tasks", ".PC": "ladder tasks", ".CNF": "configuration tasks", ".INC": "include files"}
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def tick_option(text: str) -> int:
 def is_rack_file(path: Path) -> bool:
     """Whether a path means a rack file: by its name, or as the folder of one."""
     suffix = path.suffix.upper()
-    return suffix in _RACK_SUFFIXES or (suffix != TASK_SUFFIX and path.is_dir())
+    return suffix in _RACK_SUFFIXES or (not is_task_file(path) and path.is_dir())
 
 
 def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult]:
@@ -124,9 +123,7 @@ def require_task(path: Path) -> None:
     Raises:
         UsageError: it is of another kind.
     """
-    suffix = path.suffix.upper()
-    if suffix == TASK_SUFFIX:
-        return
-    if suffix in _OTHER_TASKS:
-        raise UsageError(f"{path}: {_OTHER_TASKS[suffix]} ({suffix}) are not supported yet, only {TASK_SUFFIX} tasks")
-    raise UsageError(f"{path} is not a task: a task's source is a {TASK_SUFFIX} file")
+    try:
+        kind_of_file(path)
+    except NotATask as fault:
+        raise UsageError(f"{path}: {fault}") from fault

@@ -67,6 +67,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("what is the task to work on?", "give --input IN.csv, or --stimuli FILE with --duration S")
     target = target_of(arguments)
     source, result = check_task_file(arguments.file, target)
+    if result.program is not None and result.program.is_basic:
+        hint = "run it in a rack: automax run CONFIG --simulated --duration 10"
+        raise UsageError(f"{arguments.file} is a BASIC task: it waits where it wants and has no scans to trace", hint)
     if result.program is None:
         print_diagnostics(result.diagnostics, source, sys.stderr)
         return 1

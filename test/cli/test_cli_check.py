@@ -159,12 +159,24 @@ def test_missing_file_leaves_json_whole(automax):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("TASK.BAS", "BASIC tasks (.BAS) are not supported yet"), ("TASK.TXT", "a task's source is a .BLK file")],
+    [("TASK.PC", "a ladder task (.PC) is not run"), ("TASK.TXT", "a task's source is a .BLK or .BAS file")],
 )
 def test_other_kinds_of_files_are_refused(automax, name, message):
     result = automax("check", automax.write(name, "10 END\n"))
     assert (result.code, result.out) == (2, "")
     assert message in result.err
+
+
+def test_a_basic_task_is_checked_as_one(automax):
+    text = "10 EVENT NAME = GO\n20 WAIT ON GO\n30 DELAY 2 SECONDS\n40 GOTO 20\n50 END\n"
+    assert automax("check", automax.write("SLOW.BAS", text)) == (0, "", "")
+    assert "AMX0031" in automax("check", automax.write("SLOW.BLK", text)).out
+    compiled = automax("compile", "SLOW.BAS")
+    assert compiled.code == 0
+    assert compiled.out.startswith("def burst(state, io):")
+    traced = automax("trace", "SLOW.BAS", "--input", automax.write("IN.csv", "GO\n1\n"))
+    assert (traced.code, traced.out) == (2, "")
+    assert "SLOW.BAS is a BASIC task" in traced.err
 
 
 def test_folder_is_no_task(automax):

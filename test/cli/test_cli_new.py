@@ -172,6 +172,15 @@ def test_odd_names_become_names_of_tasks(plant):
     }  # fmt: skip
 
 
+def test_a_basic_task_gets_the_least_priority(plant):
+    plant.write("plant/WATCH.BAS", "10 START EVERY 1 SECONDS\n20 PRINT 1\n30 END\n")
+    assert plant("new", "plant").code == 0
+    text = (plant.folder / "plant" / "rack.yaml").read_text()
+    assert "WATCH: {file: 'WATCH.BAS', priority: 6} # a BASIC task" in text
+    (processor,) = loaded("plant/rack.yaml").task_modules
+    assert {task.file.name for task in processor.tasks} == {"FAST.BLK", "SLOW.BLK", "WATCH.BAS"}
+
+
 def test_files_that_cannot_be_tasks_are_left_out(plant):
     folder = plant.folder / "plant"
     os.mkfifo(folder / "PIPE.BLK")

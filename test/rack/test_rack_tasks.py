@@ -38,7 +38,7 @@ def test_priorities_are_4_to_11(tmp_path):
         ("/etc/LINE.BLK", "AMX6305"),
         ("'C:\\LINE.BLK'", "AMX6305"),
         ("'..\\LINE.BLK'", "AMX6305"),
-        ("LINE.BAS", "AMX6304"),
+        ("LINE.INC", "AMX6304"),
         ("line.pc", "AMX6304"),
         ("LINE", "AMX6304"),
         (".BLK", "AMX6304"),
