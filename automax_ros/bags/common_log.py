@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
@@ -12,6 +12,7 @@ from automax_ros.bags.variables import Watched, checked_table
 from automax_ros.bags.write_log import WriteLog
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType, Value
+from automax_ros.running.channels import CHANNEL_VIEWS
 from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable
 
 Key = tuple[int, int]
@@ -20,6 +21,11 @@ Entry = tuple[int, int, Value]
 """Variable, element, value."""
 Cell = Value
 """A value in a table."""
+
+
+_Kind = tuple[Callable[[float], Value] | None, float, float, int, str]
+"""How the values of a variable are typed, the least and the greatest, how many elements it has, its name."""
+_CHANNEL_NUMBERS = 256
 
 
 class CommonLog:
@@ -37,11 +43,12 @@ class CommonLog:
         self._bag = bag
         self._log = WriteLog(facts.table.run_id)
         self._first_write = facts.first_write
-        self._kinds = {
+        self._kinds: dict[int, _Kind] = {
             item.id: (_TYPED.get(kind), *kind.range, math.prod(item.dimensions), name)
             for name, item in self.variables.items()
             for kind in (DataType.numbered(item.type),)
         }
+        self._read_kinds = {**_CHANNELS, **self._kinds}
 
     def check_table(self, table: VariableTable) -> None:
         """Make sure that a further table is of the same run.
@@ -72,17 +79,27 @@ class CommonLog:
         log.sequence = message.sequence
         return self.entries(message.values, message.stamp)
 
+    def reads(self, values: Values, stamp: int) -> list[Entry]:
+        """Return what a scan read, as ``entries`` does; what came out of channels has views of its own.
+
+        Raises:
+            BagError: it does not fit the table of variables.
+        """
+        return self._typed(values, stamp, self._read_kinds)
+
     def entries(self, values: Values, stamp: int) -> list[Entry]:
         """Return the entries of a message, each in its variable's own type.
 
         Raises:
             BagError: they do not fit the table of variables.
         """
+        return self._typed(values, stamp, self._kinds)
+
+    def _typed(self, values: Values, stamp: int, kinds: Mapping[int, _Kind]) -> list[Entry]:
         if not values.variable:
             return []
         texts = iter(values.text)
         found: list[Entry] = []
-        kinds = self._kinds
         try:
             for number, element, value in zip(values.variable, values.element, values.value, strict=True):
                 typed, least, greatest, elements, name = kinds[number]
@@ -126,6 +143,9 @@ _TYPED: dict[DataType, Callable[[float], Value]] = {
     DataType.BOOLEAN: bool,
 }
 """What makes a number in a message one of the variable's type; strings have none."""
+_CHANNELS: dict[int, _Kind] = {
+    view: (_TYPED.get(kind), *kind.range, _CHANNEL_NUMBERS, "a channel") for kind, view in CHANNEL_VIEWS.items()
+}
 
 
 class WatchedValues:

@@ -93,5 +93,6 @@ class BackgroundCompilation:
             emitter.emit(build.assign(GOSUB, build.constant(0)))
         if EVERY in self._fields:
             emitter.emit(build.when(build.name(EVERY), [build.assign(PC, build.name(EVERY))]))
-        pair = ast.Tuple([build.constant(int(Suspension.END)), build.constant(0)], build.LOAD)
+        again = build.name(EVERY) if EVERY in self._fields else build.constant(0)
+        pair = ast.Tuple([build.constant(int(Suspension.END)), again], build.LOAD)
         return [*emitter.body, ast.Return(pair)]

@@ -78,7 +78,7 @@ class Suspension(enum.IntEnum):
     """Why a BASIC task gives the Processor up, and what the number beside it says."""
 
     END = 0
-    """END: it goes on when its START EVERY says so, else its run is over."""
+    """END: it goes on when its START EVERY says so, or with 0 beside it its run is over."""
     STOP = 1
     """STOP: its run is over."""
     DELAY = 2

@@ -10,6 +10,7 @@ from automax_ros.core.names import element_name
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 from automax_ros.rack.config import CommonVariable
+from automax_ros.replay.channels import CHANNELS
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
 from automax_ros.replay.inputs import ScanMemory, same_bits
@@ -74,11 +75,13 @@ class ScanComparison:
             return Seen()
         names = self._source.compiled.latched
         latched = [NamedValue(name, value) for name, value in zip(names, record.latched, strict=False)]
-        reads = [
-            NamedValue(element_name(self._variable((view, element)), element), value)
-            for view, element, value in record.reads[:1000]
-        ]
+        reads = [NamedValue(self._read_name(view, element), value) for view, element, value in record.reads[:1000]]
         return Seen(tuple(latched), tuple(reads))
+
+    def _read_name(self, view: int, element: int) -> str:
+        if view in CHANNELS:
+            return f"channel #{element}"
+        return element_name(self._variable((view, element)), element)
 
     def _other_writes(self, writes: Sequence[Entry]) -> list[Found]:
         """What differs in the order of writes, although every variable ends up the same."""

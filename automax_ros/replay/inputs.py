@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from automax_ros.bags.common_log import Entry, Key
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
+from automax_ros.replay.channels import CHANNELS, RecordedChannels
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.running.views import LatchPlan, latch_plan
 from automax_ros.wire.messages import Scan
@@ -41,6 +42,7 @@ class ScanMemory:
         self._edited = edited
         self.apart: dict[Key, Value] = {}
         self._commons = commons
+        self.channels = RecordedChannels()
         self._index = {variable.name: view for view, variable in enumerate(commons.rack)}
         self._views: tuple[int, ...] = ()
         self._positions: dict[int, int] = {}
@@ -102,7 +104,9 @@ class ScanMemory:
             BagError: the scan does not fit the variables of the rack.
         """
         commons = self._commons
-        self._reads = commons.entries(scan.read, scan.stamp)
+        reads = commons.reads(scan.read, scan.stamp)
+        self._reads = [entry for entry in reads if entry[0] not in CHANNELS]
+        self.channels.begin(entry for entry in reads if entry[0] in CHANNELS)
         self._writes = commons.entries(scan.written, scan.stamp)
         self._committed = commons.entries(scan.committed, scan.stamp)
         self._rewritten = frozenset(entry[:2] for entry in self._writes) if self._edited else frozenset()

@@ -17,7 +17,8 @@ from automax_ros.replay.report import Kind, TaskReport
 from automax_ros.replay.state import fitting_state, log_is_empty, state_differences, whole_state
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
-from automax_ros.running.task import ScanRecord, Status, Task, snapshot_layout
+from automax_ros.running.basic_task import make_task
+from automax_ros.running.task import ScanRecord, Status, snapshot_layout
 from automax_ros.wire.messages import Operation, Scan, TaskState
 
 _MOST_NOTES = 20
@@ -51,7 +52,7 @@ class TaskReplay:
         self._comparison = ScanComparison(source, commons, self.memory, tallies, tolerance)
         self._tolerance = tolerance
         self._starts_at = starts_at
-        self._task = Task(source.compiled, self.memory, backplane=commons.backplane)
+        self._task = make_task(source.compiled, self.memory, backplane=commons.backplane, channels=self.memory.channels)
         self._task.record_scans()
         self._last: int | None = None
         self._last_stamp = 0
@@ -283,7 +284,7 @@ class TaskReplay:
         self._layout_hash = self._layout.hash
         self._recorded_layout = snapshot_layout(source.recorded) if source.recorded else None
         program = (source.recorded or source.compiled).program
-        self._period_ns: float = math.inf if program.event is not None else program.period_ns
+        self._period_ns: float = math.inf if program.event is not None or program.is_basic else program.period_ns
         if source.edited:
             self._note_edit()
         self._tunables = Tunables(self._bag, source, self._recorded_layout or self._layout, self._note, self._when)

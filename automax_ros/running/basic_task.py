@@ -14,7 +14,7 @@ from automax_ros.compile.scan_io import Suspension, Wish
 from automax_ros.core.types import DataType
 from automax_ros.language.program import OpenedFile
 from automax_ros.running.backplane import NO_MODULES, Backplane
-from automax_ros.running.channels import CHANNEL_VIEWS, Channels, Message
+from automax_ros.running.channels import CHANNEL_VIEWS, ChannelAccess, Channels, Message
 from automax_ros.running.events import Events
 from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
@@ -119,10 +119,10 @@ class BasicTask(Task):
         priority: int = 11,
         backplane: Backplane = NO_MODULES,
         events: Events | None = None,
-        channels: Channels | None = None,
+        channels: ChannelAccess | None = None,
     ) -> None:
         """Install the task; without ``events`` and ``channels`` it has some of its own."""
-        self.channels = Channels() if channels is None else channels
+        self.channels: ChannelAccess = Channels() if channels is None else channels
         self.suspended: Callable[[], None] = _nothing
         super().__init__(
             compiled, memory, writer=writer, slot=slot, priority=priority, backplane=backplane, events=events
@@ -229,7 +229,7 @@ class BasicTask(Task):
     def _over(self, outcome: Wish, began_ns: int) -> None:
         """End a burst: note what the task waits for."""
         self.wish, (kind, number), now_ns = outcome, outcome, self.memory.now_ns
-        if kind == Suspension.STOP or (kind == Suspension.END and self.every is None):
+        if kind == Suspension.STOP or outcome == (Suspension.END, 0):
             self.status = Status.ENDED
         elif kind == Suspension.END:
             self.wake_ns = self._next_start(now_ns)
@@ -241,7 +241,8 @@ class BasicTask(Task):
 
     def _next_start(self, now_ns: int) -> int:
         """Return the next instant of START EVERY; those that a longer run has passed are left out (decision)."""
-        assert self.every is not None
+        if self.every is None:
+            return now_ns  # a burst that is executed again has no clock
         period, begin, last = self.every
         number = max(last + 1, -((begin - now_ns) // period))
         self.every = period, begin, number
@@ -272,7 +273,7 @@ def make_task(
     priority: int = 11,
     backplane: Backplane = NO_MODULES,
     events: Events | None = None,
-    channels: Channels | None = None,
+    channels: ChannelAccess | None = None,
 ) -> Task:
     """Install a task of the kind that its program is of."""
     if compiled.program.is_basic:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from automax_ros.compile.scan_io import MUST_WAIT, Suspension
 from automax_ros.core.types import DataType, Value
@@ -25,6 +25,31 @@ CHANNEL_VIEWS = {kind: 0xFFFF - place for place, kind in enumerate(DataType)}
 
 The element is the channel's number. The outcome of each access stands first, as an INTEGER.
 """
+
+
+def item_types(types: str) -> tuple[DataType, ...]:
+    """Return the types that a channel's type characters mean, `.` for REAL."""
+    return tuple(DataType(character.strip(".")) for character in types)
+
+
+class ChannelAccess(Protocol):
+    """What tasks do with channels: those of a rack, and those of a recording, fulfil it."""
+
+    def open_reader(self, number: int, types: str, depth: int, reader: str, now_ns: int) -> int:
+        """Make a task the reader; return the problem or 0."""
+        ...
+
+    def open_writer(self, number: int, types: str) -> int:
+        """Return 0, MUST_WAIT while nobody reads the channel, or the problem."""
+        ...
+
+    def receive(self, number: int, types: str, reader: str, now_ns: int) -> tuple[Message, int]:
+        """Return the oldest message and 0, or nothing and MUST_WAIT or the problem."""
+        ...
+
+    def send(self, number: int, types: str, message: Message, now_ns: int) -> int:
+        """Add a message; return 0, MUST_WAIT where there is no room, or the problem."""
+        ...
 
 
 @dataclass
@@ -44,7 +69,6 @@ class Channels:
         """Begin with none."""
         self._all: dict[int, Channel] = {}
         self._waiting: list[tuple[Suspension, int, Wake]] = []
-        self.now_ns = 0
 
     def open_reader(self, number: int, types: str, depth: int, reader: str, now_ns: int) -> int:
         """Make a task the reader; return the problem or 0.
