@@ -370,7 +370,7 @@ class Rack:
     def _after(self, task: Task, record: ScanRecord | None) -> None:
         if record is not None:
             self.observers.scanned(task, record)
-        if self._inputs.any_frozen and self._inputs.scanned(task.name):
+        if self._inputs.frozen and self._inputs.scanned(task.name):
             self.observers.tell_writes()
         if task.status is Status.FAULTED:
             last = task.errors.last

@@ -38,18 +38,16 @@ class Freezer:
 
 
 class ProcessInputs:
-    """Writes of one rack's inputs and other variables from outside its tasks, between scans."""
+    """Writes of one rack's inputs and other variables from outside its tasks, between scans.
+
+    ``frozen`` has what is frozen now: to be asked before ``scanned``, since that comes after every scan.
+    """
 
     def __init__(self, memory: CommonMemory, scheduler: Scheduler) -> None:
         """Begin with inputs that follow the process."""
         self._memory, self._scheduler = memory, scheduler
-        self._frozen: dict[Key, Freezer] = {}
+        self.frozen: dict[Key, Freezer] = {}
         self._shapes: dict[Key, Shape] = {}
-
-    @property
-    def any_frozen(self) -> bool:
-        """Whether an input is frozen: to be asked before ``scanned``, after every scan."""
-        return bool(self._frozen)
 
     def shape(self, keys: Iterable[Key], shape: Shape) -> None:
         """Let values from outside pass through a function before they reach a variable."""
@@ -60,7 +58,7 @@ class ProcessInputs:
         key = view, element
         if key in self._shapes:
             value = self._shapes[key](value)
-        freezer = self._frozen.get(key)
+        freezer = self.frozen.get(key)
         if freezer is None:
             self._memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
         else:
@@ -81,12 +79,12 @@ class ProcessInputs:
         self.free(freezer)
         freezer.owed = set(tasks)
         if freezer.owed:
-            self._frozen.update(dict.fromkeys(freezer.keys, freezer))
+            self.frozen.update(dict.fromkeys(freezer.keys, freezer))
 
     def scanned(self, task: str) -> bool:
         """Follow a scan; return whether inputs were freed and have changed."""
         changed = False
-        for freezer in dict.fromkeys(self._frozen.values()):
+        for freezer in dict.fromkeys(self.frozen.values()):
             freezer.owed.discard(task)
             if not freezer.owed:
                 changed = self.free(freezer) or changed
@@ -96,7 +94,7 @@ class ProcessInputs:
         """Let inputs follow the process again, whoever owes a scan; return whether writes have waited."""
         freezer.owed = set()
         for key in freezer.keys:
-            self._frozen.pop(key, None)
+            self.frozen.pop(key, None)
         kept, freezer.kept = freezer.kept, {}
         self._memory.now_ns = self._scheduler.now_ns
         for (view, element), (value, writer) in kept.items():
