@@ -187,6 +187,9 @@ class UdcModule:
         if self._current is not None:
             self._current.due(now_ns, skipped)
             return
+        if not self._taking_part():
+            self._cancel()
+            return
         self._skipped = skipped
         self._begin(now_ns)
         self._rest, self._scanning = self._taking_part(), True

@@ -7,14 +7,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from automax_ros.core.diagnostics import Diagnostic, Note
+from automax_ros.core.kinds import Direction
+from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.types import DataType
 from automax_ros.language.program import BoundCall, Program
 from automax_ros.language.syntax.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Scope
 from automax_ros.language.written import Place, places_that_write
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.modules.udc_config import UdcConfig
-from automax_ros.rack.modules.udc_registers import APPLICATION
+from automax_ros.rack.modules.udc_registers import APPLICATION, ISCR, SCANS_PER_INTERRUPT
 from automax_ros.rack.modules.udc_size import MAX_BYTES, estimated_bytes
+from automax_ros.rack.register_writes import constant_writes
 
 _Found = tuple[str, Diagnostic]
 
@@ -26,7 +29,7 @@ def udc_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[st
         if isinstance(module, UdcConfig):
             own = _Udc(config, module, programs)
             rules = (own.foreign_commons, own.sizes, own.ticks, own.boolean_pairs, own.double_outputs)
-            for rule in (*rules, own.drive_parameters):
+            for rule in (*rules, own.drive_parameters, own.interrupts):
                 for name, diagnostic in rule():
                     found.setdefault(name, []).append(diagnostic)
     return found
@@ -148,6 +151,33 @@ class _Udc:
                             Note(f"{key} stands in line {plant.line} of {self.config.path.name}", bound.call.span),
                         )
                         yield task.name, Diagnostic("AMX6485", message, bound.call.span, bound.line, notes=notes)
+
+    def interrupts(self) -> Iterator[_Found]:
+        """A task that scans on the UDC's interrupt counts with a period that N scans of the UDC can have."""
+        periods = self._periods_ns()
+        for program in self.programs.values():
+            event = next((item for item in program.events if item.name == program.event), None)
+            if event is None or event.interrupt_status is None or not periods or program.period_ns in periods:
+                continue
+            variable = self.points.get(event.interrupt_status.name)
+            if variable is not None and variable.point is not None and variable.point.register == ISCR:
+                every = " or ".join(f"{period / NS_PER_MS:g} ms" for period in sorted(periods))
+                tick = f"TICKS={program.ticks} x {program.tick_ns / NS_PER_MS:g} ms"
+                message = f"{event.name} comes every {every}, but the blocks of this task count with {tick}"
+                hint = f"the UDC interrupts every N of its scans, N being register {SCANS_PER_INTERRUPT}"
+                yield program.name, Diagnostic("AMX6445", message, event.span, event.number, hint)
+
+    def _periods_ns(self) -> set[int]:
+        """Return the periods of the interrupt as far as the tasks show, none where that cannot be known."""
+        place = (self.module.slot, SCANS_PER_INTERRUPT)
+        values = list(constant_writes(self.config, self.programs.values()).get(place, []))
+        for variable in self.points.values():
+            if variable.point is not None and variable.point.register == SCANS_PER_INTERRUPT:
+                values += [int(value) for value in variable.presets if not isinstance(value, str)]
+                values += [None] if variable.direction is Direction.IN else []
+        if not self.own or None in values:
+            return set()
+        return {value * self.own[0].period_ns for value in values if value is not None and value > 0}
 
     def _written_by(self, program: Program) -> Iterator[_Written]:
         for name, places in places_that_write(program).items():

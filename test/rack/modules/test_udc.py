@@ -225,3 +225,30 @@ def test_on_the_wall_clock_scans_that_are_late_are_skipped_and_counted(tmp_path)
     assert [rack.statistics[name].scans for name in ("WIND_A", "WIND_B")] == [2, 2]
     assert rack.scheduler.next_ns is not None
     assert rack.value("B_SEES%") == 1002
+
+
+def test_an_io_module_can_drive_the_clock_of_a_udc(tmp_path):
+    points = OUTS + "  RES%: {slot: 5, register: 3}\n"
+    source = A.format(ticks=2).replace("30 CCLK@ = TRUE\n", "")
+    rack = built(tmp_path, points, more="}\n  5: {module: 57C411", WIND_A=source, WIND_B=B.format(ticks=2))
+    rack.start()
+    rack.run(0.001)
+    rack.write("RES%", 64)
+    rack.run(0.0016)
+    assert rack.value("A_OUT%") == 2
+    rack.write("CCLK@", True)
+    rack.run(0.0001)
+    assert rack.operations.stopped.code == "38"
+
+
+def test_a_task_that_ends_itself_ends_the_scans_of_the_module(tmp_path):
+    source = A.format(ticks=2).replace("120 A_OUT% = N%", "115 A_OUT% = N%\n120 IF N% = 3 THEN STOP")
+    rack = built(tmp_path, OUTS + "  IN%: {slot: 10, register: 304}\n", tasks="WIND_A: {drive: A}", WIND_A=source)
+    rack.start()
+    rack.write("NTH%", 30000)
+    rack.run(0.1)
+    assert (rack.value("A_OUT%"), rack.value("COUNT%")) == (3, 3)
+    assert rack.task("WIND_A").status is Status.ENDED
+    rack.operations.run("WIND_A")
+    rack.run(0.0006)
+    assert (rack.value("A_OUT%"), rack.value("COUNT%")) == (4, 4)

@@ -191,3 +191,22 @@ def test_registers_of_the_module_itself_take_no_points(tmp_path, register):
 def test_a_real_stands_on_application_registers_alone(tmp_path, register, code):
     path = written(tmp_path, f"  GAIN: {{slot: 10, register: {register}}}\n", tasks="WIND_A: {drive: A}", WIND_A=task())
     assert [item.code for item in load(path).diagnostics] == ([code] if code else [])
+
+
+WAITING = """\
+10 COMMON ISCR%, NTH%
+20 EVENT NAME=UDC_INT, INTERRUPT_STATUS=ISCR%, TIMEOUT=20
+30 NTH% = {n}
+100 CALL SCAN_LOOP(TICKS=4, EVENT=UDC_INT)
+900 END
+"""
+
+
+@pytest.mark.parametrize(
+    ("n", "more", "wrong"),
+    [("2", "", False), ("3", "", True), ("3", "40 NTH% = 2\n", False), ("K% + 1", "", False)],
+)
+def test_an_interrupt_every_n_scans_fits_the_ticks_that_it_starts(tmp_path, n, more, wrong):
+    """The UDC scans every 1 ms, LINE counts with 4 x 0.5 ms: N has to be 2."""
+    line = WAITING.format(n=n).replace("20 EVENT", "15 LOCAL K%\n20 EVENT").replace("100 CALL", f"{more}100 CALL")
+    assert found(tmp_path, WIND_A=task(), LINE=line) == ([("LINE", "AMX6445")] if wrong else [])
