@@ -148,11 +148,10 @@ def test_the_module_decides_how_many_registers_there_are(tmp_path):
 
 
 def test_every_documented_key_is_tried():
-    """Some do nothing yet, and the page says so; those of operation are tried in ``test_executive.py``, a UDC's with it."""
+    """Some do nothing yet, and the page says so; those of operation are in ``test_executive.py``, a UDC's with it."""
     text = PAGE.read_text(encoding="utf-8")
     tables = re.findall(r"^\| (?:key|option) \| value .*\n\| --- .*\n((?:\|.*\n)+)", text, re.M)
     rows = [re.match(r"\| `(\w+)` \|", row) for table in tables for row in table.splitlines()]
     keys = {match[1] for match in rows if match}
     assert keys == {*CHANGES, *OPERATION, *UDC, "module", "operator", "slot", "register", "bit"}
     assert "`on_module_loss` | `stop_all` or `hold` | `stop_all` | No effect yet" in text
-    assert "`operator` | `true` or `false` | `false` | No effect yet" in text
