@@ -1,13 +1,17 @@
-"""Simulated seconds per wall second of the example rack, without and with recording. Prints, fails on none."""
+"""Simulated seconds per wall second of the example rack, without and with recording, and in modeled execution.
+
+Prints, fails on none.
+"""
 
 from __future__ import annotations
 
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from automax_ros.bags.recorder import Recorder
-from automax_ros.rack.config import RackConfig
+from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.wire.stream import RackStream
@@ -36,7 +40,7 @@ def run(config: RackConfig, folder: Path | None) -> float:
 
 
 def main() -> None:
-    """Print both figures."""
+    """Print the figures."""
     config = load(CONFIG).config
     if config is None:
         raise SystemExit(f"{CONFIG} has errors: automax check {CONFIG}")
@@ -44,12 +48,16 @@ def main() -> None:
     rate = scans_per_second(Rack(config))
     print(f"example rack: {rate:.0f} scans per second, compiled in {time.perf_counter() - began:.2f} s")
     plain = min(run(config, None) for _ in range(REPEATS))
+    modeled = min(run(replace(config, execution=Timing.MODELED), None) for _ in range(REPEATS))
     with tempfile.TemporaryDirectory() as temporary:
         recorded = min(run(config, Path(temporary) / f"bag{number}") for number in range(REPEATS))
         size = sum(item.stat().st_size for item in (Path(temporary) / "bag0").iterdir())
     for word, taken, wanted in (("without recording", plain, 200), ("with recording", recorded, 60)):
         pace, scan_us = SECONDS / taken, taken / SECONDS / rate * 1e6
         print(f"{word:18} {pace:7.0f} x real time, {scan_us:6.1f} us per scan; wanted: at least {wanted}")
+    scan_us = modeled / SECONDS / rate * 1e6
+    print(f"modeled execution  {SECONDS / modeled:7.0f} x real time, {scan_us:6.1f} us per scan; ", end="")
+    print(f"{modeled / plain:.2f} times as long as ideal; wanted: at most 3")
     print(f"bag: {size / 1e6:.2f} MB, {size / SECONDS / rate:.0f} bytes per scan")
 
 

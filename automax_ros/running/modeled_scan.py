@@ -91,14 +91,14 @@ class HeardMemory:
             self._memory.write_now(view, value, writer, element, kind)
 
 
-@dataclass
+@dataclass(slots=True)
 class ScanUnderWay:
-    """A scan that has begun: ``steps`` counts those it has announced, ``log`` is the error log before it."""
+    """A scan that has begun: ``steps`` counts those it has announced, ``log`` is the error log before it, if any."""
 
     began_ns: int
     skipped: int
     state: StateValues
-    log: ErrorLog
+    log: ErrorLog | None
     memory: HeardMemory
     steps: int = 0
 
@@ -112,8 +112,3 @@ class ScanUnderWay:
             "steps": self.steps,
             "heard": list(self.memory.heard),
         }
-
-
-def copied(state: StateValues) -> StateValues:
-    """Return a copy of a state that shares no array with it."""
-    return [value[:] if isinstance(value, list) else value for value in state]

@@ -8,7 +8,7 @@ from automax_ros.running.execution import Job, Place, Steps
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
 
-@dataclass
+@dataclass(eq=False, slots=True)
 class _Frame:
     """A job under way: ``remaining_ns`` of execution before its next step; ``steps`` None before its first."""
 
@@ -31,15 +31,21 @@ class ProcessorTime:
         self._key = EventKey(EventClass.EXECUTE, 0, name)
         self._frames: list[_Frame] = []
         self._event: ScheduledEvent | None = None
+        self._spare: ScheduledEvent | None = None
         self._stepping: _Frame | None = None
         self._since_ns = 0
         self._going = False
 
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
         """Let a job be executed as soon as nothing goes before it."""
-        self._book(now_ns)
-        self._insert(_Frame(job, skipped))
-        self._go(now_ns)
+        frame = _Frame(job, skipped)
+        if self._frames:
+            self._book(now_ns)
+            self._insert(frame)
+        else:
+            self._frames.append(frame)
+        if not self._going:
+            self._go(now_ns)
 
     def busy(self, job: Job) -> bool:
         """Return whether a job that was begun is not done yet."""
@@ -94,50 +100,48 @@ class ProcessorTime:
 
     def _go(self, now_ns: int) -> None:
         """Execute what is first, until it takes time that something else comes into."""
-        if self._going:
-            return
+        frames, advance_to, key = self._frames, self._scheduler.advance_to, self._key
         self._going = True
         try:
-            while self._frames:
-                frame = self._frames[0]
-                if frame.remaining_ns:
-                    end_ns = now_ns + frame.remaining_ns
-                    if not self._scheduler.advance_to(end_ns, self._key):
+            while frames:
+                frame = frames[0]
+                left_ns = frame.remaining_ns
+                if left_ns:
+                    if not advance_to(now_ns + left_ns, key):
                         break
-                    now_ns, frame.remaining_ns = end_ns, 0
-                self._step(frame, now_ns)
+                    now_ns += left_ns
+                steps, self._stepping = frame.steps, frame
+                try:
+                    if steps is None:
+                        steps = frame.steps = frame.job.steps(now_ns, frame.skipped)
+                        frame.remaining_ns = next(steps)
+                    else:
+                        frame.remaining_ns = steps.send(now_ns)
+                except StopIteration as end:
+                    self._stepping = None
+                    if frame in frames:
+                        frames.remove(frame)
+                        frame.job.done(end.value)
+                else:
+                    if frame not in frames:
+                        steps.close()
+                self._stepping = None
         finally:
             self._going = False
-        self._wait(now_ns)
+        if frames:
+            self._wait(now_ns)
 
     def _wait(self, now_ns: int) -> None:
         """Go on with what is first when it has had its time, unless it goes on by itself."""
         if self._frames and not self._going:
             self._since_ns = now_ns
-            self._event = self._scheduler.at(now_ns + self._frames[0].remaining_ns, self._key, self._goes_on)
+            event, self._spare = self._spare or ScheduledEvent(self._key, self._goes_on), None
+            self._event = self._scheduler.post(now_ns + self._frames[0].remaining_ns, event)
 
-    def _goes_on(self, now_ns: int) -> None:
-        self._event = None
+    def _goes_on(self, now_ns: int, _: int) -> None:
+        self._event, self._spare = None, self._event
         self._frames[0].remaining_ns = 0
         self._go(now_ns)
-
-    def _step(self, frame: _Frame, now_ns: int) -> None:
-        self._stepping = frame
-        try:
-            if frame.steps is None:
-                frame.steps = frame.job.steps(now_ns, frame.skipped)
-                frame.remaining_ns = next(frame.steps)
-            else:
-                frame.remaining_ns = frame.steps.send(now_ns)
-        except StopIteration as end:
-            self._stepping = None
-            if frame in self._frames:
-                self._frames.remove(frame)
-                frame.job.done(end.value)
-        else:
-            self._stepping = None
-            if frame not in self._frames:
-                frame.steps.close()
 
 
 def _goes_before(new: _Frame, other: _Frame) -> bool:

@@ -75,7 +75,7 @@ class Scheduler:
         Raises:
             ValueError: the instant lies in the past.
         """
-        return self._post(time_ns, ScheduledEvent(key, lambda now, _: action(now)))
+        return self.post(time_ns, ScheduledEvent(key, lambda now, _: action(now)))
 
     def every(self, period_ns: int, first_ns: int, key: EventKey, action: PeriodicAction) -> ScheduledEvent:
         """Post an event at ``first_ns`` and each ``period_ns`` after it.
@@ -85,7 +85,18 @@ class Scheduler:
         """
         if period_ns <= 0:
             raise ValueError(f"a period of {period_ns} ns is not positive")
-        return self._post(first_ns, ScheduledEvent(key, action, period_ns))
+        return self.post(first_ns, ScheduledEvent(key, action, period_ns))
+
+    def post(self, time_ns: int, event: ScheduledEvent) -> ScheduledEvent:
+        """Post an event that is not in the queue, and return it.
+
+        Raises:
+            ValueError: the instant lies in the past.
+        """
+        if time_ns < self.now_ns:
+            raise ValueError(f"an event at {time_ns} ns lies before the present, {self.now_ns} ns")
+        heapq.heappush(self._queue, self._queued(time_ns, event))
+        return event
 
     @property
     def next_ns(self) -> int | None:
@@ -107,10 +118,13 @@ class Scheduler:
         if time_ns >= self._end_ns:
             return False
         queue = self._queue
-        while queue and queue[0][5].cancelled:
-            heapq.heappop(queue)
-        if queue and queue[0][:4] <= (time_ns, key.event_class, key.priority, key.name):
-            return False
+        while queue and queue[0][0] <= time_ns:
+            if queue[0][5].cancelled:
+                heapq.heappop(queue)
+            elif queue[0][0] < time_ns or queue[0][1:4] <= (key.event_class, key.priority, key.name):
+                return False
+            else:
+                break
         self.now_ns = time_ns
         return True
 
@@ -190,9 +204,3 @@ class Scheduler:
     def _queued(self, time_ns: int, event: ScheduledEvent) -> _Queued:
         self._serial += 1
         return time_ns, event.key.event_class, event.key.priority, event.key.name, self._serial, event
-
-    def _post(self, time_ns: int, event: ScheduledEvent) -> ScheduledEvent:
-        if time_ns < self.now_ns:
-            raise ValueError(f"an event at {time_ns} ns lies before the present, {self.now_ns} ns")
-        heapq.heappush(self._queue, self._queued(time_ns, event))
-        return event

@@ -15,7 +15,7 @@ from automax_ros.core.types import DataType, Value
 from automax_ros.running.backplane import NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog
 from automax_ros.running.events import Events
-from automax_ros.running.modeled_scan import HeardMemory, Progress, ScanUnderWay, copied
+from automax_ros.running.modeled_scan import HeardMemory, Progress, ScanUnderWay
 from automax_ros.running.scan_record import ScanRecord, Status, Steps
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory
@@ -68,6 +68,7 @@ class Task:
         self.plan = self.memory.plan([self.memory.view(name) for name in compiled.latched])
         self.written = tuple(self.memory.view(name) for name in compiled.written)
         self._state: StateValues = compiled.layout.fresh()
+        self._arrays = [position for position, field in enumerate(compiled.layout.fields) if field.is_array]
         self.errors = ErrorLog()
         self.status = Status.STOPPED
         self.scan_number = 0
@@ -164,8 +165,8 @@ class Task:
             return None
         self._put_down()
         self._heard.begin()
-        self._under_way = scan = ScanUnderWay(now_ns, skipped, copied(self._state), self.errors.copy(), self._heard)
-        record = self._begin_record(now_ns, skipped, self._heard_io)
+        self._under_way = scan = self._new_scan(now_ns, skipped)
+        record = self._begin_record(now_ns, skipped, self._heard_io) if self._recording else None
         self._begins(now_ns)
         steps = (form or self._form_in_steps())(scan.state, self._heard_io)
         outcome: Any = False
@@ -181,7 +182,7 @@ class Task:
         except ScanTooLong as error:
             self._too_long(error)
         except BaseException:
-            self.errors, self._under_way = scan.log, None
+            self.errors, self._under_way = scan.log or ErrorLog(), None
             raise
         self.scan_number += 1
         self._state, self._under_way = scan.state, None
@@ -216,7 +217,7 @@ class Task:
 
     def snapshot(self) -> list[Value]:
         """Return the task's state as flat values, in the order of ``layout``."""
-        errors = self.errors if self._under_way is None else self._under_way.log
+        errors = self.errors if self._under_way is None else self._under_way.log or ErrorLog()
         return [*self.compiled.layout.flatten(self.state), *errors.flatten()]
 
     def restore(self, values: list[Value]) -> None:
@@ -292,6 +293,15 @@ class Task:
         if self._scans is not None:
             self._scans.close()
             self._scans = None
+
+    def _new_scan(self, now_ns: int, skipped: int) -> ScanUnderWay:
+        """Return a scan that works on a state of its own."""
+        state = self._state[:]
+        for position in self._arrays:
+            array = state[position]
+            assert isinstance(array, list)
+            state[position] = array[:]
+        return ScanUnderWay(now_ns, skipped, state, self.errors.copy() if self.errors.count else None, self._heard)
 
     def _begins(self, now_ns: int) -> None:
         """Begin a scan at an instant."""
