@@ -2,9 +2,8 @@
 
 A 57C409 has its two inputs in the registers 0 and 1, their status in 4 and a control register for each in 5 and 6; that
 2 and 3 are their update periods is ours (decision). Each channel has an interrupt, at which its input freezes. The
-module drives the common clock while bit 6 is set in one of the control registers; the manual sets it in both (p. 3-3,
-decision). The registers of a 57C410 are ours
-too (decision): four outputs in 0 to 3.
+module drives the common clock while bit 6 is set in one of the control registers, of which the manual sets both
+(decision). The registers of a 57C410 are ours too (decision): four outputs in 0 to 3.
 """
 
 from __future__ import annotations
