@@ -75,14 +75,14 @@ class ScanIo(Protocol):
 
 
 class Suspension(enum.IntEnum):
-    """Why a BASIC task gives the Processor up, and what the number beside it says."""
+    """Why a BASIC task gives the Processor up, and what the number after it says."""
 
     END = 0
-    """END: it goes on when its START EVERY says so, or with 0 beside it its run is over."""
+    """END: it goes on when its START EVERY says so, or with 0 after it its run is over."""
     STOP = 1
     """STOP: its run is over."""
     DELAY = 2
-    """It goes on after so many ns."""
+    """It goes on after this many ns."""
     EVENT = 3
     """It waits for the event of this index in ``Program.events``."""
     EMPTY = 4
@@ -94,7 +94,7 @@ class Suspension(enum.IntEnum):
     PORT = 7
     """It waits for a character of a port, for ever."""
     BUSY = 8
-    """It has executed so many statements that others get their turn."""
+    """It has executed as many statements as it may before others get their turn."""
 
 
 Wish = tuple[int, int]

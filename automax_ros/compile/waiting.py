@@ -93,7 +93,7 @@ class WaitingLowering(StatementLowering):
         return next(item for item in self.emitter.program.files if item.number == number)
 
     def _flag(self, number: int) -> str:
-        """Return the local that tells whether a file is open."""
+        """Return the local that says whether a file is open."""
         name = f"file{number}_open"
         self.fields[name] = StateField(f"FILE {number}.open", DataType.BOOLEAN, Role.STACK, False)
         return name

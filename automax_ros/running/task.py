@@ -286,7 +286,7 @@ class Task:
     def wait_again(self, numbers: Sequence[int]) -> None:
         """Take over what ``waiting`` gave; ValueError where a task cannot wait for that."""
         if numbers:
-            raise ValueError(f"task {self.name} cannot wait: it is no BASIC task")
+            raise ValueError(f"task {self.name} cannot wait: only a BASIC task can")
 
     def _put_down(self) -> None:
         """Let the compiled scan store the state that it holds."""

@@ -53,7 +53,7 @@ def check(
     tick_ns: int = DEFAULT_TICK_NS,
     commons: Mapping[str, CommonSpec] | None = None,
 ) -> CheckResult:
-    """Check a task; never raises, whatever the text. The source's name tells whether it is a BASIC task.
+    """Check a task; never raises, whatever the text. The source's name says whether it is a BASIC task.
 
     ``name`` is the task's name, ``catalogue`` the blocks by name, ``tick_ns`` the tick in ns. ``commons`` is what the
     rack defines, by full name: a COMMON that it lacks or defines otherwise is an error, and so is a write to an input

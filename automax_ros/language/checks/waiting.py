@@ -120,7 +120,7 @@ def _check_open_channel(context: Context, statement: OpenChannel) -> None:
 def _check_open_port(context: Context, statement: OpenPort) -> None:
     _check_number(context, statement.file, statement.span)
     if statement.port.upper() not in PORTS:
-        message = f"{quoted(statement.port)} is no port: a Processor has PORTA and PORTB"
+        message = f"{quoted(statement.port)} is not a port: a Processor has PORTA and PORTB"
         context.report("AMX4117", message, statement.span)
     if statement.setup is not None:
         check_integer(context, statement.setup, "AMX2009", "SETUP")

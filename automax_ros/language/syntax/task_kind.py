@@ -16,7 +16,7 @@ class TaskKind(enum.Enum):
 _REFUSED = {
     ".PC": "a ladder task (.PC) is not run: write it as a control-block task (.BLK) or a BASIC task (.BAS)",
     ".CNF": "a configuration task (.CNF) is not run: the rack's YAML file stands in its place",
-    ".INC": "an include file (.INC) is no task: write its statements into the task",
+    ".INC": "an include file (.INC) is not a task: write its statements into the task",
 }
 TASK_SUFFIXES = tuple(kind.value for kind in TaskKind)
 
