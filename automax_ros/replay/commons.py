@@ -69,6 +69,10 @@ class RecordedCommons(CommonLog):
             raise UnknownValue(key)
         return value
 
+    def is_known(self, key: Key) -> bool:
+        """Return whether the recording has told a value."""
+        return self._cells[self._start[key[0]] + key[1]] is not None
+
     def _odd(self, name: str, value: float) -> Value:
         raise ValueError(f"{name} cannot be {value!r}")
 

@@ -19,6 +19,7 @@ from automax_ros.bags.run_facts import RunFacts, run_facts
 from automax_ros.bags.span import require_scans
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.kinds import WriterKind
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Tallies
 from automax_ros.replay.report import ReplayReport
@@ -28,6 +29,8 @@ from automax_ros.wire.messages import NAMES, CommonImage, CommonWrite, Operation
 
 DEFAULT_MAX_DIFFERENCES = 50
 """Most differences that a replay's report tells in full, unless said otherwise (decision)."""
+LONGEST_WAIT_NS = NS_PER_S
+"""How long after the end of the range a scan is waited for that began in it: modeled ones last (decision)."""
 _KINDS = (CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable)
 _TYPES = frozenset(NAMES[kind] for kind in _KINDS)
 _STATES = frozenset({"automax_msgs/msg/TaskState"})
@@ -190,7 +193,7 @@ class _Run:
             self._commons.take(message)
         elif isinstance(message, TaskState):
             if self._end is not None and message.stamp > self._end:
-                return False
+                return message.stamp <= self._end + LONGEST_WAIT_NS
             task = self._task(message.task)
             if task is not None:
                 task.take_state(message, entry.log_time, counted=message.stamp >= self._begin)
@@ -235,7 +238,7 @@ class _Run:
 
     def _take_scan(self, scan: Scan) -> bool:
         if self._end is not None and scan.stamp > self._end:
-            return False
+            return scan.stamp <= self._end + LONGEST_WAIT_NS
         task = self._task(scan.task)
         if task is not None:
             self._last_stamp = scan.stamp
@@ -245,9 +248,12 @@ class _Run:
         return True
 
     def _take_write(self, write: CommonWrite) -> None:
+        writer = self._writers.get(write.writer)
+        if writer is not None:
+            writer.take_own(write)
         entries = self._commons.take(write) or ()
         for task in self._tasks.values():
-            if task.memory.apart and self._writers.get(write.writer) is not task:
+            if writer is not task and task.memory.is_apart:
                 task.memory.overwritten(entries)
 
     def _task(self, name: str) -> TaskReplay | None:

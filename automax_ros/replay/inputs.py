@@ -33,16 +33,20 @@ class ScanMemory:
     long as it reads and writes in the recorded order, its other reads are the recorded ones; but where the recorded
     scan wrote the variable itself, an edited one, which may not have done so, reads the memory of the recording.
 
-    ``apart`` are the values that the task's own writes left different from the recorded ones.
+    ``apart`` are the values that the task's own writes left different from the recorded ones. ``channels`` are those of
+    a BASIC task.
+
+    A modeled scan stands in the log where it ended, some of its own writes before it. An edited one reads what memory
+    is there, without these: others may have written it since the latch (decision).
     """
 
     def __init__(self, commons: RecordedCommons, *, edited: bool = False) -> None:
         """Take the memory of the recording; ``edited``: another source runs than the recorded one."""
         self.now_ns = 0
+        self.channels = RecordedChannels()
         self._edited = edited
         self.apart: dict[Key, Value] = {}
         self._commons = commons
-        self.channels = RecordedChannels()
         self._index = {variable.name: view for view, variable in enumerate(commons.rack)}
         self._views: tuple[int, ...] = ()
         self._positions: dict[int, int] = {}
@@ -56,6 +60,8 @@ class ScanMemory:
         self._write_count = 0
         self._committed: list[Entry] = []
         self._own: dict[Key, Value] = {}
+        self._before: dict[Key, Value] = {}
+        """What stood where the recorded scan that is still to come has written already."""
 
     def view(self, name: str) -> int:
         """Return the view of a variable by its full name; KeyError if the rack has none."""
@@ -121,7 +127,7 @@ class ScanMemory:
         values = list(self._recorded)
         for position in self._untold:
             if (self._views[position], 0) not in self.apart:
-                values[position] = self._commons.value((self._views[position], 0))
+                values[position] = self._told((self._views[position], 0))
         for (view, _), value in self.apart.items():
             latched_at = self._positions.get(view)
             if latched_at is not None:
@@ -135,13 +141,15 @@ class ScanMemory:
         if self._in_step:
             self._read_count = number + 1
             self._in_step = number < len(self._reads) and self._reads[number][:2] == key
+        if self._in_step and not self._edited and key not in self.apart:
+            return self._reads[number][2]  # others may have written since the scan itself did
         if key in self._own:
             return self._own[key]
         if key in self.apart:
             return self.apart[key]
         if self._in_step and key not in self._rewritten:
             return self._reads[number][2]
-        return self._commons.value(key)
+        return self._told(key)
 
     def write_now(
         self,
@@ -174,6 +182,7 @@ class ScanMemory:
             UnknownValue: a value is needed that the recording has not told.
         """
         if not self.apart and self.writes_agree and self._commits_agree(commits):
+            self._before.clear()
             return []
         recorded = self._recorded_changes()
         different: list[tuple[Key, Value, Value]] = []
@@ -185,12 +194,13 @@ class ScanMemory:
             elif key in self.apart:
                 own = self.apart[key]
             else:
-                own = self._commons.value(key)
+                own = self._told(key)
             if same_bits(its, own):
                 self.apart.pop(key, None)
             else:
                 self.apart[key] = own
                 different.append((key, its, own))
+        self._before.clear()
         return different
 
     @property
@@ -212,10 +222,25 @@ class ScanMemory:
         changes = self._recorded_changes()
         return changes[key] if key in changes else self._commons.value(key)
 
+    @property
+    def is_apart(self) -> bool:
+        """Whether a write of somebody else matters to what the task finds."""
+        return bool(self.apart or self._before)
+
     def overwritten(self, entries: Iterable[Entry]) -> None:
         """Somebody else has written: what the task wrote there before is gone."""
         for view, element, _ in entries:
             self.apart.pop((view, element), None)
+            self._before.pop((view, element), None)
+
+    def written_early(self, key: Key) -> None:
+        """The recorded scan that is still to come is about to write a value in the log: remember what stands there."""
+        if self._edited and key not in self._before and self._commons.is_known(key):
+            self._before[key] = self._commons.value(key)
+
+    def _told(self, key: Key) -> Value:
+        """Return what the recording tells of a value, without what the recorded scan itself has written by now."""
+        return self._before[key] if key in self._before else self._commons.value(key)
 
     def _take(self, view: int, element: int, value: Value) -> None:
         """Keep what the scan writes, and what else shows the same registers; a force keeps its value."""
@@ -255,7 +280,7 @@ class ScanMemory:
         key = (view, element)
         if key in self._own:
             return self._own[key]
-        return self.apart[key] if key in self.apart else self._commons.value(key)
+        return self.apart[key] if key in self.apart else self._told(key)
 
     def _commits_agree(self, commits: Sequence[tuple[int, Value]]) -> bool:
         recorded = self._committed

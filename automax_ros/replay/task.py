@@ -7,6 +7,7 @@ from pathlib import Path
 
 from automax_ros.bags.common_log import Key
 from automax_ros.bags.errors import BagError
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import seconds_text
 from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.commons import RecordedCommons, UnknownValue
@@ -19,7 +20,7 @@ from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.basic_task import make_task
 from automax_ros.running.task import ScanRecord, Status, snapshot_layout
-from automax_ros.wire.messages import Operation, Scan, TaskState
+from automax_ros.wire.messages import CommonWrite, Operation, Scan, TaskState
 
 _MOST_NOTES = 20
 """Notes that a report has about one task."""
@@ -55,7 +56,7 @@ class TaskReplay:
         self._task = make_task(source.compiled, self.memory, backplane=commons.backplane, channels=self.memory.channels)
         self._task.record_scans()
         self._last: int | None = None
-        self._last_stamp = 0
+        self._last_stamp = self._last_end = 0
         self._recorded_ended = False
         self._synchronous = False
         self._stored_ran: bool | None = None
@@ -181,6 +182,12 @@ class TaskReplay:
         if counted and not self._source.edited and not self._tolerance and state.layout_hash == self._layout_hash:
             self._compare_state(state)
 
+    def take_own(self, write: CommonWrite) -> None:
+        """Note what a modeled scan wrote before it ended, and so before it stands in the log."""
+        if write.kind == WriteKind.BASIC and write.stamp > self._last_end:
+            for key in zip(write.values.variable, write.values.element, strict=False):
+                self.memory.written_early(key)
+
     def take_operation(self, operation: Operation) -> None:
         """Remember that the task was installed again: its next state is then no work of its scans."""
         installs = operation.what in ("reload", "delete") or (operation.what == "power_on" and not self._last)
@@ -203,7 +210,7 @@ class TaskReplay:
             self._synchronous = False
             self.memory.forget_latch()
             self.memory.apart.clear()
-        self._last, self._last_stamp = scan.scan, scan.stamp
+        self._last, self._last_stamp, self._last_end = scan.scan, scan.stamp, scan.stamp + scan.duration_ns
         self._recorded_ended = False
         self.memory.follow(scan)
 

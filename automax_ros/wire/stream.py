@@ -6,7 +6,7 @@ more often than a variable's rate limit allows; the last value before a pause al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -211,15 +211,21 @@ class RackStream:
     def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
         """Send a scan, its writes and the values that changed; every now and then a snapshot after them."""
         stream = self._tasks[task]
-        now = record.time_ns
+        now = max(record.time_ns, self._rack.now_ns)  # a modeled scan is told when it has ended
         full = now >= stream.next_full_ns and record.scan > 0
+        own = 0 if not writes or writes[0].writer == task.writer else own_from(writes, task.writer)
+        if own:
+            self._send_log(writes[:own])
         if stream.scans:
             message = self._messages.scan(task, record, full=full)
             payload = self._encode_scan(message)
+            stamp = self._messages.stamp(writes[own].time_ns) if own < len(writes) else self._messages.stamp(now)
             for take in stream.scans:
-                take(message[0], payload)
+                take(stamp, payload)
+        if own < len(writes):
+            self._send_log(writes[own:])
         if writes:
-            self._send_writes(writes, now)
+            self._send_values({entry[4]: None for entry in writes}, now)
         if full or not record.scan:
             self._send_state(task, now)
         elif stream.each_state:
@@ -268,11 +274,14 @@ class RackStream:
             _send(forces, self._writes)
 
     def _send_writes(self, writes: list[Write], now_ns: int) -> None:
+        self._send_log(writes)
+        self._send_values({entry[4]: None for entry in writes}, now_ns)
+
+    def _send_log(self, writes: list[Write]) -> None:
         for message in self._messages.writes(writes):
             payload = self._encode_write(message)
             for take in self._writes:
                 take(message[0], payload)
-        self._send_values({entry[4]: None for entry in writes}, now_ns)
 
     def _send_values(self, views: Iterable[int], now_ns: int) -> None:
         for view in views:
@@ -307,6 +316,11 @@ class RackStream:
 
 def _as_installed(task: Task) -> bool:
     return task.snapshot() == task.layout.flatten(task.layout.fresh())
+
+
+def own_from(writes: Sequence[Write], writer: int) -> int:
+    """Return where a scan stands among writes: before its own first one, after all that others wrote before that."""
+    return next((place for place, entry in enumerate(writes) if entry.writer == writer), len(writes))
 
 
 def _send(message: Message, takes: Collection[Take], stamp: int | None = None) -> None:
