@@ -19,7 +19,7 @@ from automax_ros.replay.state import fitting_state, log_is_empty, state_differen
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.basic_task import make_task
-from automax_ros.running.task import ScanRecord, Status, snapshot_layout
+from automax_ros.running.task import OVERLAP, ScanRecord, Status, snapshot_layout
 from automax_ros.wire.messages import CommonWrite, Operation, Scan, TaskState
 
 _MOST_NOTES = 20
@@ -226,7 +226,7 @@ class TaskReplay:
                 record = self._task.run(scan.stamp)
             else:
                 self._task.scan_number = scan.scan - 1
-                record = self._task.scan(scan.stamp, scan.skipped)
+                record = self._overlap(scan) or self._task.scan(scan.stamp, scan.skipped)
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             what = f"scan {scan.scan} of task {self.name} cannot be executed: {error}"
             hint = "its recorded state is none that the task can have"
@@ -234,6 +234,12 @@ class TaskReplay:
         if record is not None and self._task.status is not Status.RUNNING:
             self._stopped_in = scan.scan
         return record
+
+    def _overlap(self, scan: Scan) -> ScanRecord | None:
+        """Fault the task where the recorded one was faulted by its time: no execution of a source tells that."""
+        if not any(error.code == OVERLAP for error in scan.errors):
+            return None
+        return self._task.fault(OVERLAP, scan.stamp)
 
     def _compare_state(self, state: TaskState) -> None:
         self._states += 1

@@ -16,6 +16,7 @@ from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.engine import ReplayOptions, replay
+from automax_ros.running.task import OVERLAP
 from automax_ros.wire.messages import CommonWrite, Operation, Scan, VariableTable
 
 from .replays import edited, record, replayed
@@ -111,7 +112,7 @@ LONG_WORK = edited(
     WORK,
     ("TICKS=6", "TICKS=1"),
     ("LOCAL I%", "LOCAL K%, I%"),
-    ("110 FOR", "105 FOR K% = 1 TO 5\n110 FOR"),
+    ("110 FOR", "105 FOR K% = 1 TO 40\n110 FOR"),
     ("150 TOTAL", "145 NEXT K%\n150 TOTAL"),
 )
 OTHER_WORK = edited(WORK, ("/ 8", "/ 4"))
@@ -234,7 +235,7 @@ def test_a_scan_stands_before_its_writes_unless_others_ran_in_its_middle(modeled
     assert late > 100
 
 
-def test_scans_that_were_given_up_are_told_and_replayed_around(tmp_path):
+def test_a_rack_that_an_overlap_stopped_replays(tmp_path):
     """WORK takes longer than a tick: it overlaps (code 14), all stops, and runs again after the log was cleared."""
     (tmp_path / "rack").mkdir()
     rack = make(tmp_path / "rack", "modeled")
@@ -251,8 +252,8 @@ def test_scans_that_were_given_up_are_told_and_replayed_around(tmp_path):
     assert [(item.task, item.detail) for item in stops] == [("WORK", "14"), ("WORK", "14")]
     report = replayed(bag)
     assert report.identical, report.differences[:3]
-    work = next(task for task in report.tasks if task.name == "WORK")
-    assert sum("was given up" in note for note in work.notes) == 2
+    overlaps = [item for item in messages(bag, Scan) if any(error.code == OVERLAP for error in item.errors)]
+    assert [(item.task, item.scan, item.latched.variable) for item in overlaps] == [("WORK", 1, ()), ("WORK", 1, ())]
     assert not [note for task in report.tasks for note in task.notes if "missing" in note or "could not" in note]
 
 
