@@ -27,6 +27,7 @@ SUBCOMMANDS: dict[str, str] = {
     "import": "make a rack file from a configuration task",
     "convert": "make tasks of an old plant acceptable",
     "run": "run a rack",
+    "step": "step a rack: a tick, a scan, a BASIC line at a time",
     "record": "record a rack that runs",
     "ctl": "operate a rack that runs: RUN, STOP, force, set, tune",
     "replay": "execute a recording again and show the first scan that differs",

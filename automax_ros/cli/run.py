@@ -13,25 +13,21 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.cli.output_files import require_different_files, require_writable
-from automax_ros.cli.rack_file import is_text, load_rack_file
+from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
 from automax_ros.cli.record_options import add_record_arguments, recording_options
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.run_plan import RunPlan
 from automax_ros.cli.run_simulated import run_simulated
 from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.stimuli_file import StimuliRefused
-from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
 from automax_ros.cli.window import seconds_above_0
-from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.faults import Fault
-from automax_ros.core.types import Value, bare_name
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.retention import RetentionFault
-from automax_ros.rack.settings import CommonElement, setting, watched
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rack.settings import CommonElement, watched
 
 WITHOUT_ROS = "or run with --simulated, which needs no ROS"
 
@@ -86,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     with stop_signals() as stop:
         if not arguments.simulated:
             prepare_ros(WITHOUT_ROS)
-        config = _config(arguments.config, allow_outside=arguments.allow_outside)
+        config = config_of(arguments.config, allow_outside=arguments.allow_outside)
         if config is None:
             return 1
         plan = RunPlan(
@@ -94,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
             duration_ns,
             arguments.record,
             recording_options(arguments, config),
-            tuple(_settings(config, arguments.settings)),
+            tuple(settings_of(config, arguments.settings)),
             tuple(_watched(config, arguments.watch)),
             arguments.state,
             arguments.stimuli,
@@ -108,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
 
             return run_live(plan, stop)
         except RackError as error:
-            return _refused(error)
+            return print_refused("run", error)
         except StimuliRefused:
             return 1
         except (BagError, RetentionFault) as error:
@@ -125,47 +121,8 @@ def _check_files(arguments: argparse.Namespace) -> None:
         require_different_files(given, {"--report": arguments.report})
 
 
-def _config(path: Path, *, allow_outside: bool) -> RackConfig | None:
-    result = load_rack_file(path, allow_outside=allow_outside)
-    print_diagnostics(result.diagnostics, result.source, sys.stderr)
-    if not is_text(result):
-        raise UsageError(f"{path} cannot be used")
-    return result.config if not has_errors(result.diagnostics) else None
-
-
-def _settings(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
-    settings = []
-    for text in texts:
-        try:
-            settings.append(setting(config, text))
-        except Fault as error:
-            raise UsageError(f"--set: {error.message}", _tunable_hint(config, text) or error.hint) from error
-    return settings
-
-
-def _tunable_hint(config: RackConfig, text: str) -> str | None:
-    """Return what to do where NAME=VALUE, or TASK.NAME=VALUE, names a tunable of a task; None where it does not."""
-    name, _, value = (part.strip().upper() for part in text.partition("="))
-    for task, _, result in check_tasks(config):
-        symbol = result.program.symbols.get(name.removeprefix(f"{task.name}.")) if result.program is not None else None
-        if symbol is not None and symbol.tuning is not None:
-            slot = next(item.slot for item in config.task_modules if task in item.tasks)
-            command = (
-                f"ros2 param set /{config.namespace}/processor_{slot} {task.name}.{bare_name(symbol.name)} {value}"
-            )
-            return f"{symbol.name} is a tunable of task {task.name}: change CURRENT= in it, or while it runs: {command}"
-    return None
-
-
 def _watched(config: RackConfig, texts: list[str] | None) -> list[CommonElement]:
     try:
         return watched(config, watch_list(texts))
     except Fault as error:
         raise UsageError(f"--watch: {error.message}", error.hint) from error
-
-
-def _refused(error: RackError) -> int:
-    for source, diagnostics in error.findings:
-        print_diagnostics(diagnostics, source, sys.stderr)
-    print(f"automax run: {error}", file=sys.stderr)
-    return 1

@@ -1,0 +1,67 @@
+"""What commands that run a rack share: its configuration, ``--set``, and what is told of a rack with errors."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from automax_ros.cli.rack_file import is_text, load_rack_file
+from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.faults import Fault
+from automax_ros.core.types import Value, bare_name
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.installation import RackError
+from automax_ros.rack.settings import setting
+from automax_ros.rack.tasks_check import check_tasks
+
+
+def config_of(path: Path, *, allow_outside: bool) -> RackConfig | None:
+    """Return a rack's configuration; what is wrong with its file is printed, and None returned where it has errors.
+
+    Raises:
+        UsageError: the file cannot be read.
+    """
+    result = load_rack_file(path, allow_outside=allow_outside)
+    print_diagnostics(result.diagnostics, result.source, sys.stderr)
+    if not is_text(result):
+        raise UsageError(f"{path} cannot be used")
+    return result.config if not has_errors(result.diagnostics) else None
+
+
+def settings_of(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
+    """Return what the texts of ``--set`` give common variables.
+
+    Raises:
+        UsageError: one of them is at fault.
+    """
+    settings = []
+    for text in texts:
+        try:
+            settings.append(setting(config, text))
+        except Fault as error:
+            raise UsageError(f"--set: {error.message}", _tunable_hint(config, text) or error.hint) from error
+    return settings
+
+
+def _tunable_hint(config: RackConfig, text: str) -> str | None:
+    """Return what to do where NAME=VALUE, or TASK.NAME=VALUE, names a tunable of a task; None where it does not."""
+    name, _, value = (part.strip().upper() for part in text.partition("="))
+    for task, _, result in check_tasks(config):
+        symbol = result.program.symbols.get(name.removeprefix(f"{task.name}.")) if result.program is not None else None
+        if symbol is not None and symbol.tuning is not None:
+            slot = next(item.slot for item in config.task_modules if task in item.tasks)
+            command = (
+                f"ros2 param set /{config.namespace}/processor_{slot} {task.name}.{bare_name(symbol.name)} {value}"
+            )
+            return f"{symbol.name} is a tunable of task {task.name}: change CURRENT= in it, or while it runs: {command}"
+    return None
+
+
+def print_refused(command: str, error: RackError) -> int:
+    """Print why a rack cannot be built, for a subcommand; return its exit code."""
+    for source, diagnostics in error.findings:
+        print_diagnostics(diagnostics, source, sys.stderr)
+    print(f"automax {command}: {error}", file=sys.stderr)
+    return 1

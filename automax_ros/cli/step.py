@@ -1,0 +1,174 @@
+"""Step a rack in simulated time: a tick, a scan, a BASIC line at a time, with breakpoints.
+
+Commands are typed with line editing, history and completion (Tab), or come from a script through standard input, one
+per line; `help` lists them. A script goes on after a command that fails, and the exit code is 1 then. Ctrl-C halts a
+rack that goes on; Ctrl-D or `quit` leaves.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
+from automax_ros.cli.step_commands import completions, obey
+from automax_ros.cli.step_session import Session
+from automax_ros.cli.step_text import place_text
+from automax_ros.cli.stimuli_file import StimuliRefused, stimulation
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import printable
+from automax_ros.rack.installation import RackError
+from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.stepping.stepper import Stepper
+
+PROMPT = "step> "
+_DELIMITERS = " \t\n=:"
+"""What ends a word for completion: not the type characters of names."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax step``."""
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help="write a common variable before the tasks start; may be given again",
+    )
+    parser.add_argument(
+        "--stimuli", type=Path, metavar="FILE", help="let happen what this YAML file says, by rack time"
+    )
+    parser.add_argument(
+        "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Step the rack; 0 unless it has errors or a command failed."""
+    config = config_of(arguments.config, allow_outside=arguments.allow_outside)
+    if config is None:
+        return 1
+    settings = settings_of(config, arguments.settings)
+    interrupt = _Interrupt()
+    try:
+        stepper = Stepper(config, interrupted=interrupt.taken)
+        happening = stimulation(stepper.rack, arguments.stimuli, allow_outside=arguments.allow_outside)
+    except RackError as error:
+        return print_refused("step", error)
+    except StimuliRefused:
+        return 1
+    stepper.start(settings)
+    happening.begin()
+    session = Session(stepper, _tell)
+    with interrupt.watching():
+        failed = _obey_all(session, interrupt)
+    return 1 if failed or happening.refused else 0
+
+
+def _obey_all(session: Session, interrupt: _Interrupt) -> bool:
+    """Carry out commands until their end; return whether one of them failed."""
+    interactive = sys.stdin.isatty()
+    if interactive:
+        _edit_lines(session)
+        _tell("help lists the commands, quit leaves")
+    _tell(place_text(session.stepper.rack, *session.stepper.place))
+    failed = False
+    for line in _typed(interrupt) if interactive else sys.stdin:
+        failed |= not _obeyed(session, line)
+        if session.over:
+            break
+    return failed and not interactive
+
+
+def _obeyed(session: Session, line: str) -> bool:
+    try:
+        obey(session, line)
+    except Fault as fault:
+        sys.stdout.flush()
+        print(f"automax step: {fault}", file=sys.stderr)
+        return False
+    except OperationRefused as refused:
+        sys.stdout.flush()
+        print(f"automax step: refused: {refused}", file=sys.stderr)
+        return False
+    return True
+
+
+def _typed(interrupt: _Interrupt) -> Iterator[str]:
+    """Yield the lines that a person types; Ctrl-C gives up the present one."""
+    while True:
+        try:
+            with interrupt.prompting():
+                line = input(PROMPT)
+        except EOFError:
+            _tell("")
+            return
+        except KeyboardInterrupt:
+            _tell("")
+            continue
+        yield line
+
+
+def _edit_lines(session: Session) -> None:
+    """Give the prompt editing, history and completion, where Python has readline."""
+    try:
+        import readline
+    except ImportError:
+        return
+
+    def complete(text: str, state: int) -> str | None:
+        found = completions(session, text)
+        return found[state] if state < len(found) else None
+
+    readline.set_completer(complete)
+    readline.set_completer_delims(_DELIMITERS)
+    readline.parse_and_bind("tab: complete")
+
+
+def _tell(line: str) -> None:
+    print(printable(line), flush=True)
+
+
+@dataclass
+class _Interrupt:
+    """Ctrl-C: at the prompt it gives the line up, while the rack goes on it halts it between two events."""
+
+    _pending: bool = False
+    _prompting: bool = False
+
+    def taken(self) -> bool:
+        """Return whether Ctrl-C came since the last call."""
+        pending, self._pending = self._pending, False
+        return pending
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Take SIGINT while the block lasts."""
+
+        def note(_: int, __: FrameType | None) -> None:
+            if self._prompting:
+                raise KeyboardInterrupt
+            self._pending = True
+
+        before = signal.signal(signal.SIGINT, note)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    @contextmanager
+    def prompting(self) -> Iterator[None]:
+        """Let SIGINT raise KeyboardInterrupt while the block lasts."""
+        self._prompting, self._pending = True, False
+        try:
+            yield
+        finally:
+            self._prompting = False

@@ -1,0 +1,215 @@
+"""What the commands of `automax step` do to a rack that is stepped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from automax_ros.cli.step_text import change_lines, halt_lines, place_text, source_lines
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import near_or_listed, printable, quoted, table
+from automax_ros.core.ticks import seconds_ns
+from automax_ros.core.types import Value
+from automax_ros.core.values import number, source_text, whole_number
+from automax_ros.rack.report import STATUS_WORDS
+from automax_ros.rack.settings import setting
+from automax_ros.rack.stepping.stepper import Halt, Stepper, Why
+from automax_ros.rack.stepping.variables import Variable
+
+MOST_STEPS = 1_000_000
+_DEFAULT_GO_NS = 1 << 62
+
+
+class CommandFault(Fault):
+    """A command cannot be carried out as it was typed."""
+
+
+@dataclass
+class Session:
+    """One rack under a person's hand; ``tell`` prints a line. ``over`` is TRUE after ``quit``."""
+
+    stepper: Stepper
+    tell: Callable[[str], None]
+    over: bool = False
+    _watched: dict[str, Variable] = field(default_factory=dict)
+
+    def step(self, words: list[str], one: Callable[[str], Halt]) -> None:
+        """Repeat a step of a task as often as is wanted, until something else halts the rack."""
+        task = next((word for word in words if not word.isdecimal()), "")
+        times = self._times([word for word in words if word != task])
+
+        def all_of_them() -> Halt:
+            halt = one(task)
+            for _ in range(times - 1):
+                if halt.why is not Why.DONE:
+                    break
+                halt = one(task)
+            return halt
+
+        self.move(all_of_them)
+
+    def ticks(self, words: list[str]) -> None:
+        """Go on for ticks of the first Processor."""
+        times = self._times(words)
+        self.move(lambda: self.stepper.ticks(times))
+
+    def move(self, call: Callable[[], Halt]) -> None:
+        """Let the rack go on, and say what its variables were and are."""
+        before = self.values()
+        self.told(call(), before)
+
+    def told(self, halt: Halt, before: dict[str, Value]) -> None:
+        """Say where the rack halts, and what its variables were and are."""
+        for task in self.stepper.rack.tasks:
+            while task.printed:
+                self.tell(f"{task.name}: {printable(task.printed.popleft())}")
+        self.tell(place_text(self.stepper.rack, *self.stepper.place))
+        for line in halt_lines(halt):
+            self.tell(line)
+        for line in change_lines(before, self.values(), all_of_them=bool(self._watched)):
+            self.tell(line)
+        if halt.line:
+            self.source([halt.task], around=0)
+
+    def values(self) -> dict[str, Value]:
+        """Return the watched variables, or without any all simple ones."""
+        shown = self._watched.values() or self._all()
+        return {variable.label: variable.read() for variable in shown}
+
+    def watch(self, words: list[str]) -> None:
+        """Show these after each step; without any, list them."""
+        for word in words:
+            variable = self.stepper.variables.find(word)
+            self._watched[variable.label] = variable
+        self.show(list(self._watched))
+
+    def unwatch(self, words: list[str]) -> None:
+        """Show these no longer, or none of them."""
+        labels = [self.stepper.variables.find(word).label for word in words] or list(self._watched)
+        for label in labels:
+            self._watched.pop(label, None)
+
+    def show(self, words: list[str]) -> None:
+        """Print values: of variables, or of all simple variables of a task."""
+        tasks = {task.name for task in self.stepper.rack.tasks}
+        found: list[Variable] = []
+        for word in words:
+            is_task = word.upper() in tasks
+            found += self.stepper.variables.of_task(word.upper()) if is_task else [self.stepper.variables.find(word)]
+        for line in table([[f"  {item.label}", source_text(item.read())] for item in found]):
+            self.tell(line)
+
+    def assign(self, words: list[str], write: Callable[[str, Value], None]) -> None:
+        """Carry out NAME=VALUE for a common; forces and values take effect between scans only."""
+        name, value = setting(self.stepper.rack.config, " ".join(words))
+        self.between_scans()
+        write(name, value)
+
+    def tune(self, words: list[str]) -> None:
+        """Carry out TASK.NAME=VALUE for a tunable."""
+        name, equals, text = " ".join(words).partition("=")
+        if not equals:
+            raise CommandFault(f"{quoted(' '.join(words))} is not TASK.NAME=VALUE")
+        self.between_scans()
+        try:
+            self.stepper.rack.adjust.tune(name.strip(), number(text))
+        except ValueError as error:
+            raise CommandFault(str(error)) from error
+
+    def unforce(self, words: list[str]) -> None:
+        """End forces."""
+        self.between_scans()
+        self.stepper.rack.adjust.unforce(None if words in (["all"], []) else words)
+
+    def between_scans(self) -> None:
+        """Refuse what must not fall into a scan (decision: values from outside come between two scans, as always)."""
+        task, line = self.stepper.place
+        if task:
+            raise CommandFault(f"{task} is held before line {line}: a scan must end first", "write: scan")
+
+    def add_break(self, words: list[str]) -> None:
+        """Add a breakpoint; without a word, list them."""
+        task, colon, line = "".join(words).partition(":")
+        if colon:
+            self.stepper.break_at(task, self._whole(line, "a line"))
+        elif words:
+            self.stepper.break_on("".join(words))
+        for place in sorted(self.stepper.lines):
+            self.tell(f"  {place[0]}:{place[1]}")
+        for label in self.stepper.watched:
+            self.tell(f"  {label}")
+
+    def source(self, words: list[str], around: int = 5) -> None:
+        """Print the source of a task around the line at which it is held."""
+        held, line = self.stepper.place
+        sources = self.stepper.rack.sources
+        name = (words[0].upper() if words else held) or next(iter(sources))
+        if name not in sources:
+            raise CommandFault(f"the rack has no task {quoted(name)}", near_or_listed(name, sources))
+        shown = line if name == held else 0
+        if len(words) > 1:
+            shown = self._whole(words[1], "a line")
+        for text in source_lines(sources[name].lines, shown, around):
+            self.tell(text)
+
+    def tasks(self) -> None:
+        """Print the tasks with what they do."""
+        rack = self.stepper.rack
+        rows = [["  task", "module", "status", "scans", "errors"]]
+        for module in rack.task_modules:
+            for item in module.tasks:
+                status, errors = STATUS_WORDS[item.task.status], str(item.task.errors.count)
+                rows.append([f"  {item.name}", module.config.name, status, str(item.statistics.scans), errors])
+        for line in table(rows, right={3, 4}):
+            self.tell(line)
+
+    def errors(self) -> None:
+        """Print the error logs."""
+        for task in self.stepper.rack.tasks:
+            for entry in task.errors.entries:
+                self.tell(f"  {task.name}: {entry.describe()}")
+
+    def go(self, words: list[str]) -> None:
+        """Go on, for a time if one is given."""
+        for_ns = self._seconds(words[0]) if words else _DEFAULT_GO_NS
+        self.move(lambda: self.stepper.go(for_ns))
+
+    def until(self, words: list[str]) -> None:
+        """Go on to a rack time."""
+        time_ns = self._seconds(words[0])
+        if time_ns < self.stepper.rack.now_ns:
+            raise CommandFault(f"{words[0]} s has passed")
+        self.move(lambda: self.stepper.until(time_ns))
+
+    def end(self) -> None:
+        """Leave."""
+        self.over = True
+
+    def _all(self) -> Iterator[Variable]:
+        """Yield the simple commons, and the own variables of the task that is held."""
+        rack, (task, _) = self.stepper.rack, self.stepper.place
+        for variable in rack.config.declared:
+            if not variable.is_array:
+                yield self.stepper.variables.find(variable.name)
+        for name in [task] if task else [item.name for item in rack.tasks]:
+            yield from (item for item in self.stepper.variables.of_task(name) if item.task)
+
+    def _times(self, words: list[str]) -> int:
+        times = self._whole(words[0], "how often") if words else 1
+        if not 1 <= times <= MOST_STEPS:
+            raise CommandFault(f"how often is 1 to {MOST_STEPS}, not {times}")
+        return times
+
+    @staticmethod
+    def _whole(text: str, what: str) -> int:
+        try:
+            return whole_number(text)
+        except ValueError as error:
+            raise CommandFault(f"{what} must be a whole number: {error}") from error
+
+    @staticmethod
+    def _seconds(text: str) -> int:
+        try:
+            return seconds_ns(text)
+        except ValueError as error:
+            raise CommandFault(str(error)) from error
