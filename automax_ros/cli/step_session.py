@@ -128,7 +128,7 @@ class Session:
             raise CommandFault(f"{task} is held before line {line}: a scan must end first", "write: scan")
 
     def add_break(self, words: list[str]) -> None:
-        """Add a breakpoint; without a word, list them."""
+        """Add a breakpoint, and list all."""
         task, colon, line = "".join(words).partition(":")
         if colon:
             self.stepper.break_at(task, self._whole(line, "a line"))

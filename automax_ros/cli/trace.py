@@ -41,6 +41,7 @@ from automax_ros.running.error_log import LogEntry
 from automax_ros.running.lone_task import LoneTask, LoneVariable
 from automax_ros.running.task import ScanRecord, Status
 
+_USAGE = "usage: automax trace FILE --input IN.csv, or: automax trace FILE --stimuli FILE --duration S"
 _ROWS_A_LOOK = 256
 """Rows between two looks at the clock for the progress bar."""
 
@@ -64,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Trace the task; 1 if it has errors, stops or faults, 2 if the table or an option is at fault."""
     if arguments.input is None and (arguments.stimuli is None or arguments.duration is None):
-        raise UsageError("what is the task to work on?", "give --input IN.csv, or --stimuli FILE with --duration S")
+        raise UsageError("nothing is given for the task to work on", _USAGE)
     target = target_of(arguments)
     source, result = check_task_file(arguments.file, target)
     if result.program is not None and result.program.is_basic:
