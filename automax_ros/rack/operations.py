@@ -181,6 +181,7 @@ class Operations:
             self._tell("reload", name, ok=False, reason=str(error))
             raise
         ran = item.task.status is Status.RUNNING
+        item.stop()  # A scan under way is given up first: only then the task's values are whole.
         before, values = item.task.layout, item.task.snapshot()
         item.install(compiled, source)
         if keep_state:

@@ -387,6 +387,22 @@ def test_a_reload_carries_over_what_fits_by_name(tmp_path):
     assert [what for what, _, ok in notes.operations if ok] == ["reload"] * 3
 
 
+def test_a_reload_in_the_middle_of_a_modeled_scan_carries_over_whole_values(tmp_path):
+    long = "".join(f"{line} OWN% = OWN% + 1\n" for line in range(110, 510))
+    text = f"10 LOCAL OWN%\n100 CALL SCAN_LOOP(TICKS=2)\n{long}900 END\n"
+    yaml = YAML.replace("rack: LINE1\n", "rack: LINE1\nexecution: modeled\n").replace("tick_ms: 5.5", "tick_ms: 10")
+    rack, notes = build(tmp_path, yaml=yaml, FAST=text)
+    rack.start()
+    rack.run(0.0005)
+    rack.operations.reload("FAST", SourceText("FAST.BLK", text + "\n"), keep_state=True)
+    fast = rack.task("FAST")
+    done = fast.value("OWN%")
+    assert done in (0, 400), "locals of a whole scan, or of none"
+    rack.run(0.0295)
+    assert fast.value("OWN%") == done + 400, "one whole scan since, from 10 ms on"
+    assert [scan for name, scan, _ in notes.scans if name == "FAST"] == [0, 0, 1]
+
+
 OPERATIONS = st.lists(
     st.tuples(
         st.sampled_from(
