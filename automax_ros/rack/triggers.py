@@ -95,8 +95,8 @@ class EventTrigger:
         """Let the scan be due after whatever sets the event: a scan does not begin inside another."""
         self._event.wait(self._wake)
         if self._due is not None:
-            due = self._due
-            self._set = self._scheduler.at(now_ns, self._key, lambda now: due(now, 0))
+            due, skipped = self._due, self._event.skipped
+            self._set = self._scheduler.at(now_ns, self._key, lambda now: due(now, skipped))
 
 
 class ModuleTrigger:

@@ -9,12 +9,16 @@ Wake = Callable[[int], None]
 
 
 class Event:
-    """One event. A ``set`` before anybody waits is kept until one waits, once (decision)."""
+    """One event. A ``set`` before anybody waits is kept until one waits, once (decision).
+
+    ``skipped`` is how often it would have been set just before the last time, had the host not been late.
+    """
 
     def __init__(self, name: str) -> None:
         """Begin with an event that nobody has set and nobody waits for."""
         self.name = name
         self.pending = False
+        self.skipped = 0
         self._waiting: list[Wake] = []
 
     @property
@@ -22,10 +26,10 @@ class Event:
         """Whether anybody waits for it."""
         return bool(self._waiting)
 
-    def set(self, now_ns: int) -> None:
+    def set(self, now_ns: int, skipped: int = 0) -> None:
         """Let all who wait go on, in the order in which they began to wait; without any, keep it for the next."""
         waiting, self._waiting = self._waiting, []
-        self.pending = not waiting
+        self.pending, self.skipped = not waiting, skipped
         for wake in waiting:
             wake(now_ns)
 

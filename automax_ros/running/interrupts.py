@@ -53,8 +53,11 @@ class Interrupts:
         bound = sorted(self._bound.get((bank, register), {}).items())
         return [task.name for (*_, event), (task, _) in bound if task.status is Status.RUNNING and awaits(task, event)]
 
-    def post(self, bank: int, register: int, now_ns: int) -> None:
-        """Set the events of an ISCR, each once, in the order of priority and name of their tasks."""
+    def post(self, bank: int, register: int, now_ns: int, skipped: int = 0) -> None:
+        """Set the events of an ISCR, each once, in the order of priority and name of their tasks.
+
+        ``skipped`` interrupts before this one were left out, since the host was late.
+        """
         bound = sorted(self._bound.get((bank, register), {}).items())
         for event in dict.fromkeys(event for _, (_, event) in bound):
-            event.set(now_ns)
+            event.set(now_ns, skipped)

@@ -176,11 +176,11 @@ class _PeriodicInterrupt:
             self._event.cancel()
             self._event = None
 
-    def _happen(self, now_ns: int, _: int) -> None:
+    def _happen(self, now_ns: int, skipped: int) -> None:
         interrupts, inputs = self._parts.interrupts, self._parts.inputs
         inputs.freeze(self._freezer, interrupts.waiting(self._bank, self.status))
         self._parts.tell_writes()
-        interrupts.post(self._bank, self.status, now_ns)
+        interrupts.post(self._bank, self.status, now_ns, skipped)
 
 
 def _counted(value: Value) -> Value:

@@ -118,6 +118,16 @@ def test_without_a_clock_nothing_interrupts(tmp_path):
     assert len(seen.scans) == 1
 
 
+def test_a_late_host_skips_whole_interrupts_and_counts_them(tmp_path):
+    rack = built(tmp_path, FOLLOW=(5, FOLLOW))
+    seen = Watching(rack)
+    rack.start()
+    for now_ms in (1, 22, 23, 100, 101, 110):
+        rack.scheduler.run_due(now_ms * MS)
+    assert seen.scans == [("FOLLOW", number * 22 * MS) for number in (1, 4, 5)]
+    assert rack.statistics["FOLLOW"].skipped == 2
+
+
 def test_another_module_may_drive_the_clock_but_not_both(tmp_path):
     common = COMMON + "  OTHER%: {slot: 7, register: 2, ros: in}\n"
     slots = "  6: {module: 57C411}\n  7: {module: 57C419}\n"
