@@ -239,7 +239,8 @@ class Operations:
     def power_on(self, *, battery: bool = True, auto_run: bool | None = None) -> None:
         """Switch the power on again.
 
-        Without a good ``battery`` non-volatile commons, locals, tunables, error logs and forces are as at installation.
+        Without a good ``battery`` non-volatile commons, locals, tunables, error logs and forces are as at installation;
+        the tasks themselves are there again, as if somebody had loaded them (decision).
         With ``auto_run`` (else as the rack file says) the tasks that ran when the power went are put into RUN
         (J2-3106-1 p. 12-4); a task that was stopped, or that a fault has stopped, was not running then.
 
