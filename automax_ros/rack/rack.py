@@ -44,7 +44,7 @@ from automax_ros.running.memory import CommonMemory
 from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.processor_time import ProcessorTime
 from automax_ros.running.scheduler import Scheduler
-from automax_ros.running.task import ScanRecord, Status, Task
+from automax_ros.running.task import EVENT_TIMEOUT, ScanRecord, Status, Task
 from automax_ros.running.views import Memory
 
 
@@ -357,7 +357,10 @@ class Rack:
         self._interrupts.bind(task)
         if isinstance(task, BasicTask):
             return WaitTrigger(task, self.events, self.channels, self.scheduler)
-        return usual_trigger(task, self.events, self.scheduler)
+        return usual_trigger(task, self.events, self.scheduler, self._no_event)
+
+    def _no_event(self, task: Task) -> None:
+        next(item for item in self.scheduled if item.task is task).fault(EVENT_TIMEOUT)
 
     def _clock_fault(self, reason: str, code: str) -> None:
         if self.operations.powered:

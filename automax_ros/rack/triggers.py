@@ -13,6 +13,9 @@ Due = PeriodicAction
 """Is called when a scan is due, with the instant in ns and the number of instants skipped just before it."""
 
 
+_LAST = EventKey(EventClass.OBSERVE, 0, "")
+
+
 class Trigger(Protocol):
     """Tells when scans of one task are due, from ``arm`` to ``disarm``."""
 
@@ -61,35 +64,82 @@ class ClockTrigger:
         return self._scheduler.due_ns(self._event) if self._event is not None else None
 
 
-class EventTrigger:
-    """A scan is due whenever an event is set (4.0, EVENT): at that instant, in the task's place among all scans."""
+class Timeout:
+    """The time within which an event must be set again, once somebody waits for it.
 
-    def __init__(self, event: Event, task: Task, scheduler: Scheduler) -> None:
+    A host that is late makes the interrupts of a module late too, so no time runs out before all that is due has been
+    carried out.
+    """
+
+    def __init__(self, timeout_ns: int, key: EventKey, scheduler: Scheduler, expired: Callable[[], None]) -> None:
+        """Take the time, and what is called when it is over; it does not run yet."""
+        self._timeout_ns, self._key, self._scheduler, self._expired = timeout_ns, key, scheduler, expired
+        self._end: ScheduledEvent | None = None
+
+    def begin(self, since_ns: int) -> None:
+        """Let the time run from an instant on, in place of any earlier one."""
+        self.end()
+        self._end = self._scheduler.at(since_ns + self._timeout_ns, self._key, self._over)
+
+    def end(self) -> None:
+        """Let it run no longer."""
+        if self._end is not None:
+            self._end.cancel()
+            self._end = None
+
+    def _over(self, now_ns: int) -> None:
+        if now_ns < self._scheduler.wall_ns:
+            self._end = self._scheduler.at(self._scheduler.wall_ns, _LAST, self._over)
+        else:
+            self._end = None
+            self._expired()
+
+
+class EventTrigger:
+    """A scan is due whenever an event is set (4.0, EVENT): at that instant, in the task's place among all scans.
+
+    A hardware event must be set within its TIMEOUT, in ticks of the Processor, from RUN and from each event on, or
+    ``expired`` is called (decision: no source gives the unit, or what happens; J-3675 p. 6-17).
+    """
+
+    def __init__(self, event: Event, task: Task, scheduler: Scheduler, expired: Callable[[], None]) -> None:
         """Take the event; nobody waits for it yet."""
         self._event, self._scheduler = event, scheduler
         self._key = EventKey(EventClass.SCAN, task.priority, task.name)
         self._due: Due | None = None
         self._set: ScheduledEvent | None = None
+        self._since_ns = 0
+        program = task.compiled.program
+        ticks = next((item.timeout for item in program.events if item.name == event.name), None)
+        self._timeout = Timeout(ticks * program.tick_ns, self._key, scheduler, expired) if ticks else None
 
-    def arm(self, first_ns: int, due: Due) -> None:  # noqa: ARG002
+    def arm(self, first_ns: int, due: Due) -> None:
         """Wait for the event from now on, and go on waiting while a scan that it started is under way."""
         self.disarm()
         self._due = due
         self._event.pending = False
         self._event.wait(self._wake)
+        self._wait_since(first_ns)
 
     def disarm(self) -> None:
         """Wait no longer."""
         self._due = None
         self._event.forget(self._wake)
+        if self._timeout is not None:
+            self._timeout.end()
         if self._set is not None:
             self._set.cancel()
             self._set = None
 
     @property
     def next_ns(self) -> int | None:
-        """The present, while it waits."""
-        return self._scheduler.now_ns if self._due is not None else None
+        """Since when it waits."""
+        return self._since_ns if self._due is not None else None
+
+    def _wait_since(self, now_ns: int) -> None:
+        self._since_ns = now_ns
+        if self._timeout is not None:
+            self._timeout.begin(now_ns)
 
     def _wake(self, now_ns: int) -> None:
         """Let the scan be due after whatever sets the event: a scan does not begin inside another."""
@@ -97,6 +147,7 @@ class EventTrigger:
         if self._due is not None:
             due, skipped = self._due, self._event.skipped
             self._set = self._scheduler.at(now_ns, self._key, lambda now: due(now, skipped))
+            self._wait_since(now_ns)
 
 
 class ModuleTrigger:
@@ -121,7 +172,12 @@ class ModuleTrigger:
         return self._scheduler.now_ns if self.armed else None
 
 
-def usual_trigger(task: Task, events: Events, scheduler: Scheduler) -> Trigger:
-    """Return the trigger of a Processor's task: the event that its SCAN_LOOP names, else the clock (4.0)."""
+def usual_trigger(task: Task, events: Events, scheduler: Scheduler, expired: Callable[[Task], None]) -> Trigger:
+    """Return the trigger of a Processor's task: the event that its SCAN_LOOP names, else the clock (4.0).
+
+    ``expired`` is called with the task when a hardware event was not set within its TIMEOUT.
+    """
     event = task.compiled.program.event
-    return ClockTrigger(task, scheduler) if event is None else EventTrigger(events.event(event), task, scheduler)
+    if event is None:
+        return ClockTrigger(task, scheduler)
+    return EventTrigger(events.event(event), task, scheduler, lambda: expired(task))

@@ -60,7 +60,10 @@ _Queued = tuple[int, int, int, str, int, ScheduledEvent]
 
 
 class Scheduler:
-    """The event queue of one rack."""
+    """The event queue of one rack.
+
+    ``wall_ns`` is the time that ``run_due`` catches up with: ahead of ``now_ns`` while what is late is carried out.
+    """
 
     def __init__(self, start_ns: int = 0) -> None:
         """Begin at an instant with an empty queue."""
@@ -68,6 +71,7 @@ class Scheduler:
         self._queue: list[_Queued] = []
         self._serial = 0
         self._end_ns = start_ns
+        self.wall_ns = start_ns
 
     def at(self, time_ns: int, key: EventKey, action: Action) -> ScheduledEvent:
         """Post an event that happens once.
@@ -165,7 +169,7 @@ class Scheduler:
         the others are skipped and counted.
         """
         queue = self._queue
-        self._end_ns = now_ns + 1
+        self._end_ns, self.wall_ns = now_ns + 1, now_ns
         skipped = self._skip_until(now_ns)
         while queue and queue[0][0] <= now_ns:
             instant, _, _, _, _, event = queue[0]

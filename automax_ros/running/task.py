@@ -20,10 +20,11 @@ from automax_ros.running.scan_record import ScanRecord, Status, Steps
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory
 
-__all__ = ["OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task", "snapshot_layout"]
+__all__ = ["EVENT_TIMEOUT", "OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task", "snapshot_layout"]
 
 SCAN_TOO_LONG = 7040
 OVERLAP = 7070
+EVENT_TIMEOUT = 7071
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
 _RUNNING = Status.RUNNING
