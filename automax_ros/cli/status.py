@@ -60,8 +60,9 @@ class StatusDisplay:
         print(f"{'mean us':>10}{'longest us':>12}" if self._live else "")
         for task in rack.tasks:
             statistics = rack.statistics[task.name]
+            period = f"{task.period_ns / 1e6:g}" if task.period_ns else "-"
             print(
-                f"  {task.name:10}{task.slot:>4}{task.period_ns / 1e6:>11g}{statistics.scans:>10}"
+                f"  {task.name:10}{task.slot:>4}{period:>11}{statistics.scans:>10}"
                 f"{statistics.skipped:>7}{task.errors.count:>8}",
                 end="",
             )
