@@ -45,6 +45,7 @@ common:
 
 OPERATION = {"execution", "executive", "auto_run", "on_module_loss", "critical"}
 UDC = {"drive", "plants", "motor", "motor_overload_ratio"}
+"""Keys of UDC modules and what they drive; ``modules/test_udc_rules.py`` tries them."""
 
 
 class Behaviour(NamedTuple):
@@ -155,3 +156,4 @@ def test_every_documented_key_is_tried():
     keys = {match[1] for match in rows if match}
     assert keys == {*CHANGES, *OPERATION, *UDC, "module", "operator", "slot", "register", "bit"}
     assert "`on_module_loss` | `stop_all` or `hold` | `stop_all` | No effect yet" in text
+    assert "The emulator does not simulate plants yet" in text

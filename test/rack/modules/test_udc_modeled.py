@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from automax_ros.running.task import Status
 
@@ -123,3 +125,56 @@ def test_ideal_and_modeled_leave_the_same_values(tmp_path):
         other.run(0.0015)
     other.run(0.0004)
     assert [ideal.value(name) for name in ("A_OUT%", "B_OUT%")] == [other.value(name) for name in ("A_OUT%", "B_OUT%")]
+
+
+NTH = """\
+  SLOW%: {slot: 10, register: 1300}
+  BACK%: {slot: 10, register: 1302}
+"""
+WITH_NTH = """\
+10 COMMON CCLK@, A_OUT%, SLOW%, BACK%, IN%
+20 LOCAL N%, M%
+30 CCLK@ = TRUE
+100 CALL SCAN_LOOP(TICKS=3)
+110 CALL COUNTER(INPUT_PLUS=1, INPUT_MINUS=0, RESET=FALSE, OUTPUT=N%)
+120 A_OUT% = N% + IN%
+130 M% = M% + A_OUT%
+140 CALL SUMMER(INPUT1=N%, INPUT2=BACK%, OUTPUT=SLOW%)
+900 END
+"""
+ANSWER = """\
+10 COMMON ISCR%, NTH%, SLOW%, BACK%, IN%
+20 LOCAL N%
+30 EVENT NAME=UDC_INT, INTERRUPT_STATUS=ISCR%, TIMEOUT=100
+40 NTH% = 2
+100 CALL SCAN_LOOP(TICKS=6, EVENT=UDC_INT)
+110 N% = N% + 1
+120 CALL SUMMER(INPUT1=SLOW%, INPUT2=7, OUTPUT=BACK%)
+130 IN% = N%
+900 END
+"""
+
+
+@given(st.integers(0, 800))
+@settings(deadline=None, derandomize=True, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_state_from_the_middle_of_a_scan_has_the_same_future(tmp_path, tens_of_us):
+    def rack():
+        sources = {"WIND_A": WITH_NTH, "WIND_B": B.format(more="").replace("TICKS=2", "TICKS=3"), "LINE": ANSWER}
+        return built(tmp_path, POINTS + NTH, top=TOP, **sources)
+
+    def shown(one):
+        tasks = [(task.scan_number, task.value("N%")) for task in one.tasks if task.name != "WIND_B"]
+        return tasks, [one.value(item.name) for item in one.config.declared]
+
+    first, second, whole = rack(), rack(), rack()
+    first.start()
+    whole.start()
+    first.run(tens_of_us * 1e-5)
+    second.load(first.state())
+    for _ in range(9):
+        first.run(0.0007)
+        second.run(0.0007)
+        assert shown(first) == shown(second)
+    whole.run((tens_of_us * 10 + 9 * 700) * 1e-6)
+    assert shown(whole) == shown(first)
+    assert whole.operations.stopped is None
