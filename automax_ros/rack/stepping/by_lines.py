@@ -25,23 +25,28 @@ class HeldScan:
         form = cast(ScanSteps, task.compiled.scan_lines.scan)
         self._names = [*(field.name for field in task.compiled.layout.fields), *task.compiled.latched]
         self._skipped = skipped
+        self._record: ScanRecord | None = None
         self._steps = cast(
             Generator[LineValues, None, ScanRecord | None], task.scan_modeled(now_ns, skipped, form=form)
         )
 
     def advance(self) -> bool:
-        """Go to the next line; FALSE where the scan has ended, and was told of.
+        """Go to the next line; FALSE where the scan has ended, which ``finish`` tells.
 
         ``values`` are then what the scan holds by names of its layout: locals, block states, and its latched commons.
         """
         try:
             self.line, values = next(self._steps)
         except StopIteration as end:
-            self.item.statistics.skipped += self._skipped
-            self.item.done(end.value)
+            self._record = end.value
             return False
         self.values = dict(zip(self._names, values, strict=True))
         return True
+
+    def finish(self) -> None:
+        """Tell of the scan that has ended; others may begin by that."""
+        self.item.statistics.skipped += self._skipped
+        self.item.done(self._record)
 
     def close(self) -> None:
         """Give the scan up: the task is as before it; what it has written to memory stays."""
@@ -63,6 +68,16 @@ class ByLines:
             job.whole(now_ns, skipped)
         else:
             self.held = HeldScan(item, now_ns, skipped)
+
+    def advance(self) -> bool:
+        """Go to the next line of the held scan; FALSE where it has ended: then none is held, or one that follows it."""
+        held = self.held
+        assert held is not None
+        if held.advance():
+            return True
+        self.held = None
+        held.finish()
+        return False
 
     def busy(self, job: Job) -> bool:
         """Return whether a job's scan is held."""

@@ -169,12 +169,10 @@ class Stepper:
         Raises:
             Fault: there is no such task, it does not run, or its scans cannot be held.
         """
-        held = self._execution.held
-        if held is not None:
+        if self._execution.held is not None:
             before = self._read()
-            if held.advance():
+            if self._execution.advance() or self._follows():
                 return self._halt(Why.CHANGE if self._read() != before else Why.DONE, before)
-            self._execution.held = None
             return self._halt(Why.STOPPED if self.rack.operations.stopped else Why.DONE, before)
         items = [self._steppable(self._running(task).name)] if task else list(self._all_steppable())
         try:
@@ -208,15 +206,15 @@ class Stepper:
 
     def _through_scan(self) -> bool:
         """Execute the held scan to its next breakpoint, TRUE, or to its end, FALSE."""
-        held = self._execution.held
-        assert held is not None
         before = self._read()
-        while held.advance():
-            at_breakpoint = (held.item.name, held.line) in self.lines
-            if at_breakpoint or self._at_once or self._read() != before:
+        while self._execution.advance():
+            if self.place in self.lines or self._at_once or self._read() != before:
                 return True
-        self._execution.held = None
         return False
+
+    def _follows(self) -> bool:
+        """Go to the first line of a scan that the end of another has begun; FALSE where there is none."""
+        return self._execution.held is not None and self._execution.advance()
 
     def _halt(self, why: Why, before: dict[str, Value]) -> Halt:
         now = self._read()

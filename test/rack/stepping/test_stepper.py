@@ -199,3 +199,38 @@ def test_modeled_scans_cannot_be_held_at_a_line(tmp_path):
     assert halt.why is Why.CHANGE
     assert stepper.scan("DRAW").why is Why.DONE
     assert stepper.rack.statistics["DRAW"].scans == 1
+
+
+def test_a_basic_task_is_held_too(tmp_path):
+    (tmp_path / "DIAG.BAS").write_text("10 LOCAL N%\n20 DELAY 2 TICKS\n30 N% = N% + 1\n40 GOTO 20\n50 END\n")
+    tasks = "SPEED: {priority: 5}, DRAW: {priority: 8}, DIAG: {priority: 11, file: DIAG.BAS}"
+    stepper = built(tmp_path, RACK.replace("SPEED: {priority: 5}, DRAW: {priority: 8}", tasks))
+    stepper.start()
+    stepper.break_at("DIAG", 30)
+    halts = [stepper.go(10 * MS) for _ in range(3)]
+    assert [(halt.at_ns, halt.task, halt.line) for halt in halts] == [(2 * MS * n, "DIAG", 30) for n in (1, 2, 3)]
+    assert stepper.value("DIAG.N%") == 2
+    assert stepper.line().line == 40
+    assert stepper.value("DIAG.N%") == 3
+
+
+def test_both_tasks_of_a_udc_are_held_in_turn(tmp_path):
+    udc = (
+        "10 COMMON X%\n20 LOCAL N%\n100 CALL SCAN_LOOP(TICKS=2)\n110 N% = N% + 1\n120 X% = N%\n130 END\n",
+        "10 COMMON X%\n20 LOCAL SEEN%\n100 CALL SCAN_LOOP(TICKS=2)\n110 SEEN% = X%\n130 END\n",
+    )
+    for name, text in zip(("A", "B"), udc, strict=True):
+        (tmp_path / f"{name}.BLK").write_text(text)
+    rack = RACK.replace(
+        "common: {",
+        "  6: {module: 57552, tasks: {A: {drive: A}, B: {drive: B}}}\ncommon: {ISCR%: {slot: 6, register: 2000}, X%: {slot: 6, register: 300}, ",
+    )
+    stepper = built(tmp_path, rack)
+    stepper.start([("ISCR%", 64)])
+    stepper.break_at("A", 120)
+    stepper.break_at("B", 110)
+    halts = [stepper.go(100 * MS) for _ in range(4)]
+    assert [(halt.task, halt.line) for halt in halts] == [("A", 120), ("B", 110)] * 2
+    assert (stepper.value("A.N%"), stepper.value("B.SEEN%")) == (2, 1)
+    assert stepper.line().task == ""
+    assert stepper.value("B.SEEN%") == 2
