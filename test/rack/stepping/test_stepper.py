@@ -221,10 +221,9 @@ def test_both_tasks_of_a_udc_are_held_in_turn(tmp_path):
     )
     for name, text in zip(("A", "B"), udc, strict=True):
         (tmp_path / f"{name}.BLK").write_text(text)
-    rack = RACK.replace(
-        "common: {",
-        "  6: {module: 57552, tasks: {A: {drive: A}, B: {drive: B}}}\ncommon: {ISCR%: {slot: 6, register: 2000}, X%: {slot: 6, register: 300}, ",
-    )
+    module = "  6: {module: 57552, tasks: {A: {drive: A}, B: {drive: B}}}\n"
+    points = "ISCR%: {slot: 6, register: 2000}, X%: {slot: 6, register: 300}, "
+    rack = RACK.replace("common: {", f"{module}common: {{{points}")
     stepper = built(tmp_path, rack)
     stepper.start([("ISCR%", 64)])
     stepper.break_at("A", 120)
