@@ -23,13 +23,15 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.wire.cdr import CdrError, decoder
 from automax_ros.wire.definitions import message_types
 from automax_ros.wire.heads import scan_head
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, ScanError, String, VariableTable
+from automax_ros.wire.messages import CommonImage, CommonWrite, Operation, Scan, ScanError, String, VariableTable
 from automax_ros.wire.rack_files import RackFilesError, files_from_text
 
 MOST_KEPT = 1000
-"""Most attachments, tasks and kinds of errors that `bag info` lists (decision): a recording may lie about them."""
+"""Most attachments, operations, tasks and kinds of errors that `bag info` lists (decision): a recording may
+lie about them."""
 _TABLE = "automax_msgs/msg/VariableTable"
 _SCAN = "automax_msgs/msg/Scan"
+_OPERATION = "automax_msgs/msg/Operation"
 _STRING = "std_msgs/msg/String"
 _FILES_TOPIC = "/config"
 _NO_ERRORS = bytes(4)
@@ -113,6 +115,7 @@ class BagInfo:
     topics: dict[str, TopicInfo] = field(default_factory=dict)
     tasks: dict[str, TaskInfo] = field(default_factory=dict)
     files: list[FileInfo] = field(default_factory=list)
+    operations: list[Operation] = field(default_factory=list)
     attachments: list[AttachmentInfo] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)
     problems: list[BagError] = field(default_factory=list)
@@ -219,6 +222,10 @@ def _count(info: BagInfo, record: object) -> None:
         topic.messages += 1
         if name == _SCAN:
             _count_scan(info, record)
+        elif name == _OPERATION and len(info.operations) < MOST_KEPT:
+            operation = _decoded(info, _OPERATION, record)
+            assert isinstance(operation, Operation)
+            info.operations.append(operation)
         elif name == _TABLE and info.table is None:
             _keep_table(info, record)
         elif name == _STRING and record.channel.topic.endswith(_FILES_TOPIC) and not info.texts:
@@ -275,7 +282,7 @@ def _count_attachment(info: BagInfo, record: Attachment) -> None:
     if entry in info.attachments or len(info.attachments) >= MOST_KEPT:
         return  # a split file repeats them
     info.attachments.append(entry)
-    if record.name.endswith((".yaml", ".BLK")) and len(record.data) <= _MOST_TEXT:
+    if record.name.endswith((".yaml", ".BLK", ".BAS")) and len(record.data) <= _MOST_TEXT:
         info.texts.setdefault(record.name, record.data.decode("utf-8", "replace"))
 
 

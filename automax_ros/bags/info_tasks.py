@@ -9,6 +9,7 @@ from automax_ros.bags.info import BagInfo
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.loader import load_stored
 from automax_ros.rack.tasks_check import check_source, commons_of
+from automax_ros.wire.rack_files import source_name
 
 RACK_FILE = "rack.yaml"
 
@@ -40,8 +41,8 @@ def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
     facts = {}
     for processor in config.task_modules:
         for task in processor.tasks:
-            source = info.texts.get(f"{task.name}.BLK")
-            name = f"{task.name}.BLK"
+            name = source_name(task.name, task.file.name)
+            source = info.texts.get(name)
             program = None
             if source:
                 text_of = SourceText(name, source)

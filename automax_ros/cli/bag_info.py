@@ -20,6 +20,7 @@ from automax_ros.cli.progress import share_shown
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
+from automax_ros.wire.messages import Operation
 
 _WALL_CLOCK_NS = 10**9 * NS_PER_S
 """Stamps of a run from here on are times of day (September 2001); simulated runs begin at 0."""
@@ -89,6 +90,7 @@ def as_data(info: BagInfo, facts: dict[str, TaskFacts], *, checked: bool) -> dic
             for name, topic in info.topics.items()
         ],
         "files": [vars(file) for file in info.files],
+        "operations": [_operation(info, item) for item in info.operations],
         "attachments": [vars(item) for item in info.attachments],
         "custom_data": info.custom_data,
     }
@@ -117,6 +119,12 @@ def _task(info: BagInfo, name: str, facts: TaskFacts | None) -> dict[str, Any]:
         if seen
         else [],
     }
+
+
+def _operation(info: BagInfo, item: Operation) -> dict[str, Any]:
+    start = info.table.stamp if info.table else 0
+    told = {"at": (item.stamp - start) / NS_PER_S, "what": item.what, "task": item.task, "ok": item.ok}
+    return {**told, "reason": item.reason, "detail": item.detail}
 
 
 def _variables(info: BagInfo) -> dict[str, Any]:

@@ -18,6 +18,7 @@ def lines_of(content: Mapping[str, Any]) -> list[str]:
         *_head(content),
         *_section("tasks", [_TASK_HEAD, *map(_task, content["tasks"])] if content["tasks"] else []),
         *_section("errors logged", [row for task in content["tasks"] for row in _errors(task)]),
+        *_section("operations", [_operation(item) for item in content["operations"]]),
         *_section("variables", _variables(content["variables"])),
         *_section("writers", _writers(content["writers"])),
         *_section("topics", [_TOPIC_HEAD, *map(_topic, content["topics"])] if content["topics"] else []),
@@ -70,6 +71,12 @@ def _errors(task: Mapping[str, Any]) -> list[list[str]]:
         [task["name"], f"line {item['line']}", item["code"], count_of(item["count"], "time")]
         for item in task["errors_by_line"]
     ]
+
+
+def _operation(item: Mapping[str, Any]) -> list[str]:
+    done = "" if item["ok"] else "refused"
+    why = ": ".join(text for text in (done, item["reason"]) if text)
+    return [f"{_seconds(item['at'])} s", item["what"], item["task"] or "-", item["detail"], why]
 
 
 def _variables(variables: Mapping[str, Any]) -> list[list[str]]:

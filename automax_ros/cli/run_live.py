@@ -15,6 +15,7 @@ from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import RackLock, domain_id
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import default_folder
+from automax_ros.rack.standing import StopCause
 
 
 def run_live(plan: RunPlan, stop: StopRequest) -> int:
@@ -34,15 +35,16 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     sync: DiskSync | None = None
     display = StatusDisplay(rack, plan.watch, live=True, health=live.health)
     recording = RecordingWatch(None, display)
-    told = False
+    told: StopCause | None = None
 
     def on_idle(now_ns: int) -> None:
         nonlocal told
         live.stopping = stop.requested
         display.update(now_ns)
-        if rack.stop_reason is not None and not told:
-            told = True
-            display.message(f"STOP ALL: {rack.stop_reason}")
+        cause = rack.operations.stopped
+        if cause is not None and cause != told:
+            told = cause
+            display.message(f"{cause.title}: {cause.reason}")
         state.update(now_ns)
         for text in [*state.news(), *stimulation.news()]:
             display.message(text)

@@ -87,7 +87,7 @@ class StatusDisplay:
         scans = sum(item.scans for item in self._rack.statistics.values())
         elapsed = (now_ns - self._last_rack_ns) / NS_PER_S
         rate = (scans - self._last_scans) / elapsed if elapsed else 0.0
-        parts = [f"{now_ns / NS_PER_S:8.1f} s", f"{rate:.0f} scans/s"]
+        parts = [f"{now_ns / NS_PER_S:8.1f} s", *self._standing(), f"{rate:.0f} scans/s"]
         if self._live:
             parts += [self._load(module, passed_ns) for module in self._rack.task_modules]
         else:
@@ -96,6 +96,13 @@ class StatusDisplay:
         parts += self._values()
         self._last_rack_ns, self._last_scans = now_ns, scans
         self._line.show(parts)
+
+    def _standing(self) -> list[str]:
+        """Return what stands in the way of the tasks: no power, or what stopped them all."""
+        operations = self._rack.operations
+        if not operations.powered:
+            return ["power off"]
+        return [] if operations.stopped is None else [operations.stopped.title]
 
     def _load(self, module: Module, passed_ns: int) -> str:
         """Return a Processor's share of the time since the last line, and the deadlines it has missed."""

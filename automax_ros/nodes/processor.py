@@ -134,11 +134,13 @@ class ProcessorNode(ModuleNode):
         statistics = self._rack.statistics[task.name]
         newly_skipped = statistics.skipped - self._skipped_reported[task.name]
         self._skipped_reported[task.name] = statistics.skipped
+        cause = self._rack.operations.stopped
         level, text = DiagnosticStatus.OK, task.status.value
         if task.status is Status.FAULTED:
             level, text = DiagnosticStatus.ERROR, self._rack.stop_reason or text
         elif task.status is not Status.RUNNING:
             level = DiagnosticStatus.WARN
+            text = f"{text}: {cause.title}" if cause is not None else text
         elif newly_skipped:
             level, text = DiagnosticStatus.WARN, f"AMX7042 deadlines missed since the last report: {newly_skipped}"
         elif task.errors.last is not None:
@@ -155,6 +157,8 @@ class ProcessorNode(ModuleNode):
             "longest_us": statistics.longest_ns / 1000,
         }
         shown = {key: f"{value:g}" for key, value in values.items()}
+        if cause is not None:
+            shown |= {"stopped_code": cause.code or "", "stopped_by": cause.task, "stopped_reason": cause.reason}
         return self.status(task.name, level, text, task.slot, shown)
 
 

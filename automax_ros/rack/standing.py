@@ -15,6 +15,11 @@ class StopCause:
     task: str = ""
 
     @property
+    def title(self) -> str:
+        """What stands on a status line: STOP ALL, with the hardware's code where one is known."""
+        return "STOP ALL" if self.code is None else f"STOP ALL (code {self.code})"
+
+    @property
     def is_fault(self) -> bool:
         """Whether a fault stopped the rack: it has a code or a task, a command has neither."""
         return self.code is not None or bool(self.task)

@@ -40,6 +40,11 @@ class RackFile:
         return hashlib.sha256(self.text.encode("utf-8", "surrogatepass")).hexdigest()
 
     @property
+    def owner(self) -> str:
+        """The task whose source it is; the rack file's own name."""
+        return self.name if self.name == RACK_FILE else PurePath(self.name).stem
+
+    @property
     def media_type(self) -> str:
         """What the file is."""
         return "application/yaml" if self.name == RACK_FILE else "text/plain"

@@ -18,10 +18,16 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.info import TaskInfo, bag_info
 from automax_ros.bags.info_tasks import task_facts
 from automax_ros.bags.reader import BagReader
+from automax_ros.bags.recorder import Recorder
+from automax_ros.cli.bag_info import as_data
+from automax_ros.cli.bag_info_text import lines_of
+from automax_ros.rack.operations import OperationRefused
 from automax_ros.wire.cdr import encode
 from automax_ros.wire.messages import Int16, Scan, ScanError
+from automax_ros.wire.stream import RackStream
 
 from .independent import GOLDEN, decoded, summary
+from .live_racks import build
 from .recordings import MS, TABLE, record, sample_recording, write_of
 
 GOLDEN_FILE = GOLDEN / "scans_0.mcap"
@@ -287,3 +293,26 @@ def test_progress_goes_from_0_to_1(tmp_path: Path) -> None:
     assert len(shares) > 10
     assert 0 <= shares[0] < 0.1
     assert 0.9 < shares[-1] <= 1
+
+
+def test_operations_are_told_with_their_time_and_what_was_refused(tmp_path):
+    rack = build(tmp_path)
+    stream = RackStream(rack, rack.fingerprint)
+    recorder = Recorder(rack, stream, tmp_path / "bag")
+    stream.begin()
+    rack.start()
+    rack.run(0.25)
+    rack.adjust.force("SUM%", 7)
+    with pytest.raises(OperationRefused):
+        rack.operations.run("WORK")
+    stream.end()
+    recorder.close()
+    info = bag_info(tmp_path / "bag", check=True)
+    assert [(item.stamp, item.what, item.task, item.ok, item.detail) for item in info.operations] == [
+        (250_000_000, "force", "", True, "SUM% = 7"),
+        (250_000_000, "run", "WORK", False, ""),
+    ]
+    lines = lines_of(as_data(info, {}, checked=True))
+    start = lines.index("operations")
+    assert lines[start + 1].split() == ["0.25", "s", "force", "-", "SUM%", "=", "7"]
+    assert "refused: task WORK runs already" in lines[start + 2]

@@ -21,6 +21,7 @@ from automax_ros.bags.live.topics import LiveTopics
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder
 from automax_ros.bags.writer import StorageOptions
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.engine import replay
 from automax_ros.wire.cdr import decode
@@ -479,3 +480,36 @@ def test_full_disk_ends_the_recording(wire, tmp_path, monkeypatch):
     assert "No space left" in str(recording.failure)
     feed(recording, wire.sent[200:])
     recording.close()
+
+
+def test_operations_of_the_span_are_recorded_and_those_before_are_not(tmp_path):
+    """The rack's last operations wait for late joiners; a reloaded source is stored, and the bag replays with both."""
+    wire = Wire(tmp_path / "rack")
+    wire.run(0.2)
+    wire.rack.operations.stop("WORK")
+    old = [item for item in wire.sent if item.topic == "/line1/operations"]
+    wire.rack.operations.run("WORK")
+    wire.run(0.2)
+    joined = wire.join()
+    recording = recording_of(wire, tmp_path / "live")
+    wire.run(0.2)
+    text = wire.rack.sources["SPEED"].text.replace("LIMIT_PLUS=1000", "LIMIT_PLUS=20")
+    wire.rack.operations.reload("SPEED", SourceText("SPEED.BLK", text))
+    recording.store(files_of(wire.rack))
+    wire.run(0.2)
+    wire.rack.operations.stop_all("test")
+    wire.rack.operations.run_all()
+    wire.run(0.2)
+    messages = wire.end()[joined:]
+    image = next(number for number, item in enumerate(messages) if item.topic == "/line1/backplane") + 1
+    feed(recording, [*messages[:image], *old, *messages[image:]])
+    recording.close()
+    assert len(old) == 1
+    told = decoded(tmp_path / "live", "/line1/operations")
+    assert [(item.what, item.task) for item in told] == [("reload", "SPEED"), ("stop_all", ""), ("run_all", "")]
+    assert recording.lacks == []
+    report = replay(tmp_path / "live")
+    assert report.identical
+    speed = next(task for task in report.tasks if task.name == "SPEED")
+    assert any(note.startswith("reloaded at") for note in speed.notes)
+    assert speed.scans > 40

@@ -120,9 +120,9 @@ class LiveRecording(Recording):
     @property
     def lacks(self) -> list[str]:
         """What the bag lacks for a replay without the repository."""
-        names = {file.name for file in self._files}
-        missing = [name for name in (RACK_FILE, *(f"{task}.BLK" for task in self._tasks)) if name not in names]
-        found = [f"the file {name}" for name in missing]
+        owners = {file.owner for file in self._files}
+        wanted = {RACK_FILE: RACK_FILE, **{task: f"{task}.BLK" for task in self._tasks}}
+        found = [f"the file {name}" for owner, name in wanted.items() if owner not in owners]
         found += [f"the source that task {task} runs (another one is stored)" for task in self._wrong_sources]
         waiting = [task for task, track in self._tasks.items() if not track.ready]
         if self._topics.left_out:
@@ -383,10 +383,10 @@ class LiveRecording(Recording):
             self.ended = reason
 
     def _compare_source(self, task: str, source_hash: str) -> None:
-        for file in self._files:
-            if file.name == f"{task}.BLK" and file.sha256 != source_hash and task not in self._wrong_sources:
-                self._wrong_sources.append(task)
-                self.notes.append(f"the file stored as {file.name} is not the source that task {task} runs")
+        own = {file.sha256: file.name for file in (*self._files, *self._stored.values()) if file.owner == task}
+        if own and source_hash not in own and task not in self._wrong_sources:
+            self._wrong_sources.append(task)
+            self.notes.append(f"the file stored as {next(iter(own.values()))} is not the source that task {task} runs")
 
     def _look_whether_replayable(self, stamp: int) -> None:
         if self.replayable_from is None and all(track.ready for track in self._tasks.values()):

@@ -28,7 +28,7 @@ class Provenance:
             information = None if self._told else told_information(record)
             if information is not None:
                 self.take_information(information)
-        elif record.name not in self._files and (record.name == RACK_FILE or record.name.endswith(".BLK")):
+        elif record.name not in self._files and (record.name == RACK_FILE or record.name.endswith((".BLK", ".BAS"))):
             self._bytes += len(record.data)
             if self._bytes <= _MAX_BYTES and len(self._files) < _MAX_FILES:
                 self._files[record.name] = RackFile(record.name, record.data.decode("utf-8", "replace"))
