@@ -5,7 +5,8 @@
 - ``sections`` and ``scalars`` check mappings and values of the tree that ``core/yaml_text`` reads;
 - ``slots``, ``tasks``, ``commons``, ``points``, ``names``, ``presets`` check one part of the file each;
 - ``modules/`` has a file for each kind of module, ``files`` reads files within bounds;
-- ``rack`` is what runs, ``operations`` what can be done with it, ``observers`` who is told;
+- ``rack`` is what runs, ``operations`` and ``adjusting`` what an operator can do with it, ``observers`` who is told;
+- ``retention`` keeps in a folder what survives the power, from one process to the next;
 - ``drafting`` makes a rack file from a folder of tasks;
 - ``ros_names`` turns the rack's names into names of ROS 2.
 

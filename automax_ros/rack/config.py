@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from automax_ros.core.kinds import Direction
@@ -123,6 +125,11 @@ class RackConfig:
     executive: int = NEWEST
     auto_run: bool = False
     on_module_loss: ModuleLoss = ModuleLoss.STOP_ALL
+
+    @cached_property
+    def by_name(self) -> Mapping[str, CommonVariable]:
+        """The variables by their full names."""
+        return {variable.name: variable for variable in self.variables}
 
     @property
     def declared(self) -> tuple[CommonVariable, ...]:

@@ -24,7 +24,7 @@ def setting(config: RackConfig, text: str) -> tuple[str, Value]:
     Raises:
         Fault: not of that form, no such common, the value does not fit, or the rack itself writes that common (2.4.6).
     """
-    meant, value = core_setting(text, _by_name(config), _ABSENT)
+    meant, value = core_setting(text, config.by_name, _ABSENT)
     if meant.name in PREDEFINED:
         raise NameFault(f"{meant.name} cannot be set: the rack itself writes it", "leave it out")
     return meant.label, value
@@ -52,8 +52,4 @@ def common_named(config: RackConfig, name: str) -> CommonElement:
     Raises:
         NameFault: there is none.
     """
-    return element(name, _by_name(config), _ABSENT)
-
-
-def _by_name(config: RackConfig) -> dict[str, CommonVariable]:
-    return {variable.name: variable for variable in config.variables}
+    return element(name, config.by_name, _ABSENT)
