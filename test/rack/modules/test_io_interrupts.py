@@ -231,8 +231,7 @@ def test_a_pulsetach_needs_its_timer_enabled_and_counts_24_bits(tmp_path):
 
 def test_inputs_freeze_from_the_interrupt_to_the_end_of_the_scan(tmp_path):
     """A task of higher priority holds the Processor for several ms; the process moves the input meanwhile."""
-    hog = "10 LOCAL N%, M%\n20 CALL SCAN_LOOP(TICKS=4)\n30 FOR N% = 1 TO 600\n35 M% = N%\n40 NEXT N%\n50 END\n"
-    rack = built(tmp_path, execution="modeled", HOG=(4, hog), FOLLOW=(5, FOLLOW))
+    rack = built(tmp_path, execution="modeled", HOG=(4, HOG), FOLLOW=(5, FOLLOW))
     seen = Watching(rack)
     rack.start()
     later(rack, 21_900_000, lambda: rack.write("POSITION%", 1))
@@ -342,20 +341,23 @@ def test_a_reloaded_task_has_the_interrupt_of_its_new_source(tmp_path):
     assert len(seen.scans) >= 3
 
 
-@given(
-    cut=st.integers(0, 70_000_000),
-    moves=st.lists(st.tuples(st.integers(0, 70_000_000), st.integers(-9, 9)), max_size=6),
-)
+HOG = "10 LOCAL N%, M%\n20 CALL SCAN_LOOP(TICKS=4)\n30 FOR N% = 1 TO 600\n35 M% = N%\n40 NEXT N%\n50 END\n"
+INSTANTS = st.one_of(st.integers(0, 70_000_000), st.integers(21_900_000, 26_000_000))
+
+
+@pytest.mark.parametrize("execution", ["ideal", "modeled"])
+@given(cut=INSTANTS, moves=st.lists(st.tuples(INSTANTS, st.integers(-9, 9)), max_size=6))
 @settings(deadline=None, derandomize=True, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_rack_goes_on_from_its_state_at_any_instant(tmp_path, cut, moves):
+def test_a_rack_goes_on_from_its_state_at_any_instant(tmp_path, execution, cut, moves):
     def run(until_ns: int, rack: Rack) -> None:
         for time_ns, value in sorted(moves):
             if rack.now_ns <= time_ns < until_ns:
-                rack.run((time_ns - rack.now_ns) / 1e9)
+                rack.scheduler.run_until(time_ns)
                 rack.write("POSITION%", value)
-        rack.run((until_ns - rack.now_ns) / 1e9)
+        rack.scheduler.run_until(until_ns)
 
-    whole, first, second = (built(tmp_path, FOLLOW=(5, FOLLOW)) for _ in range(3))
+    tasks = {"FOLLOW": (5, FOLLOW), "HOG": (4, HOG)}
+    whole, first, second = (built(tmp_path, execution=execution, **tasks) for _ in range(3))
     whole.start()
     run(80 * MS, whole)
     first.start()
@@ -441,3 +443,19 @@ def test_what_waits_in_a_basic_task_freezes_too():
         task.scan(time_ns)
         found.append(interrupts.waiting(0, 3))
     assert found == [[], [], ["B"], []]
+
+
+def test_a_power_cycle_ends_the_clock_until_the_task_turns_it_on_again(tmp_path):
+    rack = built(tmp_path, FOLLOW=(5, FOLLOW))
+    seen = Watching(rack)
+    rack.start()
+    rack.run(0.03)
+    rack.operations.power_off()
+    rack.run(0.1)
+    assert [time for _, time in seen.scans] == [22 * MS]
+    rack.operations.power_on()
+    rack.run(0.1)
+    assert (len(seen.scans), rack.value("ISCR%"), rack.value("COPY%")) == (1, 0, 0)
+    rack.operations.run("FOLLOW")
+    rack.run(0.0221)
+    assert [time for _, time in seen.scans[1:]] == [252 * MS]
