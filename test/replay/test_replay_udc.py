@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.report import Difference, ReplayReport
 
@@ -115,3 +116,31 @@ def test_an_edited_task_finds_its_own_output_again(bag):
     assert difference.first.scan == 1
     assert difference.greatest is not None
     assert difference.greatest.difference > 500
+
+
+def operating(rack: Rack, number: int) -> None:
+    turning(rack, number)
+    if number == 3:
+        rack.operations.stop("WIND_B")
+    if number == 5:
+        rack.operations.run("WIND_B")
+    if number == 7:
+        rack.operations.stop_all("for a test")
+    if number == 8:
+        rack.operations.run_all()
+    if number == 10:
+        rack.operations.reload("WIND_A", SourceText("WIND_A.BLK", edited(A, ("N% = N% + 1\n", "N% = N% + 3\n"))))
+    if number == 13:
+        rack.operations.power_off()
+    if number == 14:
+        rack.operations.power_on()
+        rack.operations.run_all()
+
+
+@pytest.mark.parametrize("top", ["", "execution: modeled\n"], ids=["ideal", "modeled"])
+def test_an_operated_udc_replays_bit_for_bit(tmp_path, top):
+    """Its locals are 0 after STOP ALL and a power cycle, here as there."""
+    report = replayed(recorded(tmp_path / "rack", operating, yaml=YAML.format(top=top), **SOURCES))
+    assert report.identical, (report.first, report.differences)
+    scans = {task.name: task.scans for task in report.tasks}
+    assert min(scans["WIND_A"], scans["WIND_B"]) > 600
