@@ -54,7 +54,7 @@ class ReplaySource:
 
     ``compiled`` is what runs; ``recorded`` is what ran when the recording was made, None if that cannot be told;
     ``edited`` says whether their sources differ. ``versions`` are all sources that ran, by their hash: a task may have
-    been reloaded. An edited source runs in place of each of them (decision).
+    been reloaded. An edited source runs in place of each of them (decision). ``keeps_locals``: over STOP ALL too.
     """
 
     name: str
@@ -64,6 +64,7 @@ class ReplaySource:
     edited: bool
     warnings: tuple[Diagnostic, ...] = ()
     versions: Mapping[str, CompiledTask] = field(default_factory=dict)
+    keeps_locals: bool = True
 
     def reloaded(self, source_hash: str) -> ReplaySource | None:
         """Return what is executed after a reload with a source of this hash, None if it is not stored inside."""
@@ -135,7 +136,18 @@ class StoredRack:
             later = [self._checked(text, modules[name], name).program for text in self.later.get(name, ())]
             ran = [*([recorded] if recorded else ()), *(compile_program(item, views) for item in later if item)]
             versions = {item.program.source_hash: item for item in ran}
-            made.append(ReplaySource(name, source, compiled, recorded, edited, tuple(result.diagnostics), versions))
+            made.append(
+                ReplaySource(
+                    name,
+                    source,
+                    compiled,
+                    recorded,
+                    edited,
+                    tuple(result.diagnostics),
+                    versions,
+                    keeps_locals=modules[name].keeps_locals,
+                )
+            )
         if refused:
             raise SourceRefused(refused)
         return made

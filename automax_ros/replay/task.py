@@ -189,7 +189,12 @@ class TaskReplay:
                 self.memory.written_early(key)
 
     def take_operation(self, operation: Operation) -> None:
-        """Remember that the task was installed again: its next state is then no work of its scans."""
+        """Remember that the task was installed again: its next state is then no work of its scans.
+
+        Where the module of the task loses locals, they are lost here too.
+        """
+        if operation.ok and operation.what in ("stop_all", "power_off") and not self._source.keeps_locals:
+            self._task.compiled.layout.lose_locals(self._task.state)
         installs = operation.what in ("reload", "delete") or (operation.what == "power_on" and not self._last)
         self._installed_again |= operation.ok and operation.task in ("", self.name) and installs
 

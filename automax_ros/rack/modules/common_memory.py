@@ -31,6 +31,7 @@ class CommonMemoryConfig:
     tick_ns = 0
     times = Model.NONE
     has_battery = True
+    keeps_locals = True
 
     @property
     def name(self) -> str:

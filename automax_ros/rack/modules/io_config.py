@@ -25,6 +25,7 @@ class IoConfig:
     tick_ns = 0
     times = Model.NONE
     has_battery = False
+    keeps_locals = True
     common_registers = 0
 
     @property

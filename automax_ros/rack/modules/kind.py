@@ -122,6 +122,11 @@ class ModuleConfig(Protocol):
     def has_battery(self) -> bool: ...  # noqa: D102
 
     @property
+    def keeps_locals(self) -> bool:
+        """Whether its tasks keep their locals at STOP ALL and without power (2.4.5)."""
+        ...
+
+    @property
     def times(self) -> Model:
         """Whose execution times its tasks have, Model.NONE for a module without tasks."""
         ...

@@ -38,6 +38,7 @@ class ProcessorConfig:
     line: int = 0
 
     has_battery = True
+    keeps_locals = True
     registers: Registers = NO_REGISTERS
     common_registers = _COMMON_REGISTERS
 

@@ -39,6 +39,7 @@ class UdcConfig:
     tick_ns = UDC_TICK_NS
     times = Model.UDC
     has_battery = False
+    keeps_locals = False
     registers: Registers = UDC_REGISTERS
     common_registers = 0
 
