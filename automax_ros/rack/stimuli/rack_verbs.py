@@ -75,7 +75,7 @@ def names_of(node: Node, what: str, findings: Findings) -> list[Scalar]:
         if not isinstance(item, Scalar) or item.is_null:
             wrong_kind(item, what, "a name or a list of names", findings)
     if not items:
-        wrong_kind(node, what, "a name or a list of names", findings)
+        findings.add("AMX6008", f"{what} names nothing", node.span)
     return found
 
 

@@ -19,7 +19,8 @@ from automax_ros.rack.stimuli.signals import Signal, Signals
 from automax_ros.rack.stimuli.stage import Action, Stage
 from automax_ros.rack.stimuli.waves import MOST_HZ, Ramp, Sine, Square, Wave
 
-_LEAST_HZ = 1e-6
+_LEAST_HZ = 0.0001
+"""Lowest frequency (decision: slower is a ramp)."""
 
 
 @dataclass(frozen=True)
