@@ -148,6 +148,31 @@ def test_winder_scans_when_the_udc_interrupts():
     assert len(seen["WIND_B"]) == 100
 
 
+def test_modeled_scans_take_what_load_says():
+    """Of tasks that nothing pre-empts the most holds too; MOTORS and SECTION may have to wait."""
+    durations: dict[str, set[int]] = {}
+
+    class Observer:
+        def __getattr__(self, _name):
+            return lambda *_arguments: None
+
+        def scanned(self, task, record, _writes):
+            if record.scan and task.name != "DIAG":
+                durations.setdefault(task.name, set()).add(record.duration_ns)
+
+    rack = playing(START)
+    rack.observe(Observer())
+    rack.run(2.0)
+    config = loaded()
+    times = {task.task: task.times for item in loads_of(config, check_tasks(config)) for task in item.tasks}
+    for name, taken in durations.items():
+        assert times[name].least_ns <= min(taken), name
+    for name in ("LINE", "UNWIND", "WINDER", "WIND_A", "WIND_B"):
+        assert max(durations[name]) <= times[name].most_ns, name
+    assert durations["WIND_A"] == {times["WIND_A"].most_ns}
+    assert durations["UNWIND"] == {times["UNWIND"].most_ns}
+
+
 def changed(tmp_path: Path, ticks: int, scans: int, winder_ticks: int) -> Path:
     """A copy of the example with other TICKS on the UDC and other scans from interrupt to interrupt."""
     edits = [
