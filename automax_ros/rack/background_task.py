@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from automax_ros.compile.scan_io import Suspension
-from automax_ros.rack.triggers import Due
+from automax_ros.rack.triggers import Due, Timeout
 from automax_ros.running.basic_task import BasicTask
 from automax_ros.running.channels import Channels
 from automax_ros.running.events import Events
@@ -12,10 +14,18 @@ from automax_ros.running.task import Status
 
 
 class WaitTrigger:
-    """A burst is due when what the task waits for is there: at that instant, in the task's place among all scans."""
+    """A burst is due when what the task waits for is there: at that instant, in the task's place among all scans.
 
-    def __init__(self, task: BasicTask, events: Events, channels: Channels, scheduler: Scheduler) -> None:
+    A hardware event that it waits on must come within its TIMEOUT, in ticks of the Processor, or ``expired`` is called
+    (decision, as for scans).
+    """
+
+    def __init__(
+        self, task: BasicTask, events: Events, channels: Channels, scheduler: Scheduler, expired: Callable[[], None]
+    ) -> None:
         """Take the task; nothing is scheduled yet."""
+        self._expired = expired
+        self._timeout: Timeout | None = None
         self._task, self._events, self._channels, self._scheduler = task, events, channels, scheduler
         self._key = EventKey(EventClass.SCAN, task.priority, task.name)
         self._due: Due | None = None
@@ -34,6 +44,7 @@ class WaitTrigger:
     def disarm(self) -> None:
         """Let no burst be due any more."""
         self._due = None
+        self._end_timeout()
         self._task.suspended = _nothing
         self._channels.forget(self._wake)
         for event in self._task.compiled.program.events:
@@ -63,13 +74,27 @@ class WaitTrigger:
             event = self._events.event(task.compiled.program.events[number].name)
             if event.wait(self._wake):
                 self._wake(task.memory.now_ns)
+            else:
+                self._begin_timeout(task.compiled.program.events[number].timeout)
         elif kind in (Suspension.EMPTY, Suspension.FULL, Suspension.ABSENT):
             self._channels.wait(Suspension(kind), number, self._wake)
 
     def _wake(self, now_ns: int) -> None:
         """Let the burst be due after whatever wakes the task: it does not begin inside another's scan."""
+        self._end_timeout()
         self._task.make_ready()
         self._go_on_at(self._task.not_before(now_ns))
+
+    def _begin_timeout(self, ticks: int | None) -> None:
+        if ticks:
+            tick_ns = self._task.compiled.program.tick_ns
+            self._timeout = Timeout(ticks * tick_ns, self._key, self._scheduler, self._expired)
+            self._timeout.begin(self._task.wake_ns)
+
+    def _end_timeout(self) -> None:
+        if self._timeout is not None:
+            self._timeout.end()
+            self._timeout = None
 
     def _go_on_at(self, time_ns: int) -> None:
         self._event = self._scheduler.at(max(time_ns, self._scheduler.now_ns), self._key, self._go_on)

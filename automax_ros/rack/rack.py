@@ -356,7 +356,7 @@ class Rack:
         """Return the trigger of a task as it is installed; the interrupts that it waits for are connected."""
         self._interrupts.bind(task)
         if isinstance(task, BasicTask):
-            return WaitTrigger(task, self.events, self.channels, self.scheduler)
+            return WaitTrigger(task, self.events, self.channels, self.scheduler, lambda: self._no_event(task))
         return usual_trigger(task, self.events, self.scheduler, self._no_event)
 
     def _no_event(self, task: Task) -> None:

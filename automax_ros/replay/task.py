@@ -19,7 +19,7 @@ from automax_ros.replay.state import fitting_state, log_is_empty, state_differen
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.basic_task import make_task
-from automax_ros.running.task import OVERLAP, ScanRecord, Status, snapshot_layout
+from automax_ros.running.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status, snapshot_layout
 from automax_ros.wire.messages import CommonWrite, Operation, Scan, TaskState
 
 _MOST_NOTES = 20
@@ -242,9 +242,8 @@ class TaskReplay:
 
     def _overlap(self, scan: Scan) -> ScanRecord | None:
         """Fault the task where the recorded one was faulted by its time: no execution of a source tells that."""
-        if not any(error.code == OVERLAP for error in scan.errors):
-            return None
-        return self._task.fault(OVERLAP, scan.stamp)
+        code = next((error.code for error in scan.errors if error.code in (OVERLAP, EVENT_TIMEOUT)), None)
+        return None if code is None else self._task.fault(code, scan.stamp)
 
     def _compare_state(self, state: TaskState) -> None:
         self._states += 1

@@ -100,8 +100,9 @@ class RecordingBasicIo(BasicIo, RecordingIo):
 class BasicTask(Task):
     """A BASIC task in a rack: a ``Task`` whose scans are bursts.
 
-    ``wish`` is what it waits for since the last burst; a timed wish ends at ``wake_ns``. ``suspended`` is called after
-    each burst, when these are known. ``every`` is period, begin and number of the last instant of its START EVERY.
+    ``wish`` is what it waits for since the last burst; a timed wish ends at ``wake_ns``, one for an event began there.
+    ``suspended`` is called after each burst, when these are known. ``every`` is period, begin and number of the last
+    instant of its START EVERY.
     """
 
     _io: BasicIo
@@ -235,6 +236,8 @@ class BasicTask(Task):
             self.wake_ns = self._next_start(now_ns)
         elif kind == Suspension.DELAY:
             self.wake_ns = now_ns + number
+        elif kind == Suspension.EVENT:
+            self.wake_ns = now_ns
         elif kind == Suspension.BUSY:
             self.wake_ns = now_ns if now_ns > began_ns else self._next_tick(now_ns)
         self.suspended()

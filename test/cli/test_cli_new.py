@@ -123,7 +123,7 @@ def test_rack_file_may_stand_above_the_tasks(plant):
     [
         (["none"], "none is not a folder"),
         (["plant/FAST.BLK"], "plant/FAST.BLK is not a folder"),
-        (["empty"], "empty holds no task (.BLK)"),
+        (["empty"], "empty holds no task (.BLK, .BAS)"),
         (["plant", "-o", "empty/rack.yaml"], "empty is not the folder of the tasks, nor above it"),
         (["plant", "-o", "empty"], "empty is a folder"),
         (["plant", "-o", "plant/FAST.BLK", "--force"], "a rack file ends in .yaml or .yml"),

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import Status
 
 TICK = 5_500_000
@@ -52,7 +53,7 @@ WAITER = """10 COMMON SEEN%(9), M%
 """
 
 
-def rack_of(tmp_path, tasks: dict[str, tuple[int, str]], *, execution: str = "ideal") -> Rack:
+def rack_of(tmp_path, tasks: dict[str, tuple[int, str]], *, execution: str = "ideal", interrupts: bool = False) -> Rack:
     """A rack of two Processors: by task its slot and its source; BASIC tasks are those without SCAN_LOOP."""
     for name, (_, source) in tasks.items():
         suffix = "BLK" if "SCAN_LOOP" in source else "BAS"
@@ -67,6 +68,9 @@ def rack_of(tmp_path, tasks: dict[str, tuple[int, str]], *, execution: str = "id
         for slot in sorted({at for at, _ in tasks.values()})
     )
     commons = "  N%:\n  SENT%:\n  GOT%:\n  TEXT$:\n  TICKS%:\n  M%:\n  SEEN%(9):\n"
+    if interrupts:
+        slots += "  6: {module: 57C411}\n"
+        commons += "  ISCR%: {slot: 6, register: 3}\n"
     text = f"rack: R\nexecution: {execution}\nslots:\n  0: {{module: 57C413}}\n{slots}common:\n{commons}"
     (tmp_path / "rack.yaml").write_text(text)
     result = load(tmp_path / "rack.yaml")
@@ -182,6 +186,42 @@ def test_a_state_taken_at_any_instant_goes_on_the_same(tmp_path_factory, executi
     log += rack.memory.drain()
     assert [entry[1:] for entry in log] == [entry[1:] for entry in whole.memory.drain()]
     assert rack.memory.image() == whole.memory.image()
+
+
+HARDWARE = """\
+10 COMMON ISCR%, N%
+20 EVENT NAME=IRQ, INTERRUPT_STATUS=ISCR%, TIMEOUT=6
+30 DELAY 10 TICKS
+40 WAIT ON IRQ
+50 N% = N% + 1
+60 GOTO 40
+70 END
+"""
+
+
+@pytest.mark.parametrize("execution", ["ideal", "modeled"])
+def test_a_hardware_event_must_come_within_its_time_out(tmp_path, execution):
+    """The time counts from each WAIT: not during the DELAY, and the event may come at its last instant."""
+    rack = rack_of(tmp_path, {"WAITER": (1, HARDWARE)}, execution=execution, interrupts=True)
+    key = EventKey(EventClass.IO, 0, "irq")
+    slack = 0 if execution == "ideal" else 1_000_000
+    rack.scheduler.at(16 * TICK, key, rack.events.event("IRQ").set)
+    rack.scheduler.at(20 * TICK, key, rack.events.event("IRQ").set)
+    rack.start()
+    rack.scheduler.run_until(26 * TICK)
+    assert (rack.value("N%"), rack.operations.stopped) == (2, None)
+    kept = rack.state()
+    rack = rack_of(tmp_path, {"WAITER": (1, HARDWARE)}, execution=execution, interrupts=True)
+    rack.load(kept)
+    rack.scheduler.run_until(27 * TICK)
+    stopped = rack.operations.stopped
+    assert stopped is not None
+    assert 26 * TICK <= stopped.time_ns <= 26 * TICK + slack
+    assert [entry.problem for entry in rack.task("WAITER").errors.entries] == ["AMX7071"]
+    rack.operations.clear_errors("WAITER")
+    rack.operations.run("WAITER")
+    run_ticks(rack, 15)
+    assert rack.operations.stopped is None
 
 
 def test_a_loop_without_end_leaves_the_processor_to_others(tmp_path):
