@@ -144,3 +144,27 @@ def test_an_operated_udc_replays_bit_for_bit(tmp_path, top):
     assert report.identical, (report.first, report.differences)
     scans = {task.name: task.scans for task in report.tasks}
     assert min(scans["WIND_A"], scans["WIND_B"]) > 600
+
+
+def operated(rack: Rack, number: int) -> None:
+    """Stop and start it in all ways, the last time without the battery."""
+    turning(rack, number)
+    steps = {
+        5: lambda: rack.operations.stop_all("operator"),
+        6: rack.operations.run_all,
+        9: lambda: rack.operations.power(30_000_000),
+        12: rack.operations.run_all,
+        15: lambda: rack.operations.power(0, battery=False),
+        16: rack.operations.run_all,
+    }
+    steps.get(number, lambda: None)()
+
+
+@pytest.mark.parametrize("top", ["", "execution: modeled\n"], ids=["ideal", "modeled"])
+def test_a_udc_that_loses_its_locals_loses_them_in_the_replay(tmp_path, top):
+    keeping = "120 N% = N% + 1\n"
+    text = edited(A, ("30 CCLK@ = TRUE\n", "30 CCLK@ = TRUE\n40 N% = N% + 1000\n"))
+    assert keeping in text
+    report = replayed(recorded(tmp_path / "rack", operated, yaml=YAML.format(top=top), **{**SOURCES, "WIND_A": text}))
+    assert report.identical, report.first
+    assert {task.name for task in report.tasks if task.scans > 100} == set(SOURCES)
