@@ -25,6 +25,8 @@ TASK_TYPES = ("BAS", "BLK", "PC")
 MAX_REGISTER = 65535
 """Highest register of a module on the bus (decision: a bound; 64K registers is the largest module)."""
 _MAX_BIT = 15
+_MOST_DIAGNOSTICS = 1000
+"""Most problems of definitions that are shown (decision: a bound on untrusted texts)."""
 _PROCESSOR_SLOTS = range(5)
 """Where a Processor can stand (J2-3106-1 p. F-4)."""
 
@@ -151,7 +153,15 @@ class _Reader:
             if not tokens.at_end:
                 raise _Fault("AMX6781", f"{quoted(tokens.next.text)} is too much in this statement", tokens.next.span)
         except _Fault as fault:
-            self.found.diagnostics.append(fault.diagnostic)
+            self._report(fault.diagnostic)
+
+    def _report(self, diagnostic: Diagnostic) -> None:
+        """Keep what is wrong, up to a limit; what comes after it is read all the same."""
+        if len(self.found.diagnostics) < _MOST_DIAGNOSTICS:
+            self.found.diagnostics.append(diagnostic)
+        elif len(self.found.diagnostics) == _MOST_DIAGNOSTICS:
+            message = f"more than {_MOST_DIAGNOSTICS} problems: no more are shown"
+            self.found.diagnostics.append(Diagnostic("AMX0002", message, diagnostic.span))
 
     # Statements
 
@@ -190,7 +200,7 @@ class _Reader:
         self._add(declared, span, word)
         message = f"{declared.name} is defined by {word.text}: no module of the emulator has it"
         hint = "it becomes a plain common; write `ros: in` if something outside of the rack supplies it"
-        self.found.diagnostics.append(Diagnostic("AMX6786", message, span, hint=hint))
+        self._report(Diagnostic("AMX6786", message, span, hint=hint))
 
     def _task(self, word: Token, tokens: _Tokens) -> None:
         name = tokens.take()

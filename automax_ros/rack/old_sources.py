@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.text import count_of
 from automax_ros.core.types import MAX_STRING_LENGTH
+from automax_ros.language.syntax.constants import STRING_LIMIT
 from automax_ros.language.syntax.lines import END_OF_FILE, LineReader
 from automax_ros.language.syntax.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.syntax.tokens import Kind, Token
@@ -21,6 +22,7 @@ Check = Callable[[str], Iterable[Diagnostic]]
 """What is wrong with a task's text."""
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f]")
 _WHOLE_NUMBER = re.compile(r"([-+ \t]*[0-9]+)([Ee][-+]?[0-9]+)?")
+_PRINT = re.compile(r"[ ]*[0-9]+[ ]+PRINT(?![A-Z0-9_%!@$])")
 _LENGTH = re.compile(r"(\$)[ \t]*:[ \t]*([0-9]+)")
 _TAB = 8
 """Columns from one tab stop to the next, as DOS has them."""
@@ -63,7 +65,8 @@ def convert(data: bytes, check: Check) -> Converted:
     UTF-16 becomes UTF-8; a byte order mark, and Ctrl-Z with all that follows, where DOS stops reading, are left out;
     CR LF and CR become LF. Control characters become blanks. Outside of texts between quotes tabs become blanks up to
     the next multiple of 8 columns, and, remarks left out, lower case becomes upper case. REAL constants of blocks get
-    their decimal point, lengths of strings above 255 become 255 and a length of 0, which stood for the default, goes
+    their decimal point, lengths of strings above 255 become 255 and a length of 0, which stood for the default, goes;
+    a text of PRINT with more than 132 characters is printed in parts
     (decision: what an old Executive took, and the file of a DOS editor).
     """
     text, encoding, notes = _decoded(data)
@@ -190,19 +193,19 @@ def _with_constants(text: str, check: Check, counts: _Counts) -> str:
     for item in sorted(found, key=lambda item: item.span, reverse=True):
         row, start, end = item.span.line - 1, item.span.column - 1, item.span.end_column - 1
         thing, cure = _CURES[item.code]
-        cured = cure(lines[row][start:end])
+        cured = cure(lines[row][start:end], lines[row][:start])
         if cured is not None:
             lines[row] = lines[row][:start] + cured + lines[row][end:]
             counts.add(thing)
     return "\n".join(lines)
 
 
-def _with_point(constant: str) -> str | None:
+def _with_point(constant: str, _: str) -> str | None:
     match = _WHOLE_NUMBER.fullmatch(constant)
     return None if match is None else f"{match[1]}.0{match[2] or ''}"
 
 
-def _with_length(declared: str) -> str | None:
+def _with_length(declared: str, _: str) -> str | None:
     match = _LENGTH.search(declared)
     if match is None:
         return None
@@ -210,8 +213,19 @@ def _with_length(declared: str) -> str | None:
     return declared[: match.start()] + match[1] + length + declared[match.end() :]
 
 
-_CURES: dict[str, tuple[str, Callable[[str], str | None]]] = {
+def _in_parts(constant: str, before: str) -> str | None:
+    """Return a long text of PRINT as several, one printed directly after the other; others cannot be divided."""
+    if not _PRINT.match(before):
+        return None
+    quote, text = constant[0], constant[1:-1]
+    parts = (text[place : place + STRING_LIMIT] for place in range(0, len(text), STRING_LIMIT))
+    return "; ".join(f"{quote}{part}{quote}" for part in parts)
+
+
+_Cure = Callable[[str, str], str | None]
+_CURES: dict[str, tuple[str, _Cure]] = {
+    "AMX0021": ("text in parts", _in_parts),
     "AMX2016": ("decimal point", _with_point),
     "AMX4008": ("string length", _with_length),
 }
-"""What is changed where the check finds a problem, by its code."""
+"""What is changed where the check finds a problem, by its code: from the stretch at fault and what precedes it."""

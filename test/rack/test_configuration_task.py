@@ -126,6 +126,14 @@ def test_whatever_the_text_it_is_read(text):
     read(text)
 
 
+def test_of_very_many_faulty_lines_the_first_are_told_and_all_good_ones_read():
+    text = "".join(f"{number} FOODEF A%\n" for number in range(1, 1101)) + "2000 MEMDEF AFTER%\n"
+    found = read(text)
+    assert len(found.diagnostics) == 1001
+    assert (found.diagnostics[-1].code, found.diagnostics[-1].span.line) == ("AMX0002", 1001)
+    assert [item.declared.name for item in found.commons] == ["AFTER%"]
+
+
 NAMES = st.from_regex(r"X[A-Z0-9_]{0,9}", fullmatch=True)
 DEFINITIONS = st.lists(
     st.one_of(

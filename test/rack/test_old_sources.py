@@ -52,6 +52,8 @@ def converted(data: bytes | str):
         (b"\xef\xbb\xbf10 END\n", "10 END\n", "byte order mark left out"),
         ("10 END\n".encode("utf-16"), "10 END\n", "UTF-16 written as UTF-8"),
         (b"10 LOCAL S$:300, T$:0(2)\n", "10 LOCAL S$:255, T$(2)\n", "2 string lengths"),
+        (b"10 PRINT '" + b"x" * 133 + b"', 1\n", f"10 PRINT '{'x' * 132}'; 'x', 1\n", "1 text in parts"),
+        (b"10 LET A$ = '" + b"x" * 133 + b"'\n", f"10 LET A$ = '{'x' * 133}'\n", None),
         (b'10 PRINT "a\tb\x07c"\n', '10 PRINT "a\tb c"\n', "1 control character"),
         (b"10 PRINT 'not closed\t\n", "10 PRINT 'not closed\t\n", None),
         (b"10 REM \xe4\xf6 Latin-1\n", "10 REM \xe4\xf6 Latin-1\n", None),
