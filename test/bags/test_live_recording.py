@@ -28,7 +28,7 @@ from automax_ros.wire.cdr import decode
 from automax_ros.wire.rack_files import RackFile, files_of
 from automax_ros.wire.stream import RackStream
 
-from .live_racks import build
+from .live_racks import YAML, build
 
 RUN = 4711
 EPOCH = 1_700_000_000_000_000_000
@@ -44,9 +44,11 @@ class Sent(NamedTuple):
 class Wire:
     """A rack whose messages are noted as they are sent; ``join`` is what the nodes do for a late joiner."""
 
-    def __init__(self, folder: Path, run_id: int = RUN, epoch: int = EPOCH, *, own: Path | None = None) -> None:
+    def __init__(
+        self, folder: Path, run_id: int = RUN, epoch: int = EPOCH, *, own: Path | None = None, yaml: str = YAML
+    ) -> None:
         folder.mkdir(exist_ok=True)
-        self.rack: Rack = build(folder)
+        self.rack: Rack = build(folder, yaml)
         self.stream = RackStream(self.rack, run_id)
         self.recorder = Recorder(self.rack, self.stream, own) if own else None
         self.sent: list[Sent] = []
@@ -513,3 +515,21 @@ def test_operations_of_the_span_are_recorded_and_those_before_are_not(tmp_path):
     speed = next(task for task in report.tasks if task.name == "SPEED")
     assert any(note.startswith("reloaded at") for note in speed.notes)
     assert speed.scans > 40
+
+
+def test_a_rack_whose_scans_take_time_is_recorded_without_a_gap(tmp_path):
+    """Scans of two Processors run at the same time: what one writes comes in the middle of the other's."""
+    wire = Wire(tmp_path / "rack", yaml=f"execution: modeled\n{YAML}")
+    wire.run(0.1)
+    joined = wire.join()
+    recording = recording_of(wire, tmp_path / "live")
+    wire.run(2.0)
+    feed(recording, wire.end()[joined:])
+    recording.close()
+    assert (recording.gaps, recording.lacks) == ([], [])
+    report = replay(tmp_path / "live")
+    assert report.identical
+    assert all(task.scans > 150 for task in report.tasks)
+    ends = [scan.stamp + scan.duration_ns for scan in decoded(tmp_path / "live", "/line1/scans")]
+    assert ends == sorted(ends)
+    assert len(set(ends)) > 300

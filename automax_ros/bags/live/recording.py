@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.live.provenance import provenance
-from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
+from automax_ros.bags.live.provenance import lacking, provenance
+from automax_ros.bags.live.topics import LiveTopics
 from automax_ros.bags.live.tracks import Gap, TaskTrack
 from automax_ros.bags.recording import Recording
 from automax_ros.bags.write_log import WriteLog
@@ -24,7 +24,7 @@ from automax_ros.core.kinds import WriterKind
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import WriteHead, image_head, operation_head, scan_head, table_of, write_head
 from automax_ros.wire.messages import VariableTable
-from automax_ros.wire.rack_files import RACK_FILE, RackFile
+from automax_ros.wire.rack_files import RackFile
 
 SETTLE_NS = 1_000_000_000
 """When for so long no write has come, none is missing."""
@@ -81,6 +81,7 @@ class LiveRecording(Recording):
         self._pending: list[tuple[str, int, bytes]] = []
         self._proven_ns = 0
         self._open_gap: int | None = None
+        self._last_write = 0
         self._last_values: dict[str, bytes] = {}
         self._values_now: dict[str, bytes] = {}
         self._last_sent = 0
@@ -120,16 +121,8 @@ class LiveRecording(Recording):
     @property
     def lacks(self) -> list[str]:
         """What the bag lacks for a replay without the repository."""
-        owners = {file.owner for file in self._files}
-        wanted = {RACK_FILE: RACK_FILE, **{task: f"{task}.BLK" for task in self._tasks}}
-        found = [f"the file {name}" for owner, name in wanted.items() if owner not in owners]
-        found += [f"the source that task {task} runs (another one is stored)" for task in self._wrong_sources]
-        waiting = [task for task, track in self._tasks.items() if not track.ready]
-        if self._topics.left_out:
-            found.append(f"the topics of {self._topics.left_out} common variables beyond the first {MAX_VALUE_TOPICS}")
-        if self.first_stamp is not None:
-            found += [f"a full scan and a state of task {task} to begin with" for task in waiting]
-        return found
+        waiting = [task for task, track in self._tasks.items() if not track.ready and self.first_stamp is not None]
+        return lacking(self._files, self._tasks, self._wrong_sources, self._topics.left_out, waiting)
 
     def take(self, topic: str, sent_ns: int, payload: bytes) -> None:
         """Record a message of one of the topics, sent at a time of the rack's clock."""
@@ -202,7 +195,7 @@ class LiveRecording(Recording):
             self._rest(head.stamp, missing)
             return
         self._prove(sent_ns)
-        self._log.sequence = head.sequence
+        self._log.sequence, self._last_write = head.sequence, head.stamp
         self.writes += 1
         self._write(topic, sent_ns, head.stamp, payload)
 
@@ -293,7 +286,10 @@ class LiveRecording(Recording):
                 self._note_malformed(topic, error)
 
     def _wrote(self, payload: bytes) -> bool:
-        """Whether a scan of this run wrote common memory."""
+        """Whether a scan of this run wrote common memory, and the write must follow.
+
+        A modeled scan that was pre-empted may have written before it ended: its writes came before it then.
+        """
         try:
             scan: Any = decode("automax_msgs/msg/Scan", payload)
         except CdrError:
@@ -301,7 +297,7 @@ class LiveRecording(Recording):
         track = self._tasks.get(scan.task)
         if track is not None and track.began_anew(scan.scan, scan.stamp):
             return False
-        return bool(scan.written.variable or scan.committed.variable)
+        return bool(scan.committed.variable or (scan.written.variable and self._last_write <= scan.stamp))
 
     def _drop_pending(self) -> None:
         self.dropped += sum(topic == self._topics.scans for topic, _, _ in self._pending)

@@ -1,0 +1,48 @@
+"""What a client tells of racks that it cannot operate."""
+
+from __future__ import annotations
+
+import pytest
+
+from automax_ros.core.ticks import NS_PER_MS
+
+
+class Graph:
+    """What is seen in the graph, look by look."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, racks: int, operators: int) -> None:
+        from automax_ros.nodes.operating import RackClient
+
+        monkeypatch.setattr(RackClient, "_racks", lambda _: racks)
+        monkeypatch.setattr(RackClient, "_operators", lambda _: operators)
+
+
+@pytest.mark.parametrize(
+    ("racks", "operators", "reason"),
+    [
+        (2, 1, "2 racks are called /pm1"),
+        (1, 2, "2 racks are called /pm1"),
+        (1, 0, "rack /pm1 has no operator's services"),
+        (0, 0, "no rack /pm1 is seen within 0.1 s"),
+    ],
+)
+def test_a_rack_that_cannot_be_operated_is_named_with_the_reason(ros_domain_id, monkeypatch, racks, operators, reason):
+    from automax_ros.nodes.operating import NotOperable, RackClient
+
+    Graph(monkeypatch, racks, operators)
+    with RackClient("/pm1") as client, pytest.raises(NotOperable) as refused:
+        client.find(100 * NS_PER_MS)
+    assert refused.value.message == reason
+    assert refused.value.hint
+
+
+def test_a_service_that_does_not_answer_is_an_error_and_not_a_wait(ros_domain_id, monkeypatch):
+    from std_srvs.srv import Trigger
+
+    from automax_ros.nodes.operating import NotOperable, RackClient
+
+    Graph(monkeypatch, 1, 1)
+    with RackClient("/pm1") as client:
+        client.find(0)
+        with pytest.raises(NotOperable, match="rack /pm1 does not answer on stop_all"):
+            client.call(Trigger, "stop_all", Trigger.Request(), 200 * NS_PER_MS)
