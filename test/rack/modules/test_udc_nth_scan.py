@@ -6,9 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 
-from .udc_racks import Seen, built
+from .udc_racks import Seen, built, written
 
 POINTS = """\
   SLOW_OUT%: {slot: 10, register: 1300}
@@ -196,3 +197,25 @@ def test_a_boolean_output_overwrites_its_pair_of_registers(tmp_path):
     assert rack.value("LOST%") == 0
     rack.run(0.002)
     assert rack.value("RUN@") is True
+
+
+def test_a_basic_task_waits_for_the_interrupt_too(tmp_path):
+    """Every third scan from the second on, to scan 29: ten times, each with the register that has just gone out."""
+    basic = """\
+10 COMMON ISCR%, SLOW_OUT%, SEEN%
+20 LOCAL N%
+30 EVENT NAME=UDC_INT, INTERRUPT_STATUS=ISCR%, TIMEOUT=100
+100 WAIT ON UDC_INT
+110 SEEN% = SLOW_OUT%
+120 N% = N% + 1
+130 GOTO 100
+900 END
+"""
+    (tmp_path / "BG.BAS").write_text(basic)
+    source = UDC.replace("30 CCLK@ = TRUE", "30 CCLK@ = TRUE\n40 NTH% = 3").replace("COMMON ", "COMMON NTH%, ")
+    path = written(tmp_path, POINTS + "  SEEN%: {}\n", tasks="WIND_A: {drive: A}", WIND_A=source)
+    path.write_text(path.read_text().replace("LINE: {priority: 5}", "LINE: {priority: 5}, BG: {priority: 9}"))
+    rack = Rack(load(path).config)
+    rack.start()
+    rack.run(0.0301)
+    assert (rack.value("SEEN%"), rack.task("BG").value("N%")) == (29, 10)
