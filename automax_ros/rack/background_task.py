@@ -17,7 +17,7 @@ class WaitTrigger:
     """A burst is due when what the task waits for is there: at that instant, in the task's place among all scans.
 
     A hardware event that it waits on must come within its TIMEOUT, in ticks of the Processor, or ``expired`` is called
-    (decision, as for scans).
+    (decision: as for scans).
     """
 
     def __init__(
