@@ -6,13 +6,14 @@ import time
 
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import DiskSync, RecordingWatch, live_options
-from automax_ros.cli.run_plan import RunPlan, conclude, warn
+from automax_ros.cli.run_plan import RunPlan, conclude, report_at_end, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.stimuli_file import stimulation as stimulation_of
 from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import RackLock, domain_id
+from automax_ros.rack.operation_log import OperationLog
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import default_folder
 from automax_ros.rack.standing import StopCause
@@ -31,6 +32,8 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     state = StateKeeping(rack, plan.state or default_folder(plan.config))
     live = LiveRack(rack)
+    services = OperationLog(lambda: stimulation.is_acting)
+    rack.observers.add(services)
     recorder: Recorder | None = None
     sync: DiskSync | None = None
     display = StatusDisplay(rack, plan.watch, live=True, health=live.health)
@@ -60,6 +63,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         live.start([*state.settings, *plan.settings])
         stimulation.begin()
         live.run(plan.duration_ns, on_idle)
+        report = report_at_end(rack, stimulation, services.happened)
     finally:
         state.freeze()
         try:
@@ -75,8 +79,8 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         display.message(text)
     recording.tell()
     display.finish(plan.record, complete=not recording.failed)
-    failed = recording.failed or (state.failed and plan.state is not None)
-    return conclude(rack, plan, stimulation, failed=failed)
+    failed = recording.failed or (state.failed and plan.state is not None) or stimulation.refused > 0
+    return conclude(rack, plan, report, failed=failed)
 
 
 def _opening(rack: Rack, domain: int) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.cli.output_files import write_report
@@ -15,6 +17,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.report import report_of
 from automax_ros.rack.settings import CommonElement
 from automax_ros.rack.stimuli.player import Stimulation
+from automax_ros.rack.stimuli.stage import Happened
 
 
 @dataclass(frozen=True)
@@ -44,16 +47,21 @@ def warn(rack: Rack) -> None:
         print_diagnostics(diagnostics, source, sys.stderr)
 
 
-def conclude(rack: Rack, plan: RunPlan, stimulation: Stimulation, *, failed: bool) -> int:
+def report_at_end(rack: Rack, stimulation: Stimulation, others: Sequence[Happened] = ()) -> dict[str, Any]:
+    """Return the report of a rack as it is before anything is closed; ``others`` have operated it besides stimuli."""
+    return report_of(rack, sorted((*stimulation.happened, *others), key=lambda item: item.at_ns))
+
+
+def conclude(rack: Rack, plan: RunPlan, report: dict[str, Any] | None, *, failed: bool) -> int:
     """Write the report, print what stopped the rack, and return the exit code.
 
-    It is 1 after a fault, a refused operation, or where something else has ``failed``; a STOP ALL that was commanded is
-    as good an end as any.
+    The code is 1 after a fault, or where something has ``failed``, such as an operation of the stimuli; a STOP ALL that
+    was commanded is as good an end as any.
     """
-    if plan.report is not None:
-        write_report(plan.report, report_of(rack, stimulation.happened))
+    if plan.report is not None and report is not None:
+        write_report(plan.report, report)
     stopped = rack.operations.stopped
     if stopped is not None:
         print(f"automax run: STOP ALL: {stopped.reason}", file=sys.stderr)
     fault = stopped is not None and stopped.is_fault
-    return 1 if fault or failed or stimulation.refused else 0
+    return 1 if fault or failed else 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import RecordingWatch
-from automax_ros.cli.run_plan import RunPlan, conclude, warn
+from automax_ros.cli.run_plan import RunPlan, conclude, report_at_end, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
@@ -54,7 +54,8 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
         display.message(text)
     recording.tell()
     display.finish(plan.record, complete=not recording.failed)
-    return conclude(rack, plan, stimulation, failed=recording.failed or state.failed)
+    failed = recording.failed or state.failed or stimulation.refused > 0
+    return conclude(rack, plan, report_at_end(rack, stimulation), failed=failed)
 
 
 def _goes_on(rack: Rack, plan: RunPlan, stimulation: Stimulation) -> bool:

@@ -15,7 +15,8 @@ _KEY = EventKey(EventClass.OUTSIDE, ENTRIES, "stimuli")
 class Stimulation:
     """Posts one event at a time: that of the next instant with entries.
 
-    ``happened`` are the operations so far, refused ones too, and values that were refused; ``refused`` counts those.
+    ``happened`` are the operations so far, refused ones too, and values that were refused; ``refused`` counts
+    those. ``is_acting`` is TRUE while an entry does something.
     """
 
     def __init__(self, stimuli: Sequence[Stimulus], scheduler: Scheduler) -> None:
@@ -24,6 +25,7 @@ class Stimulation:
         self._stage = Stage(scheduler)
         self.happened: list[Happened] = []
         self.refused = 0
+        self.is_acting = False
         self._told = 0
 
     def begin(self) -> None:
@@ -53,7 +55,7 @@ class Stimulation:
         self._post()
 
     def _do(self, entry: Stimulus, action: Action) -> None:
-        now_ns = self._stage.scheduler.now_ns
+        now_ns, self.is_acting = self._stage.scheduler.now_ns, True
         try:
             action.do(self._stage)
         except OperationRefused as refused:
@@ -62,6 +64,8 @@ class Stimulation:
         else:
             if not entry.is_value:
                 self.happened.append(Happened(now_ns, entry.verb, action.of))
+        finally:
+            self.is_acting = False
 
 
 def _line(item: Happened) -> str:
