@@ -36,7 +36,7 @@ def rack_file_of(
 
     ``title`` gives the rack's name; task sources lie in ``folder`` and end in one of ``suffixes``, such as ``.BLK``.
     ``modules`` says what stands in slots of I/O points. Points in other slots become plain commons, since nothing
-    tells which module is there: their place stands in a comment, with the modules that have such registers (decision).
+    says which module is there: their place stands in a comment, with the modules that have such registers (decision).
     """
     return _Importing(configuration, folder, modules, suffixes).result(title)
 

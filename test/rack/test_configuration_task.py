@@ -111,7 +111,7 @@ def test_a_faulty_line_is_told_at_its_place(line, code, column, message):
     assert {"BEFORE%", "AFTER%"} <= {item.declared.name for item in found.commons}
 
 
-@pytest.mark.parametrize("code", [f"AMX{number}" for number in range(6780, 6787)])
+@pytest.mark.parametrize("code", ["AMX6780", "AMX6781", "AMX6782", "AMX6783", "AMX6784", "AMX6785", "AMX6786"])
 def test_the_page_of_each_problem_shows_it(code):
     text = (PAGES / f"{code}.md").read_text(encoding="utf-8")
     example, cure = (part.partition("```")[0] for part in text.split("```cnf\n")[1:])
