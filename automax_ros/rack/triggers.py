@@ -99,7 +99,7 @@ class EventTrigger:
     """A scan is due whenever an event is set (4.0, EVENT): at that instant, in the task's place among all scans.
 
     A hardware event must be set within its TIMEOUT, in ticks of the Processor, from RUN and from each event on, or
-    ``expired`` is called (decision: no source gives the unit, or what happens; J-3675 p. 6-17).
+    ``expired`` is called (decision: no source gives the unit or the effect).
     """
 
     def __init__(self, event: Event, task: Task, scheduler: Scheduler, expired: Callable[[], None]) -> None:

@@ -55,8 +55,11 @@ class HeardMemory:
 
     def latch(self, plan: LatchPlan) -> Latched:
         """Return copies of the planned views."""
-        self.latched_ns = self.now_ns
-        values: Latched = self._memory.latch(plan) if self._told is None else tuple(next(self._told))
+        if self._told is None:
+            self.latched_ns = self._memory.now_ns
+            values = self._memory.latch(plan)
+        else:
+            values = tuple(next(self._told))
         self.heard.append(values)
         return values
 

@@ -39,11 +39,12 @@ class ProcessorTime:
     def begin(self, job: Job, now_ns: int, skipped: int) -> None:
         """Let a job be executed as soon as nothing goes before it."""
         frame = _Frame(job, skipped)
-        if self._frames:
-            self._book(now_ns)
-            self._insert(frame)
-        else:
-            self._frames.append(frame)
+        place = self._place_of(frame) if self._frames else 0
+        if place:
+            self._frames.insert(place, frame)
+            return
+        self._book(now_ns)
+        self._frames.insert(0, frame)
         if not self._going:
             self._go(now_ns)
 
@@ -75,7 +76,8 @@ class ProcessorTime:
         """Go on with a job from the place where it was; ``steps`` have come as far, None if it had not begun."""
         now_ns = self._scheduler.now_ns
         self._book(now_ns)
-        self._insert(_Frame(job, place["skipped"], steps, place["left_ns"]))
+        frame = _Frame(job, place["skipped"], steps, place["left_ns"])
+        self._frames.insert(self._place_of(frame), frame)
         self._wait(now_ns)
 
     def _frame(self, job: Job) -> _Frame | None:
@@ -84,12 +86,14 @@ class ProcessorTime:
                 return frame
         return None
 
-    def _insert(self, frame: _Frame) -> None:
-        frames = self._frames
+    def _place_of(self, frame: _Frame) -> int:
+        """Return where a new job stands among those that are under way or wait."""
         place = 0
-        while place < len(frames) and not _goes_before(frame, frames[place]):
+        for other in self._frames:
+            if _goes_before(frame, other):
+                break
             place += 1
-        frames.insert(place, frame)
+        return place
 
     def _book(self, now_ns: int) -> None:
         """Suspend the job that is executed: it has used the time up to now."""
