@@ -12,7 +12,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
@@ -23,6 +23,7 @@ from automax_ros.cli.step_text import place_text
 from automax_ros.cli.stimuli_file import StimuliRefused, stimulation
 from automax_ros.core.faults import Fault
 from automax_ros.core.text import printable
+from automax_ros.rack.config import Timing
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.stepping.stepper import Stepper
@@ -47,6 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--stimuli", type=Path, metavar="FILE", help="let happen what this YAML file says, by rack time"
     )
     parser.add_argument(
+        "--ideal",
+        action="store_true",
+        help="let scans take no time, so that they can be held at lines, whatever CONFIG says",
+    )
+    parser.add_argument(
         "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
     )
 
@@ -56,6 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
     config = config_of(arguments.config, allow_outside=arguments.allow_outside)
     if config is None:
         return 1
+    if arguments.ideal:
+        config = replace(config, execution=Timing.IDEAL)
     settings = settings_of(config, arguments.settings)
     interrupt = _Interrupt()
     try:

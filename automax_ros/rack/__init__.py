@@ -7,6 +7,8 @@
 - ``modules/`` has a file for each kind of module, ``files`` reads files within bounds;
 - ``rack`` is what runs, ``operations`` and ``adjusting`` what an operator can do with it, ``observers`` who is told;
 - ``retention`` keeps in a folder what survives the power, from one process to the next;
+- ``stimuli/`` lets happen what a file says by rack time, ``report`` says how a run ended;
+- ``stepping/`` lets a rack go on by ticks, scans and BASIC lines;
 - ``drafting`` makes a rack file from a folder of tasks;
 - ``ros_names`` turns the rack's names into names of ROS 2.
 
@@ -28,11 +30,16 @@ if TYPE_CHECKING:
     from automax_ros.rack.observers import Operation, RackObserver
     from automax_ros.rack.operations import OperationRefused
     from automax_ros.rack.rack import Rack, RackState
+    from automax_ros.rack.report import report_of
+    from automax_ros.rack.stepping.stepper import Halt, Stepper, Why
+    from automax_ros.rack.stimuli.player import Stimulation
+    from automax_ros.rack.stimuli.reader import read_for_rack
     from automax_ros.rack.tasks_check import check_tasks
 
 __all__ = [
     "CommonVariable",
     "Draft",
+    "Halt",
     "LoadResult",
     "Module",
     "ModuleConfig",
@@ -44,9 +51,14 @@ __all__ = [
     "RackError",
     "RackObserver",
     "RackState",
+    "Stepper",
+    "Stimulation",
+    "Why",
     "check_tasks",
     "draft",
     "load",
+    "read_for_rack",
+    "report_of",
 ]
 
 __getattr__ = face(
@@ -60,4 +72,8 @@ __getattr__ = face(
     "observers",
     "operations",
     "rack",
+    "report",
+    "stepping.stepper",
+    "stimuli.player",
+    "stimuli.reader",
 )

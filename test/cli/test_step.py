@@ -18,9 +18,8 @@ from .support import Result
 @pytest.fixture
 def step(automax, monkeypatch):
     """Run a script of commands."""
-    automax.write("rack.yaml", RACK)
-    automax.write("SPEED.BLK", SPEED)
-    automax.write("DRAW.BLK", DRAW)
+    for name, text in (("rack.yaml", RACK), ("SPEED.BLK", SPEED), ("DRAW.BLK", DRAW)):
+        automax.write(name, text)
 
     def call(*commands: str, options: tuple[str, ...] = ()) -> Result:
         monkeypatch.setattr(sys, "stdin", io.StringIO("\n".join(commands) + "\n"))
@@ -143,6 +142,14 @@ def test_values_from_outside_wait_for_the_end_of_a_scan(step):
     assert (result.code, result.err.count("automax step:")) == (1, 1)
     assert "SPEED is held before line 130: a scan must end first" in result.err
     assert result.out.splitlines()[-1].split() == ["REF%", "1"]
+
+
+def test_a_modeled_rack_is_held_at_lines_in_ideal_execution_only(automax, step):
+    automax.write("rack.yaml", RACK.replace("rack: PM1\n", "rack: PM1\nexecution: modeled\n"))
+    result = step("break SPEED:120")
+    assert result.code == 1
+    assert "automax step --ideal" in result.err
+    assert "0 s, SPEED before line 120" in lines(step("break SPEED:120", "go", options=("--ideal",)))
 
 
 def test_help_lists_every_command(step):

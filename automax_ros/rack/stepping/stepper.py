@@ -245,7 +245,7 @@ class Stepper:
     def _steppable(self, name: str) -> ScheduledTask:
         item = self._task(name)
         if not self.by_lines:
-            hint = "step it with `execution: ideal`; breakpoints on variables work in both"
+            hint = "step it in ideal execution (`automax step --ideal`); breakpoints on variables work in both"
             raise Fault("scans of modeled execution cannot be held at a line: higher priorities go on meanwhile", hint)
         return item
 
