@@ -28,6 +28,14 @@ class ScanHead(NamedTuple):
     full: bool
 
 
+class StateHead(NamedTuple):
+    """Where a TaskState stands: its stamp in ns, its task, the number of the last scan that it contains."""
+
+    stamp: int
+    task: str
+    scan: int
+
+
 class OperationHead(NamedTuple):
     """Where an Operation stands: its stamp in ns, its run."""
 
@@ -44,6 +52,16 @@ def table_of(payload: bytes) -> VariableTable:
     table = decode("automax_msgs/msg/VariableTable", payload)
     assert isinstance(table, VariableTable)
     return table
+
+
+def state_head(payload: bytes) -> StateHead:
+    """Return the head of a TaskState.
+
+    Raises:
+        CdrError: the bytes are none, or the task's name is not short ASCII text.
+    """
+    head: StateHead = head_reader("automax_msgs/msg/TaskState", StateHead)(payload)
+    return head
 
 
 def operation_head(payload: bytes) -> OperationHead:

@@ -371,6 +371,32 @@ class Tolerant(Reexecution):
 # The end
 
 
+def test_a_rack_that_rested_and_runs_again_is_still_the_same(tmp_path):
+    """After STOP ALL nothing is sent for 5 s; RUN begins with a part that writes nothing: it is the same run."""
+    wire = Wire(tmp_path / "rack")
+    wire.run(0.5)
+    recording = recording_of(wire, tmp_path / "live")
+    wire.rack.operations.stop_all("test")
+    before = len(wire.sent)
+    wire.rack.run(5.0)
+    assert len(wire.sent) == before
+    wire.rack.operations.run_all()
+    resumed = len(wire.sent)
+    wire.run(0.5)
+    messages = wire.end()
+    feed(recording, messages[:before])
+    pause = 5_000_000_000 // SENT
+    quiet = [item for item in messages[before:resumed] if item.topic != "/line1/backplane"]
+    feed(recording, quiet, before + pause)
+    assert recording.ended is None
+    feed(recording, [item for item in messages[before:] if item not in quiet], before + pause + len(quiet))
+    recording.close()
+    assert recording.ended is None
+    report = replay(tmp_path / "live")
+    assert report.identical
+    assert all(any("went into RUN again" in note for note in task.notes) for task in report.tasks)
+
+
 @pytest.mark.parametrize("messages", ["all", "scans", "writes", "images"])
 def test_restarted_rack_ends_the_recording(wire, tmp_path, messages):
     """Whatever comes first of the new run: nothing of it enters the bag."""

@@ -16,7 +16,7 @@ from typing import Any
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.provenance import lacking, provenance
 from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.bags.live.tracks import Gap, TaskTrack
+from automax_ros.bags.live.tracks import Gap, TaskTrack, task_head
 from automax_ros.bags.recording import Recording
 from automax_ros.bags.write_log import WriteLog
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
@@ -26,11 +26,10 @@ from automax_ros.wire.heads import WriteHead, image_head, operation_head, scan_h
 from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.rack_files import RackFile
 
-SETTLE_NS = 1_000_000_000
+SETTLE_NS = _SECOND = 1_000_000_000
 """When for so long no write has come, none is missing."""
 MAX_PENDING = 100_000
 """Most messages that wait for the next write."""
-_SECOND = 1_000_000_000
 _RESTARTED = "the rack was started again"
 _MALFORMED_NAMED = 3
 
@@ -270,8 +269,12 @@ class LiveRecording(Recording):
         pending, self._pending = self._pending, []
         if self._image is not None:
             self._begin()
-        for topic, sent, payload in pending:
-            if topic == self._topics.scans and self._wrote(payload):
+        for number, (topic, sent, payload) in enumerate(pending):
+            anew = self._begins_anew(topic, payload)
+            if anew and not at_end and len(pending) < MAX_PENDING:
+                self._pending = pending[number:]  # a write or an image will tell whether it is the same run
+                return
+            if not anew and topic == self._topics.scans and self._wrote(payload):
                 if not at_end:
                     self._rest(scan_head(payload).stamp, 0)
                 return
@@ -285,17 +288,17 @@ class LiveRecording(Recording):
             except CdrError as error:
                 self._note_malformed(topic, error)
 
-    def _wrote(self, payload: bytes) -> bool:
-        """Whether a scan of this run wrote common memory, and the write must follow.
+    def _begins_anew(self, topic: str, payload: bytes) -> bool:
+        """Whether a scan or state is that of a task that was put into RUN again, in this run or a later one."""
+        head = task_head(self._topics, topic, payload)
+        track = None if head is None else self._tasks.get(head.task)
+        return head is not None and track is not None and track.began_anew(head.scan, head.stamp)
 
-        A modeled scan that was pre-empted may have written before it ended: its writes came before it then.
-        """
+    def _wrote(self, payload: bytes) -> bool:
+        """Whether a scan wrote common memory and the write must follow: one that was pre-empted may have before."""
         try:
             scan: Any = decode("automax_msgs/msg/Scan", payload)
         except CdrError:
-            return False
-        track = self._tasks.get(scan.task)
-        if track is not None and track.began_anew(scan.scan, scan.stamp):
             return False
         return bool(scan.committed.variable or (scan.written.variable and self._last_write <= scan.stamp))
 

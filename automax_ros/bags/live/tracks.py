@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from automax_ros.bags.live.topics import LiveTopics
+from automax_ros.wire.cdr import CdrError
+from automax_ros.wire.heads import ScanHead, StateHead, scan_head, state_head
+
 
 @dataclass(frozen=True)
 class Gap:
@@ -63,3 +67,13 @@ class TaskTrack:
 
     def _join(self, joined: bool) -> None:
         self.ready, self.alone = self.ready or joined, self.alone or joined
+
+
+def task_head(topics: LiveTopics, topic: str, payload: bytes) -> ScanHead | StateHead | None:
+    """Return the head of a scan or of a task's state; None for what is neither, or malformed."""
+    try:
+        if topic == topics.scans:
+            return scan_head(payload)
+        return state_head(payload) if topic == topics.states else None
+    except CdrError:
+        return None
