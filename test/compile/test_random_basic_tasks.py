@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 
 from hypothesis import HealthCheck, assume, given, settings
@@ -22,7 +23,8 @@ from .programs import REFUSED, tasks
 from .support import TICK, WRITER, views_of
 from .test_random_tasks import bits, written
 
-_CALL = re.compile(r"^(\d+) (?:CALL .*|REM HERE|! HERE|CLR_ERRLOG|RESTORE)$", re.MULTILINE)
+_CALL = re.compile(r"^(\d+) CALL .*$", re.MULTILINE)
+_LATER = re.compile(r"^(\d{3,5}) (?!ELSE|END|NEXT|DATA|REM|!)(.*)$", re.MULTILINE)
 MOST_BURSTS = 3000
 
 
@@ -45,18 +47,18 @@ class BackgroundInterpreter(Interpreter):
 
 
 def as_basic_task(text: str, waits: list[str]) -> str:
-    """A control-block task's text with waits in place of its blocks."""
-    queue = iter(waits)
-    text = text.replace("&\n", " ")
-    return _CALL.sub(lambda found: f"{found[1]} {next(queue, 'DELAY 1 TICKS')}", text)
+    """A control-block task's text with remarks in place of its blocks and waits before other statements."""
+    queue = itertools.cycle(waits)
+    text = _CALL.sub(r"\1 REM", text.replace("&\n", " "))
+    return _LATER.sub(lambda found: f"{found[1]} {next(queue)} \\ {found[2]}", text)
 
 
 @st.composite
 def basic_tasks(draw) -> Program:
     waits = st.sampled_from(
-        ["DELAY 1 TICKS", "DELAY 3 TICKS", "DELAY 0 TICKS", "DELAY A% TICKS", "DELAY B% - 9 TICKS", "REM"]
+        ["DELAY 1 TICKS", "DELAY 3 TICKS", "DELAY 0 TICKS", "DELAY A% TICKS", "DELAY B% - 9 TICKS", "PRINT 1", "SET GO"]
     )
-    text = as_basic_task(draw(tasks()), draw(st.lists(waits, min_size=30, max_size=30)))
+    text = "1 EVENT NAME = GO\n" + as_basic_task(draw(tasks()), draw(st.lists(waits, min_size=1, max_size=9)))
     result = check(SourceText("TASK.BAS", text), name="TASK", catalogue=CATALOGUE, tick_ns=TICK)
     wrong = [item for item in result.diagnostics if item.severity.value == "error" and item.code not in REFUSED]
     assert not wrong, (wrong, text)
