@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from automax_ros.bags.common_log import Entry
 from automax_ros.compile.scan_io import MUST_WAIT
 from automax_ros.core.types import DataType, Value
+from automax_ros.replay.same import same_bits
 from automax_ros.running.channels import CHANNEL_VIEWS, Message, item_types
 
 CHANNELS = frozenset(CHANNEL_VIEWS.values())
@@ -23,10 +24,12 @@ class RecordedChannels:
     def __init__(self) -> None:
         """Begin with no burst."""
         self._entries: dict[int, deque[tuple[int, Value]]] = {}
+        self.other: list[tuple[int, Message, Message]] = []
 
     def begin(self, entries: Iterable[Entry]) -> None:
         """Take what a recorded burst got: view, number of the channel, value."""
         self._entries = {}
+        self.other.clear()
         for view, number, value in entries:
             self._entries.setdefault(number, deque()).append((view, value))
 
@@ -43,17 +46,31 @@ class RecordedChannels:
         outcome = self._outcome(number)
         if outcome:
             return (), outcome
+        items = self._items(number, types)
+        return (items, 0) if len(items) == len(types) else ((), MUST_WAIT)
+
+    def send(self, number: int, types: str, message: Message, now_ns: int) -> int:  # noqa: ARG002
+        """Return the recorded outcome; a message that differs from the recorded one is kept in ``other``."""
+        outcome = self._outcome(number)
+        if not outcome:
+            recorded = self._items(number, types)
+            if len(recorded) != len(message) or not all(map(same_bits, recorded, message)):
+                self.other.append((number, recorded, message))
+        return outcome
+
+    def unsent(self, number: int) -> Message:
+        """Return what the recorded burst has sent to a channel and this one has not, as one message."""
+        return tuple(value for _, value in self._entries.get(number, ()))
+
+    def _items(self, number: int, types: str) -> Message:
+        """Return the next items, as many as there are of these types."""
         items: list[Value] = []
         for kind in item_types(types):
             item = self._next(number, CHANNEL_VIEWS[kind])
             if item is None:
-                return (), MUST_WAIT
+                break
             items.append(item)
-        return tuple(items), 0
-
-    def send(self, number: int, types: str, message: Message, now_ns: int) -> int:  # noqa: ARG002
-        """Return the recorded outcome."""
-        return self._outcome(number)
+        return tuple(items)
 
     def _outcome(self, number: int) -> int:
         outcome = self._next(number, CHANNEL_VIEWS[DataType.INTEGER])

@@ -9,12 +9,14 @@ from automax_ros.bags.common_log import Entry, Key
 from automax_ros.core.names import element_name
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
+from automax_ros.language.syntax.waiting_tree import Direction
 from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.channels import CHANNELS
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
-from automax_ros.replay.inputs import ScanMemory, same_bits
+from automax_ros.replay.inputs import ScanMemory
 from automax_ros.replay.report import Kind, NamedValue, errors_text
+from automax_ros.replay.same import same_bits
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.running.task import ScanRecord
 from automax_ros.wire.messages import Scan
@@ -51,6 +53,7 @@ class ScanComparison:
         ]
         if not self._source.edited and not self._memory.writes_agree and not any(item.counts for item in found):
             found += self._other_writes(record.writes)
+        found += self._other_messages()
         if record.errors or scan.errors:
             found += self._other_errors(scan, record)
         return self.tally(scan.scan, scan.stamp, found)
@@ -65,6 +68,8 @@ class ScanComparison:
             variable = self._variable(cast(Key, key))
             lines = self._written_at.get(variable.name, ())
             return Label(element_name(variable, cast(Key, key)[1]), variable.unit, lines)
+        if kind is Kind.MESSAGE:
+            return Label(f"message to channel #{key}")
         words = {Kind.WRITES: "order of writes", Kind.ERRORS: "run-time errors", Kind.STATUS: "running"}
         return Label(words.get(kind) or f"state {key}")
 
@@ -94,6 +99,25 @@ class ScanComparison:
             return [Found(Kind.WRITES, "writes", self._write_text(one), self._write_text(other))]
         return []
 
+    def _other_messages(self) -> list[Found]:
+        """What differs in what a BASIC task sent to channels."""
+        channels = self._memory.channels
+        first: dict[int, Found] = {}
+        for number, recorded, own in channels.other:
+            counts = not self._alike(recorded, own)
+            if counts or number not in first:
+                texts = _message_text(recorded), _message_text(own)
+                first.setdefault(number, Found(Kind.MESSAGE, number, *texts, counts))
+        found = list(first.values())
+        for file in (self._source.recorded or self._source.compiled).program.files:
+            unsent = channels.unsent(file.number) if file.direction is Direction.OUTPUT else ()
+            if unsent and file.number not in first:
+                found.append(Found(Kind.MESSAGE, file.number, _message_text(unsent[1:] or unsent), "no message"))
+        return found
+
+    def _alike(self, recorded: Sequence[Value], own: Sequence[Value]) -> bool:
+        return len(recorded) == len(own) and all(map(self._same, recorded, own))
+
     def _same(self, recorded: Value, own: Value) -> bool:
         return same_bits(recorded, own) or within(recorded, own, self._tolerance)
 
@@ -114,3 +138,7 @@ class ScanComparison:
 
     def _variable(self, key: Key) -> CommonVariable:
         return self._commons.rack[key[0]]
+
+
+def _message_text(message: Sequence[Value]) -> str:
+    return ", ".join(map(source_text, message))

@@ -5,7 +5,6 @@ In the log a scan stands before the writes that it caused, so common memory as r
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterable, Sequence
 
 from automax_ros.bags.common_log import Entry, Key
@@ -13,17 +12,9 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
 from automax_ros.replay.channels import CHANNELS, RecordedChannels
 from automax_ros.replay.commons import RecordedCommons
+from automax_ros.replay.same import same_bits
 from automax_ros.running.views import LatchPlan, latch_plan
 from automax_ros.wire.messages import Scan
-
-_DOUBLE = struct.Struct("<d")
-
-
-def same_bits(one: Value, other: Value) -> bool:
-    """Whether two values are the same to the last bit: -0.0 is not 0.0, and NaN is NaN."""
-    if isinstance(one, float) and isinstance(other, float):
-        return (one == other and one != 0.0) or _DOUBLE.pack(one) == _DOUBLE.pack(other)
-    return one == other and type(one) is type(other)
 
 
 class ScanMemory:

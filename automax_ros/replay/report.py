@@ -29,6 +29,7 @@ class Kind(enum.Enum):
     ERRORS = "errors"
     STATE = "state"
     STATUS = "status"
+    MESSAGE = "message"
 
 
 @dataclass(frozen=True)

@@ -353,7 +353,7 @@ class TaskReplay:
             self._note("what it ran with when it was recorded cannot be compiled here; states are taken over by name")
             return
         before, after = recorded.program.period_ns, self._source.compiled.program.period_ns
-        if before != after:
+        if before != after and before and after:
             self._note(
                 f"its scan period was {before / 1e6:g} ms and is {after / 1e6:g} ms now; "
                 "it is executed at the recorded scans all the same"

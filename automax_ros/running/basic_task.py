@@ -1,7 +1,7 @@
 """A BASIC task: it runs from one suspension to the next, a burst, and each burst counts as a scan.
 
-Nothing is latched: reads and writes go to actual memory at once. What a burst got out of channels stands among the
-reads of its record (``CHANNEL_VIEWS``), so that the burst can be executed again.
+Nothing is latched: reads and writes go to actual memory at once. What a burst got out of channels and sent stands among
+the reads of its record (``CHANNEL_VIEWS``), so that the burst can be executed again.
 """
 
 from __future__ import annotations
@@ -82,15 +82,21 @@ class RecordingBasicIo(BasicIo, RecordingIo):
         """Take a message and note the outcome and its items."""
         message, outcome = super().receive(number)
         self._noted(number, outcome)
+        self._note_items(number, message)
+        return message, outcome
+
+    def send(self, number: int, message: Message) -> int:
+        """Put a message into a channel and note the outcome, and the items that went in."""
+        outcome = self._noted(number, super().send(number, message))
+        if not outcome:
+            self._note_items(number, message)
+        return outcome
+
+    def _note_items(self, number: int, message: Message) -> None:
         kinds = self._basic.file(number).types
         self.record.reads.extend(
             (CHANNEL_VIEWS[kind], number, item) for kind, item in zip(kinds, message, strict=False)
         )
-        return message, outcome
-
-    def send(self, number: int, message: Message) -> int:
-        """Put a message into a channel and note the outcome."""
-        return self._noted(number, super().send(number, message))
 
     def _noted(self, number: int, outcome: int) -> int:
         self.record.reads.append((CHANNEL_VIEWS[DataType.INTEGER], number, outcome))

@@ -21,7 +21,7 @@ MAX_DEPTH = 1000
 Message = tuple[Value, ...]
 
 CHANNEL_VIEWS = {kind: 0xFFFF - place for place, kind in enumerate(DataType)}
-"""The view under which a record keeps what came out of a channel, by the type of the item; no rack has one so high.
+"""The view under which a record keeps what came out of a channel or went in, by the type of the item; no rack has it.
 
 The element is the channel's number. The outcome of each access stands first, as an INTEGER.
 """

@@ -115,6 +115,29 @@ def test_an_edited_basic_task_differs_where_it_first_acts_otherwise(tmp_path):
     assert ("channel #3", 0) in [(read.name, read.value) for read in report.first.read]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "recorded", "replayed_as"),
+    [
+        ("OUT% / 3.0", "OUT% / 4.0", '30, 100000, 10.0, "GRÜSSE 1", FALSE', '30, 100000, 7.5, "GRÜSSE 1", FALSE'),
+        (
+            "N% > 10",
+            "N% > 9",
+            '196, 1000000, 65.333336, "GRÜSSE 10", FALSE',
+            '196, 1000000, 65.333336, "GRÜSSE 10", TRUE',
+        ),
+        ("80 PRINT:FULL", "75 GOTO 50\n80 PRINT:FULL", '30, 100000, 10.0, "GRÜSSE 1", FALSE', "no message"),
+    ],
+)
+def test_a_message_that_an_edited_task_sends_otherwise_is_a_difference(tmp_path, old, new, recorded, replayed_as):
+    bag = record(rack_of(tmp_path), tmp_path / "bag", steps)
+    report = replay(bag, {"SENDER": SourceText("SENDER.BAS", SENDER.replace(old, new))})
+    assert [task.name for task in report.tasks if task.different] == ["SENDER"]
+    assert report.first is not None
+    (found,) = report.first.differences
+    assert found.name == "message to channel #3"
+    assert (found.first.recorded, found.first.replayed) == (recorded, replayed_as)
+
+
 def test_two_simulated_runs_are_the_same_bag(tmp_path):
     bags = []
     for name in ("one", "two"):

@@ -12,8 +12,8 @@ from bags.live_racks import build
 
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.compare import SETTLED_SCANS, Found, Label, Seen, Tallies, within
-from automax_ros.replay.inputs import same_bits
 from automax_ros.replay.report import Kind
+from automax_ros.replay.same import same_bits
 from automax_ros.wire.messages import Scan, ScanError, TaskState, Values
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed, rewritten
