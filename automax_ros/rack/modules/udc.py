@@ -256,7 +256,7 @@ class UdcModule:
 
     @property
     def _scans_per_interrupt(self) -> int:
-        """Register 2001; 0 or less is no interrupt and no copy of the registers of the Nth scan (decision)."""
+        """Register 2001; 0 or less means no interrupt and no copy of the registers of the Nth scan (decision)."""
         return max(0, int(self._parts.memory.read_now(self._bank, SCANS_PER_INTERRUPT)))
 
     @property
