@@ -59,7 +59,8 @@ def exact_ns(seconds: str) -> int:
         raise ValueError(f"{seconds} s is negative")
     if exact > MOST_SECONDS:
         raise ValueError(f"{seconds} s is too long: at most {MOST_SECONDS} s")
-    if (exact * NS_PER_S).denominator != 1 or (not exact and float(seconds)):
+    is_zero = not seconds.lower().partition("e")[0].strip(" +-.0")
+    if (exact * NS_PER_S).denominator != 1 or (not exact and not is_zero):
         raise ValueError(f"{seconds} s is finer than 1 ns")
     return int(exact * NS_PER_S)
 
