@@ -16,18 +16,8 @@ from automax_ros.compile.layout import Role, StateField
 from automax_ros.compile.stores import converted, store
 from automax_ros.core.types import DataType
 from automax_ros.language.program import Program
-from automax_ros.language.syntax.tree import (
-    Assignment,
-    Call,
-    For,
-    Gosub,
-    If,
-    OnJump,
-    Read,
-    Reference,
-    Scope,
-    Statement,
-)
+from automax_ros.language.syntax.tree import Call, For, Gosub, OnJump, Reference, Scope, Statement
+from automax_ros.language.syntax.walk import statements_in_order, targets_of
 
 STEP_IS_ZERO = 7027
 
@@ -149,19 +139,11 @@ def counts_alone(program: Program, loop: For) -> bool:
 
 def _sets(program: Program, statements: tuple[Statement, ...], name: str) -> bool:
     """Return whether statements of a loop may set a variable; a subroutine may. No jump leads back into a loop."""
-    for statement in statements:
+    for statement, _ in statements_in_order(statements):
         if isinstance(statement, Gosub) or (isinstance(statement, OnJump) and statement.gosub):
             return True
-        if isinstance(statement, Assignment) and statement.target.name == name:
-            return True
-        if isinstance(statement, Read) and any(target.name == name for target in statement.targets):
+        if any(target.name == name for target in targets_of(statement)):
             return True
         if isinstance(statement, Call) and Reference(name) in program.calls[statement.span].targets:
-            return True
-        if isinstance(statement, If) and any(
-            _sets(program, suite, name) for suite in (statement.then, statement.otherwise)
-        ):
-            return True
-        if isinstance(statement, For) and (statement.variable.name == name or _sets(program, statement.body, name)):
             return True
     return False

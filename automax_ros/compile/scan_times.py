@@ -9,11 +9,10 @@ times tell of, unless there are no others (decision).
 from __future__ import annotations
 
 import enum
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 from automax_ros.compile.cost import CostModel
-from automax_ros.compile.flow import jump_targets
 from automax_ros.compile.loops import counts_alone
 from automax_ros.compile.paths import NOTHING, Span, longest_turn, ways_out
 from automax_ros.compile.statements import GOSUB_DEPTH
@@ -33,7 +32,7 @@ from automax_ros.language.syntax.tree import (
     Stop,
 )
 from automax_ros.language.syntax.waiting_tree import StartEvery
-from automax_ros.language.syntax.walk import jumps_of
+from automax_ros.language.syntax.walk import jumps_of, statements_in_order
 
 
 @dataclass(frozen=True)
@@ -105,17 +104,7 @@ def _around(program: Program, model: CostModel, ended: bool) -> Span:
 
 def is_estimated(statements: tuple[Statement, ...], model: CostModel) -> bool:
     """Return whether a BASIC statement among these, or inside them, has a time that is an estimate."""
-    return any(model.is_estimate(statement) for statement in _all(statements))
-
-
-def _all(statements: tuple[Statement, ...]) -> Iterator[Statement]:
-    for statement in statements:
-        yield statement
-        if isinstance(statement, If):
-            yield from _all(statement.then)
-            yield from _all(statement.otherwise)
-        elif isinstance(statement, For):
-            yield from _all(statement.body)
+    return any(model.is_estimate(statement) for statement, _ in statements_in_order(statements))
 
 
 def _either(ways: _Ways, *names: _Way) -> Span | None:
@@ -144,12 +133,12 @@ def _to_the_end(ways: _Ways) -> _Ways:
 
 
 def _called(statements: tuple[Statement, ...]) -> frozenset[int]:
-    gosubs = (Gosub, OnJump)
-    return jump_targets(tuple(item for item in _all(statements) if isinstance(item, gosubs) and _calls(item)))
+    """Return the lines of all subroutines."""
+    return frozenset(line for item, _ in statements_in_order(statements) if _calls(item) for line in jumps_of(item))
 
 
-def _calls(statement: Gosub | OnJump) -> bool:
-    return isinstance(statement, Gosub) or statement.gosub
+def _calls(statement: Statement) -> bool:
+    return isinstance(statement, Gosub) or (isinstance(statement, OnJump) and statement.gosub)
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.language.program import Program
-from automax_ros.language.syntax.tree import Assignment, Call, Element, Expression, For, Read, Reference, Scope
-from automax_ros.language.syntax.walk import statements_in_order
+from automax_ros.language.syntax.tree import Call, Element, Expression, Reference, Scope
+from automax_ros.language.syntax.walk import statements_in_order, targets_of
 
 Place = tuple[int, Span]
 """The BASIC line, and where the variable stands in the text."""
@@ -23,14 +23,9 @@ def places_that_write(program: Program) -> dict[str, list[Place]]:
             found.setdefault(symbol.name, []).append((line, target.span))
 
     for statement, line in statements_in_order((*program.startup, *program.scan)):
-        if isinstance(statement, Assignment):
-            note(statement.target, line)
-        elif isinstance(statement, For):
-            note(statement.variable, line)
-        elif isinstance(statement, Read):
-            for target in statement.targets:
-                note(target, line)
-        elif isinstance(statement, Call) and statement.span in program.calls:
+        for target in targets_of(statement):
+            note(target, line)
+        if isinstance(statement, Call) and statement.span in program.calls:
             bound = program.calls[statement.span]
             for output in bound.block.outputs:
                 note(bound.arguments.get(output.name), bound.line)

@@ -296,3 +296,12 @@ def test_a_basic_task_that_never_ends_counts_one_turn():
         basic("10 COMMON KA%\n20 KA% = 1\n30 DELAY 2 SECONDS\n40 GOTO 20\n50 END\n"), CostModel(Model.PC3000)
     )
     assert (times.least_ns, times.most_ns) == (0, round(0.7 * (ASSIGN + STATEMENT_ESTIMATES_US["Delay"] + GOTO) * 1000))
+
+
+def test_a_loop_whose_variable_a_message_sets_has_no_known_turns():
+    text = "10 LOCAL I%\n20 OPEN CHANNEL FOR INPUT AS FILE #1, TYPE=(I), DEPTH=4\n30 FOR I% = 1 TO 3\n"
+    text += "40 INPUT #1, I%\n50 NEXT I%\n60 END\n"
+    times = scan_times(basic(text), CostModel(Model.MODEL_7010))
+    least = STATEMENT_ESTIMATES_US["OpenChannel"] + FOR
+    assert times.least_ns / 1000 == pytest.approx(least)
+    assert times.most_ns / 1000 == pytest.approx(least + STATEMENT_ESTIMATES_US["InputFile"])
