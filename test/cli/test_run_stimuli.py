@@ -173,3 +173,62 @@ def test_stimuli_are_recorded_and_the_same_run_gives_the_same_bag(automax, run):
         bags.append((automax.folder / name / "scans_0.mcap").read_bytes())
     assert bags[0] == bags[1]
     assert automax("replay", "one").code == 0
+
+
+EVERY_VERB = """\
+- {at: 0.005, set: {REF%: 3, NOTE$: hi, "DIAG%(1,2)": 4, START_PB@: true}}
+- {at: 0.01, ramp: {REF%: {to: 300, over: 0.5}}}
+- {at: 0.02, sine: {GAIN: {amplitude: 2.5, hz: 7, for: 0.3}}}
+- {at: 0.1, square: {RUN@: {hz: 10, for: 0.2}}}
+- {at: 0.15, tune: {SPEED.KP: 3.5}}
+- {at: 0.2, force: {REF%: 7}}
+- {at: 0.3, unforce: all}
+- {at: 0.35, reload: {SPEED: {file: NEW.BLK, keep_state: true}}}
+- {at: 0.4, stop: [DRAW]}
+- {at: 0.41, delete: [DRAW]}
+- {at: 0.42, run: [DRAW]}
+- {at: 0.45, reload: {DRAW: DRAW.BLK, SPEED: BAD.BLK}}
+- {at: 0.46, run: [DRAW]}
+- {at: 0.5, power: {off_for: 0.1}}
+- {at: 0.65, stop_all: true}
+- {at: 0.7, clear_errors: all}
+- {at: 0.75, run_all: true}
+- {at: 0.8, power: {off_for: 0.05, battery: false}}
+- {at: 0.9, run_all: true}
+"""
+
+
+def test_a_recording_of_every_verb_replays_bit_for_bit(automax, run):
+    automax.write("rack.yaml", RACK.replace("rack: PM1\n", "rack: PM1\nauto_run: true\n"))
+    automax.write("NEW.BLK", SPEED.replace("SUM! + 1", "SUM! + 3").replace("CURRENT=1.0", "CURRENT=2.0"))
+    automax.write("BAD.BLK", "10 END\n")
+    result, report = run(EVERY_VERB, "--record", "bag", duration="1")
+    assert result.code == 1
+    operations = [(item["at"], item["what"], item.get("of"), item["ok"]) for item in report["operations"]]
+    assert operations == [
+        (0.15, "tune", "SPEED.KP", True),
+        (0.2, "force", "REF%", True),
+        (0.3, "unforce", None, True),
+        (0.35, "reload", "SPEED", True),
+        (0.4, "stop", "DRAW", True),
+        (0.41, "delete", "DRAW", True),
+        (0.42, "run", "DRAW", False),
+        (0.45, "reload", "DRAW", True),
+        (0.45, "reload", "SPEED", False),
+        (0.46, "run", "DRAW", True),
+        (0.5, "power", None, True),
+        (0.65, "stop_all", None, True),
+        (0.7, "clear_errors", None, True),
+        (0.75, "run_all", None, True),
+        (0.8, "power", None, True),
+        (0.9, "run_all", None, True),
+    ]
+    why = [item["why"] for item in report["operations"] if not item["ok"]]
+    assert why[0] == "task DRAW was deleted: reload it first"
+    assert "BAD.BLK:1: AMX4040" in why[1]
+    # each ms, from the tick after a start on: reload at 0.35, AUTO RUN at 0.6 and 0.85, run_all at 0.75
+    scans = 350 + (499 - 350) + (649 - 600) + (799 - 750) + (999 - 850)
+    assert (report["stopped"], report["tasks"]["SPEED"]["scans"]) == (None, scans)
+    replayed = automax("replay", "bag")
+    assert replayed.code == 0, replayed.out
+    assert "no difference" in replayed.out
