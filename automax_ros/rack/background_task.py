@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from automax_ros.compile.scan_io import Suspension
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.triggers import Due, Timeout
 from automax_ros.running.basic_task import BasicTask
 from automax_ros.running.channels import Channels
 from automax_ros.running.events import Events
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 from automax_ros.running.task import Status
+
+LATE_NS = NS_PER_S
+"""A task that the host reaches later than this goes on at the present (decision: it does not make up for lost time)."""
 
 
 class WaitTrigger:
@@ -101,7 +105,10 @@ class WaitTrigger:
 
     def _go_on(self, now_ns: int) -> None:
         self._event = None
-        if self._due is not None:
+        if self._scheduler.wall_ns - now_ns > LATE_NS:
+            self._task.pass_over(self._scheduler.wall_ns)
+            self._go_on_at(self._scheduler.wall_ns)
+        elif self._due is not None:
             self._task.go()
             self._due(now_ns, 0)
 

@@ -201,6 +201,12 @@ class BasicTask(Task):
         """Let it go on each period from now on (START EVERY)."""
         self.every = (period_ns, now_ns, 0)
 
+    def pass_over(self, now_ns: int) -> None:
+        """Leave out the instants of START EVERY up to the present: a burst that is due begins there instead."""
+        if self.wish[0] == Suspension.END and self.every is not None:
+            period, begin, last = self.every
+            self.every = period, begin, max(last, (now_ns - begin) // period)
+
     def waiting(self) -> list[int]:
         """Return, as numbers, what it waits for and its START EVERY."""
         return [*self.wish, self.wake_ns, *(self.every or (0, 0, 0)), self._instant, self._bursts]

@@ -188,6 +188,23 @@ def test_a_state_taken_at_any_instant_goes_on_the_same(tmp_path_factory, executi
     assert rack.memory.image() == whole.memory.image()
 
 
+def test_a_host_that_is_late_lets_nothing_be_made_up_for(tmp_path):
+    """Up to a second late each burst happens at its instant; after more the task goes on at the present."""
+    rack = rack_of(
+        tmp_path,
+        {"COUNT": (1, COUNT), "LOOP": (2, "10 COMMON M%\n20 M% = M% + 1\n30 DELAY 1 TICKS\n40 GOTO 20\n50 END\n")},
+    )
+    rack.start()
+    rack.scheduler.run_due(100 * TICK)
+    assert (rack.value("N%"), rack.value("M%")) == (51, 101)
+    rack.scheduler.run_due(10_000 * TICK)
+    assert (rack.value("N%"), rack.value("M%")) == (52, 102)
+    last = rack.memory.drain()[-1]
+    assert last.time_ns == 10_000 * TICK
+    rack.scheduler.run_due(10_010 * TICK)
+    assert (rack.value("N%"), rack.value("M%")) == (57, 112)
+
+
 HARDWARE = """\
 10 COMMON ISCR%, N%
 20 EVENT NAME=IRQ, INTERRUPT_STATUS=ISCR%, TIMEOUT=6
