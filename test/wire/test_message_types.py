@@ -69,6 +69,22 @@ def test_services_are_built_with_the_fields_of_their_definitions(path: Path) -> 
         assert list(part.get_fields_and_field_types()) == [name for _, name in lines]
 
 
+@pytest.mark.soak
+@pytest.mark.timeout(1200)
+def test_a_fresh_build_makes_messages_and_services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the definitions alone: five libraries and an extension, in which each service has its type support."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    code, libraries = importlib.import_module("message_code"), importlib.import_module("message_libraries")
+    build = importlib.import_module("build_messages")
+    package = code.Interfaces(build.NAME, build.SOURCE, tmp_path, build.PREFIX, build.DEPENDENCIES)
+    code.generate(package)
+    built = libraries.build_libraries(package)
+    assert len(built) == 6
+    symbols = b"".join(path.read_bytes() for path in built)
+    for path in DEFINITIONS.glob("srv/*.srv"):
+        assert f"get_service_type_support_handle__automax_msgs__srv__{path.stem}".encode() in symbols
+
+
 def test_installed_services_are_those_of_today_and_known_to_ros() -> None:
     listing = Path("share") / "ament_index" / "resource_index" / "rosidl_interfaces" / "automax_msgs"
     prefix = next(prefix for prefix in generator().ros_prefixes() if (prefix / listing).is_file())
