@@ -7,7 +7,7 @@ Cells are separated by commas or by semicolons. A table of `automax export` can 
 over, for each row is a scan; so export --every the task's scan time.
 
 With --stimuli a YAML file sets variables by time (set, ramp, sine, square), the first scan being at 0; without a table
-the task then scans for --duration seconds.
+the task then scans for --duration seconds, or until the last entry has happened.
 """
 
 from __future__ import annotations
@@ -37,11 +37,12 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_text
 from automax_ros.rack.stimuli.reader import read_for_task
+from automax_ros.rack.stimuli.values import goes_on_for_ever
 from automax_ros.running.error_log import LogEntry
 from automax_ros.running.lone_task import LoneTask, LoneVariable
 from automax_ros.running.task import ScanRecord, Status
 
-_USAGE = "usage: automax trace FILE --input IN.csv, or: automax trace FILE --stimuli FILE --duration S"
+_USAGE = "usage: automax trace FILE --input IN.csv, or: automax trace FILE --stimuli FILE"
 _ROWS_A_LOOK = 256
 """Rows between two looks at the clock for the progress bar."""
 
@@ -64,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Trace the task; 1 if it has errors, stops or faults, 2 if the table or an option is at fault."""
-    if arguments.input is None and (arguments.stimuli is None or arguments.duration is None):
+    if arguments.input is None and arguments.stimuli is None:
         raise UsageError("nothing is given for the task to work on", _USAGE)
     target = target_of(arguments)
     source, result = check_task_file(arguments.file, target)
@@ -85,6 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
         stimuli = entries_of(read_for_task(arguments.stimuli, lone)) if arguments.stimuli is not None else ()
     except StimuliRefused:
         return 1
+    if arguments.input is None and arguments.duration is None and goes_on_for_ever(stimuli):
+        raise UsageError("the stimuli have no end: a sine or a square lacks `for`", "give --duration S")
     with ExitStack() as files:
         table = files.enter_context(InputTable(arguments.input, lone)) if arguments.input is not None else None
         scans = StimulatedScans(lone, stimuli, table, arguments.duration)

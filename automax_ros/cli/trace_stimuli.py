@@ -15,13 +15,14 @@ from automax_ros.running.scheduler import Scheduler
 class StimulatedScans:
     """Scans by the clock of a task alone, from 0 on: one for each row of a table, or as many as a duration has.
 
+    Without both the last scan is the first one at or after the end of the last entry (decision).
     Entries of a scan's instant happen before its row is set, so a cell has the last word (decision).
     """
 
     def __init__(
         self, lone: LoneTask, stimuli: Sequence[Stimulus], table: InputTable | None, duration_ns: int | None
     ) -> None:
-        """Take a table, a duration, or both: the shorter counts."""
+        """Take a table, a duration, or both: the shorter counts; without both the entries must come to an end."""
         self._period_ns = lone.task.period_ns
         self._scheduler = Scheduler()
         self._stimulation = Stimulation(stimuli, self._scheduler)
@@ -51,4 +52,12 @@ class StimulatedScans:
             self._done = number
 
     def _numbers(self) -> Iterable[int]:
-        return count() if self._most is None else range(self._most)
+        if self._most is not None:
+            return range(self._most)
+        return count() if self._table is not None else self._until_over()
+
+    def _until_over(self) -> Iterator[int]:
+        for number in count():
+            yield number
+            if self._stimulation.is_over:
+                return

@@ -68,7 +68,27 @@ def test_errors_are_told_before_the_trace(trace, text, code, place):
     assert f"stimuli.yaml:{place}: error[{code}]" in result.err
 
 
-@pytest.mark.parametrize("options", [(), ("--stimuli", "stimuli.yaml"), ("--duration", "1")])
+@pytest.mark.parametrize(
+    ("text", "last"),
+    [
+        ("[]\n", 0),
+        ("- {at: 0.02, set: {REF%: 1}}\n", 22),
+        ("- {at: 0.022, set: {REF%: 1}}\n", 22),
+        ("- {at: 0.02, ramp: {REF%: {to: 9, over: 0.0241}}}\n", 55),
+        ("- {at: 0.02, square: {RUN@: {hz: 9, for: 0.03}}}\n- {at: 0, set: {REF%: 1}}\n", 55),
+    ],
+)
+def test_without_a_table_and_a_duration_the_last_entry_ends_a_trace(trace, text, last):
+    assert columns_of(trace(text).out)["time_s"][-1] == f"{last / 1000:g}"
+
+
+def test_a_wave_without_an_end_needs_a_duration(trace):
+    result = trace("- {at: 0, sine: {REF%: {amplitude: 9, hz: 9}}}\n")
+    assert (result.code, result.out) == (2, "")
+    assert "give --duration S" in result.err
+
+
+@pytest.mark.parametrize("options", [(), ("--duration", "1")])
 def test_a_trace_needs_something_to_work_on(automax, trace, options):
     trace("[]\n", "--duration", "1")
     result = automax("trace", "TASK.BLK", *options)

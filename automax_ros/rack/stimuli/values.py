@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -16,7 +16,7 @@ from automax_ros.rack.scalars import number_value
 from automax_ros.rack.sections import Section, entries_of
 from automax_ros.rack.stimuli.reading import Verb, named, signal_of, time_of, value_for
 from automax_ros.rack.stimuli.signals import Signal, Signals
-from automax_ros.rack.stimuli.stage import Action, Stage
+from automax_ros.rack.stimuli.stage import Action, Stage, Stimulus
 from automax_ros.rack.stimuli.waves import MOST_HZ, Ramp, Sine, Square, Wave
 
 _LEAST_HZ = 0.0001
@@ -55,6 +55,12 @@ class DriveSignal:
     def do(self, stage: Stage) -> None:
         """Begin."""
         stage.drive(self.signal, self.wave)
+
+
+def goes_on_for_ever(stimuli: Iterable[Stimulus]) -> bool:
+    """Return whether one of the entries begins a wave without an end."""
+    actions = (action for entry in stimuli for action in entry.actions)
+    return any(isinstance(action, DriveSignal) and action.wave.for_ns is None for action in actions)
 
 
 def value_verbs(signals: Signals) -> Mapping[str, Verb]:
