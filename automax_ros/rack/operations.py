@@ -113,7 +113,7 @@ class Operations:
         self._tell("run_all")
 
     def stop(self, name: str) -> None:
-        """Stop a task between two scans; its locals keep their values. One that does not run stays as it is.
+        """Stop a task; its locals keep the values of its last whole scan. One that does not run stays as it is.
 
         Raises:
             OperationRefused: there is no such task, it is critical (J2-3106-1 p. 8-2), or the power is off.

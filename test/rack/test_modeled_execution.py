@@ -283,3 +283,29 @@ def test_what_is_tuned_while_a_scan_is_under_way_is_in_force_from_the_next_one(t
     assert rack.value("OUT%") == 2
     rack.run(0.001)
     assert (rack.value("OUT%"), rack.task("A").value("GAIN%")) == (7, 5)
+
+
+def test_tasks_start_in_the_order_of_priority_and_name_before_anything_is_latched(tmp_path):
+    """J2-3106-1 p. 12-4; start-up parts take no time (decision), so the first latch is that of the highest priority."""
+    text = """10 COMMON ORDER%(9), NEXT%, {name}%
+20 ORDER%(NEXT%) = {digit}
+30 NEXT% = NEXT% + 1
+40 CALL SCAN_LOOP(TICKS=1)
+50 CALL SUMMER(INPUT1={name}%, INPUT2=1, OUTPUT={name}%)
+60 END
+"""
+    digits = {"D": (4, 1), "A": (7, 2), "B": (7, 3), "C": (9, 4)}
+    listed = ", ".join(f"{name}: {{priority: {digits[name][0]}}}" for name in "BCDA")
+    module = f"{{module: 57C435, tick_ms: 1.0, tasks: {{{listed}}}}}"
+    commons = "  ORDER%(9): {}\n  NEXT%: {}\n" + "".join(f"  {name}%: {{}}\n" for name in digits)
+    sources = {name: text.format(name=name, digit=digit) for name, (_, digit) in digits.items()}
+    rack = built(tmp_path, {0: module}, commons, **sources)
+    rack.start()
+    assert [rack.value("ORDER%", place) for place in range(4)] == [1, 2, 3, 4]
+    assert commits_of(rack, 0.001) == ["D%", "A%", "B%", "C%"]
+
+
+def commits_of(rack: Rack, seconds: float) -> list[str]:
+    rack.memory.keep_log()
+    rack.run(seconds)
+    return [rack.memory.specs[write.view].name for write in rack.memory.drain()]
