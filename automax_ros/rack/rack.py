@@ -47,6 +47,9 @@ from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import EVENT_TIMEOUT, ScanRecord, Status, Task
 from automax_ros.running.views import Memory
 
+_FAULTED = Status.FAULTED
+"""A name of its own, since it is asked for after each scan and an enumeration's member is slow to get."""
+
 
 @dataclass(frozen=True)
 class RackState:
@@ -375,7 +378,7 @@ class Rack:
             self.observers.scanned(task, record)
         if self._inputs.frozen and self._inputs.scanned(task.name):
             self.observers.tell_writes()
-        if task.status is Status.FAULTED:
+        if task.status is _FAULTED:
             last = task.errors.last
             reason = f"task {task.name}: {last.describe() if last else 'fault'}"
             self.operations.stop_all(reason, last.hardware if last else None, task.name)

@@ -16,6 +16,8 @@ from automax_ros.running.task import OVERLAP, ScanRecord, Status, Task
 
 _LONGEST_NS = 2**32 - 1
 """Longest execution time that a message of a scan can hold."""
+_RUNNING = Status.RUNNING
+"""A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
 After = Callable[[Task, ScanRecord | None], None]
 """Is told of each scan, and of what stands before SCAN_LOOP, right after it."""
 
@@ -139,11 +141,12 @@ class ScheduledTask:
     def whole(self, now_ns: int, skipped: int) -> None:
         """Execute a scan at one instant."""
         task, statistics, stopwatch = self.task, self.statistics, self._stopwatch
-        if task.status is not Status.RUNNING:
+        if task.status is not _RUNNING:
             return
         began = stopwatch() if stopwatch else 0
         record = task.scan(now_ns, skipped)
-        statistics.skipped += skipped
+        if skipped:
+            statistics.skipped += skipped
         if stopwatch:
             taken = stopwatch() - began
             statistics.add(taken)
@@ -175,7 +178,7 @@ class ScheduledTask:
 
     def _begin(self, now_ns: int, skipped: int) -> None:
         """Let a scan be executed, unless the last one is still under way: that is an overlap (J2-3106-1 p. C-1)."""
-        if self.task.status is not Status.RUNNING:
+        if self.task.status is not _RUNNING:
             return
         if self._execution.busy(self):
             self.fault(OVERLAP)

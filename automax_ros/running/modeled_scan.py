@@ -23,7 +23,7 @@ Progress = Mapping[str, Any]
 
 
 class HeardMemory:
-    """Memory as a scan under way uses it: ``heard`` is all that it was given since the scan began.
+    """Memory as a scan under way uses it: ``heard`` is all that it was given since somebody set that to nothing.
 
     After ``tell`` it gives what an earlier scan was given and writes nothing, until ``live``.
     """
@@ -39,11 +39,6 @@ class HeardMemory:
     def now_ns(self) -> int:
         """The time of what happens next."""
         return self._memory.now_ns if self._told is None else self.latched_ns
-
-    def begin(self) -> None:
-        """Begin another scan: nothing was heard."""
-        self.heard = []
-        self._told = None
 
     def tell(self, heard: Sequence[Any], latched_ns: int) -> None:
         """Give what a scan was given that latched at an instant, in place of what memory holds."""

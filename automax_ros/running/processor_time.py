@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
 from automax_ros.running.execution import Job, Place, Steps
@@ -16,6 +17,7 @@ class _Frame:
     skipped: int
     steps: Steps | None = None
     remaining_ns: int = 0
+    dropped: bool = False
 
 
 class ProcessorTime:
@@ -32,7 +34,6 @@ class ProcessorTime:
         self._frames: list[_Frame] = []
         self._event: ScheduledEvent | None = None
         self._spare: ScheduledEvent | None = None
-        self._stepping: _Frame | None = None
         self._since_ns = 0
         self._going = False
 
@@ -61,8 +62,11 @@ class ProcessorTime:
         self._book(now_ns)
         self._frames.remove(frame)
         self._wait(now_ns)
-        if frame.steps is not None and frame is not self._stepping:
-            frame.steps.close()
+        frame.dropped = True
+        if frame.steps is not None:
+            # ValueError: the job gives itself up, in the middle of a step.
+            with contextlib.suppress(ValueError):
+                frame.steps.close()
 
     def place(self, job: Job) -> Place | None:
         """Return how far a job is, None where it is not under way."""
@@ -114,7 +118,7 @@ class ProcessorTime:
                     if not advance_to(now_ns + left_ns, key):
                         break
                     now_ns += left_ns
-                steps, self._stepping = frame.steps, frame
+                steps = frame.steps
                 try:
                     if steps is None:
                         steps = frame.steps = frame.job.steps(now_ns, frame.skipped)
@@ -122,18 +126,16 @@ class ProcessorTime:
                     else:
                         frame.remaining_ns = steps.send(now_ns)
                 except StopIteration as end:
-                    self._stepping = None
-                    if frame in frames:
+                    if not frame.dropped:
                         frames.remove(frame)
                         frame.job.done(end.value)
                 else:
-                    if frame not in frames:
+                    if frame.dropped:
                         steps.close()
-                self._stepping = None
         finally:
             self._going = False
-        if frames:
-            self._wait(now_ns)
+            if frames:
+                self._wait(now_ns)
 
     def _wait(self, now_ns: int) -> None:
         """Go on with what is first when it has had its time, unless it goes on by itself."""

@@ -99,7 +99,9 @@ class Scheduler:
         """
         if time_ns < self.now_ns:
             raise ValueError(f"an event at {time_ns} ns lies before the present, {self.now_ns} ns")
-        heapq.heappush(self._queue, self._queued(time_ns, event))
+        self._serial += 1
+        key = event.key
+        heapq.heappush(self._queue, (time_ns, key.event_class, key.priority, key.name, self._serial, event))
         return event
 
     @property

@@ -164,9 +164,14 @@ class Task:
         """
         if self.status is not Status.RUNNING:
             return None
-        self._put_down()
-        self._heard.begin()
-        self._under_way = scan = self._new_scan(now_ns, skipped)
+        if self._scans is not None:
+            self._put_down()
+        self._heard.heard = []
+        self._under_way = scan = ScanUnderWay(now_ns, skipped, self._state[:], None, self._heard)
+        if self._arrays:
+            self._copy_arrays(scan.state)
+        if self.errors.count:
+            scan.log = self.errors.copy()
         record = self._begin_record(now_ns, skipped, self._heard_io) if self._recording else None
         self._begins(now_ns)
         steps = (form or self._form_in_steps())(scan.state, self._heard_io)
@@ -187,7 +192,7 @@ class Task:
             raise
         self.scan_number += 1
         self._state, self._under_way = scan.state, None
-        if self.status is _RUNNING:
+        if outcome:
             self._over(outcome, now_ns)
         return record
 
@@ -295,14 +300,12 @@ class Task:
             self._scans.close()
             self._scans = None
 
-    def _new_scan(self, now_ns: int, skipped: int) -> ScanUnderWay:
-        """Return a scan that works on a state of its own."""
-        state = self._state[:]
+    def _copy_arrays(self, state: StateValues) -> None:
+        """Give a copy of the state arrays of its own."""
         for position in self._arrays:
             array = state[position]
             assert isinstance(array, list)
             state[position] = array[:]
-        return ScanUnderWay(now_ns, skipped, state, self.errors.copy() if self.errors.count else None, self._heard)
 
     def _begins(self, now_ns: int) -> None:
         """Begin a scan at an instant."""
@@ -313,9 +316,8 @@ class Task:
         return self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
 
     def _over(self, outcome: Any, began_ns: int) -> None:  # noqa: ARG002
-        """End a scan with what its compiled form returned: TRUE if the task executed STOP."""
-        if outcome:
-            self.status = Status.ENDED
+        """End a scan with what its compiled form returned, if that is not FALSE: TRUE if the task executed STOP."""
+        self.status = Status.ENDED
 
     def _bind(self) -> None:
         """Bind what scans touch: memory itself, or for modeled scans what is noted meanwhile."""
