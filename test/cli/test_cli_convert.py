@@ -67,7 +67,7 @@ def test_errors_that_are_left_are_told(automax):
     ("arguments", "message"),
     [
         (["NONE.BLK"], "NONE.BLK cannot be read: No such file or directory"),
-        (["rack.yaml"], "rack.yaml is not a task"),
+        (["rack.yaml"], "rack.yaml: a task's source is a .BLK or .BAS file"),
         (["SPEED.BLK", "--output", "nowhere"], "nowhere is not a folder"),
         (["SPEED.BLK", "a/SPEED.BLK", "--output", "a"], "exists already"),
         (["SPEED.BLK", "a/SPEED.BLK", "--output", "b"], "two files are named SPEED.BLK"),
