@@ -110,13 +110,15 @@ def test_each_line_shows_the_values_by_then():
     assert (shown[145]["OUT%"], shown[150]["OUT%"]) == (0, 8)
 
 
-def test_a_scan_that_is_given_up_keeps_what_it_has_done():
+def test_a_scan_that_is_given_up_leaves_its_task_as_it_was():
     task, _ = task_of(FLOW)
     task.run()
     form: Any = task.compiled.scan_lines.scan
     steps = task.scan_modeled(0, form=form)
     assert [next(steps)[0] for _ in range(3)] == [105, 110, 120]  # type: ignore[index]
     steps.close()
+    assert task.value("M%") == 0
+    assert 180 in [line for line, _ in by_lines(task)], "what follows is a first scan again"
     assert task.value("M%") == 1
 
 
