@@ -47,7 +47,7 @@ END_NS = 60_000_000
 
 @dataclass(frozen=True)
 class Written:
-    """A task as it is written: ``others`` are the types of the commons that it declares beside its own."""
+    """A task as it is written: ``others`` are the types of the commons that it declares next to its own."""
 
     name: str
     priority: int

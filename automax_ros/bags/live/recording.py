@@ -270,11 +270,11 @@ class LiveRecording(Recording):
         if self._image is not None:
             self._begin()
         for number, (topic, sent, payload) in enumerate(pending):
-            anew = self._begins_anew(topic, payload)
-            if anew and not at_end and len(pending) < MAX_PENDING:
+            again = self._begins_anew(topic, payload)
+            if again and not at_end and len(pending) < MAX_PENDING:
                 self._pending = pending[number:]  # a write or an image will tell whether it is the same run
                 return
-            if not anew and topic == self._topics.scans and self._wrote(payload):
+            if not again and topic == self._topics.scans and self._wrote(payload):
                 if not at_end:
                     self._rest(scan_head(payload).stamp, 0)
                 return
