@@ -130,7 +130,7 @@ def _fields(item: Any) -> dict[str, Any]:
 def _task_lines(data: Any) -> Iterable[str]:
     yield f"{'task':8} {'module':14} {'status':14} {'prio':>4} {'ms':>8} {'scans':>10} {'skipped':>8} {'errors':>7}"
     for item in data:
-        period = f"{item['period_ms']:g}" if item["period_ms"] else "event"
+        period = f"{item['period_ms']:g}" if item["period_ms"] else "-"
         yield (
             f"{item['task']:8} {item['module']:14} {item['status']:14} {item['priority']:4} {period:>8} "
             f"{item['scans']:10} {item['skipped']:8} {item['errors']:7}"
