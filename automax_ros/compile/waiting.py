@@ -142,9 +142,12 @@ class WaitingLowering(StatementLowering):
     # Channels and ports
 
     def _own_block(self, flow: Flow, statement: Statement) -> None:
-        """Begin a block that the task can come back to, with the time of the statement."""
-        if flow.blocks[-1] or self.emitter.pending_ns:
-            self._next_block(flow)
+        """Begin a block that the task can come back to, with the time of the statement.
+
+        Always a new one: the numbers of blocks are the state's ``PC``, so they are the same in all forms and for all
+        execution times. A recorded modeled burst is replayed as an ideal one.
+        """
+        self._next_block(flow)
         self._charge(statement)
 
     def _open_channel(self, flow: Flow, statement: OpenChannel) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -323,6 +324,19 @@ def outcome(task, memory, bursts: int, *, modeled: bool, renew=None) -> list:
 def test_both_forms_of_a_burst_agree(source: str) -> None:
     whole = outcome(*basic_task_of(source), 12, modeled=False)
     assert outcome(*basic_task_of(source), 12, modeled=True) == whole
+    assert outcome(*basic_task_of(source, cost_model=CostModel(Model.MODEL_7010)), 12, modeled=True) == whole
+
+
+@pytest.mark.parametrize("before", ["! TAKES TIME", "REM", "A% = 1", "FOR I% = 1 TO 2"])
+def test_where_a_burst_goes_on_does_not_depend_on_what_it_costs(before: str) -> None:
+    """Else a modeled recording could not be replayed, nor a state from one form of execution go on in another."""
+    after = "NEXT I%" if before.startswith("FOR") else "REM"
+    opening = "OPEN CHANNEL FOR INPUT AS FILE #1, TYPE = (I), DEPTH = 2"
+    source = text("DELAY 1 TICKS", before, opening, before, "INPUT #1, A%", after, after, "DELAY 1 TICKS")
+    ideal, memory = basic_task_of(source)
+    modeled, other = basic_task_of(source, cost_model=CostModel(Model.MODEL_7010))
+    assert modeled.layout == ideal.layout
+    assert outcome(modeled, other, 4, modeled=True) == outcome(ideal, memory, 4, modeled=False)
 
 
 @given(programs())
