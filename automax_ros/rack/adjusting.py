@@ -86,7 +86,8 @@ class Adjustments:
 
         Raises:
             OperationRefused: there is no such common, it is forced (J2-3093 p. 5-17) or written by the rack itself, the
-                value does not fit, or the power is off.
+                value does not fit, or the power is off. The process does not need the rack's power: inputs can be set
+                (decision).
         """
         label = self._write("set", name, value)
         self._tell("set", detail=_assignment(label, value))
@@ -120,7 +121,9 @@ class Adjustments:
 
     def _write(self, what: str, name: str, value: Value) -> str:
         """Write a common or an element; return its full name."""
-        found = self._common(what, name)
+        found = self._named(what, name)
+        if not self._config.is_input(found.variable):
+            self._need_power(what)
         view = self._memory.view(found.name)
         if found.name in PREDEFINED:
             self._refuse(what, f"{found.name} cannot be set: the rack itself writes it")
@@ -152,6 +155,9 @@ class Adjustments:
 
     def _common(self, what: str, name: str) -> CommonElement:
         self._need_power(what)
+        return self._named(what, name)
+
+    def _named(self, what: str, name: str) -> CommonElement:
         owner = name.partition(".")[0].strip().upper()
         if owner != name.strip().upper() and owner in {task.name for _, task in self._config.placed_tasks}:
             reason = (

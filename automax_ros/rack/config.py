@@ -14,7 +14,7 @@ from pathlib import Path
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.executive import NEWEST
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.kind import ModuleConfig, Registers
 from automax_ros.rack.scale import Scale
 from automax_ros.rack.task_config import TaskConfig
 
@@ -135,6 +135,18 @@ class RackConfig:
     def declared(self) -> tuple[CommonVariable, ...]:
         """The variables that the file defines: all but the registers of modules."""
         return tuple(variable for variable in self.variables if variable.bank is None)
+
+    def is_input(self, variable: CommonVariable) -> bool:
+        """Return whether a variable shows an input: the process sets it, no task may write it."""
+        point = variable.point
+        if point is None:
+            return False
+        found = self._directions[point.slot].direction(point.register)
+        return found == "input" or (found == "either" and variable.direction is Direction.IN)
+
+    @cached_property
+    def _directions(self) -> Mapping[int, Registers]:
+        return {module.slot: module.registers for module in self.modules}
 
     @property
     def task_modules(self) -> tuple[ModuleConfig, ...]:

@@ -165,6 +165,9 @@ class _Reader:
 
     # Statements
 
+    def _end(self, word: Token, tokens: _Tokens) -> None:
+        """Take END, as other programs have it; no source at hand says whether a configuration task has one (decision)."""
+
     def _io(self, word: Token, tokens: _Tokens) -> None:
         declared, span = self._variable(tokens)
         keys = self._keys(tokens, ("SLOT", "REGISTER", "BIT"))
@@ -300,5 +303,6 @@ _STATEMENTS: dict[str, _Read] = {
     "NVMEMDEF": _Reader._memory,
     **dict.fromkeys(("RIODEF", "NETDEF", "GBLDEF", "RNETDEF", "ABDEF", "MODDEF"), _Reader._elsewhere),
     "TASK": _Reader._task,
+    "END": _Reader._end,
 }
 """What a configuration task may hold (J2-3045 p. 5-36), remarks aside."""

@@ -9,7 +9,7 @@ from typing import Protocol, TypeGuard
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.language.syntax.task_kind import TASK_SUFFIXES, NotATask, is_task_file, kind_of_file
+from automax_ros.language.syntax.task_kind import LADDER_SUFFIX, TASK_SUFFIXES, NotATask, is_task_file, kind_of_file
 from automax_ros.rack.files import FileFault, read_bytes, stays_next_to
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.names import DeclarationFault, check_task_name
@@ -123,7 +123,7 @@ class TaskReader:
     def _file(self, node: Node | None, key: Scalar, name: str | None, what: str) -> Path | None:
         """Return the source's path; without the key it is the task's name with .BLK, as in the Executive (2.4.1).
 
-        Where there is no such file, but one with .BAS, that is it (decision).
+        Where there is no such file, but one with .BAS, that is it (decision); a ladder task (.PC) is told as such.
         """
         if self.rack_file is None:
             return Path(f"{name}.BLK") if name is not None else None
@@ -135,7 +135,7 @@ class TaskReader:
     def _usual(self, name: str) -> str:
         """Return the name of the source of a task whose entry does not give one."""
         assert self.rack_file is not None
-        names = [f"{name}{suffix}" for suffix in TASK_SUFFIXES]
+        names = [f"{name}{suffix}" for suffix in (*TASK_SUFFIXES, LADDER_SUFFIX)]
         return next((item for item in names if (self.rack_file.parent / item).is_file()), names[0])
 
     def _usable(self, text: str, span: Span) -> Path | None:

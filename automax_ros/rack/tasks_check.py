@@ -10,12 +10,11 @@ from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Platform
 from automax_ros.compile.cost import PLATFORMS, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
-from automax_ros.core.kinds import Direction
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
-from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import FileFault
-from automax_ros.rack.modules.kind import ModuleConfig, Registers
+from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.task_rules import findings_by_task
 from automax_ros.rack.task_source import read_task_source
@@ -31,7 +30,6 @@ class CheckedTask(NamedTuple):
 
 def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
     """Return the rack's common variables by full name, as the checker compares them with a task's COMMON."""
-    registers = {module.slot: module.registers for module in config.modules}
     return {
         variable.name: CommonSpec(
             name=variable.name,
@@ -39,18 +37,10 @@ def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
             place=f"{config.path.name}:{variable.line}",
             dimensions=variable.dimensions,
             length=variable.length,
-            is_input=_is_input(variable, registers),
+            is_input=config.is_input(variable),
         )
         for variable in config.declared
     }
-
-
-def _is_input(variable: CommonVariable, registers: Mapping[int, Registers]) -> bool:
-    """Return whether a variable shows an input, which no task may write."""
-    if variable.point is None:
-        return False
-    direction = registers[variable.point.slot].direction(variable.point.register)
-    return direction == "input" or (direction == "either" and variable.direction is Direction.IN)
 
 
 def check_tasks(config: RackConfig) -> list[CheckedTask]:

@@ -37,6 +37,21 @@ LINE = """\
 PLAIN = "10 LOCAL N%\n20 CALL SCAN_LOOP(TICKS=1)\n30 N% = N% + 1\n40 END\n"
 
 
+INPUTS = """\
+rack: LINE1
+slots:
+  0: {module: 57C435, tasks: {PLAIN: {priority: 6}}}
+  5: {module: 57C419}
+  6: {module: 57C403}
+  10: {module: 57552}
+common:
+  DOOR@: {slot: 5, register: 0, bit: 3}
+  FEEDBACK%: {slot: 10, register: 207}
+  LAMP@: {slot: 6, register: 0, bit: 1}
+  REF%:
+"""
+
+
 class Told:
     def __init__(self):
         self.operations = []
@@ -174,6 +189,26 @@ def test_without_power_nothing_is_adjusted(made):
         with pytest.raises(OperationRefused, match="the power is off"):
             call()
     assert [item.name for item in rack.forces()] == ["REF%"], "a force outlives the power"
+
+
+def test_the_process_moves_inputs_without_the_racks_power(tmp_path):
+    (tmp_path / "PLAIN.BLK").write_text(PLAIN)
+    (tmp_path / "rack.yaml").write_text(INPUTS)
+    config = load(tmp_path / "rack.yaml").config
+    assert config is not None
+    rack = Rack(config)
+    rack.start()
+    rack.operations.power_off()
+    rack.adjust.set("DOOR@", True)
+    rack.adjust.set("FEEDBACK%", 12)
+    for name in ("LAMP@", "REF%"):
+        with pytest.raises(OperationRefused, match="the power is off"):
+            rack.adjust.set(name, 1)
+    with pytest.raises(OperationRefused, match="the power is off"):
+        rack.adjust.force("DOOR@", False)
+    rack.operations.power_on()
+    shown = [rack.value(name) for name in ("DOOR@", "FEEDBACK%", "LAMP@", "REF%")]
+    assert shown == [True, 12, False, 0]
 
 
 def test_tuning_takes_any_value_within_the_limits(made):

@@ -58,6 +58,14 @@ def test_files_that_a_task_may_and_may_not_name(tmp_path, file, code):
     assert found == ([code] if code else [])
 
 
+def test_a_ladder_task_that_only_its_name_tells_is_told_as_one(tmp_path):
+    (tmp_path / "STEPS.PC").write_text("ladder\n")
+    text = rack("STEPS: {priority: 4}")
+    assert codes(tmp_path, text) == ["AMX6304"]
+    (tmp_path / "STEPS.BLK").write_text("10 CALL SCAN_LOOP(TICKS=2)\n20 END\n")
+    assert codes(tmp_path, text) == []
+
+
 def test_symbolic_link_to_itself_is_refused(tmp_path):
     (tmp_path / "LOOP.BLK").symlink_to(tmp_path / "LOOP.BLK")
     (found,) = codes(tmp_path, rack("LINE: {file: LOOP.BLK, priority: 4}"))

@@ -13,8 +13,10 @@ class TaskKind(enum.Enum):
     BASIC = ".BAS"
 
 
+LADDER_SUFFIX = ".PC"
+"""The suffix of ladder tasks, which are not run."""
 _REFUSED = {
-    ".PC": "a ladder task (.PC) is not run: write it as a control-block task (.BLK) or a BASIC task (.BAS)",
+    LADDER_SUFFIX: "a ladder task (.PC) is not run: write it as a control-block task (.BLK) or a BASIC task (.BAS)",
     ".CNF": "a configuration task (.CNF) is not run: the rack's YAML file stands in its place",
     ".INC": "an include file (.INC) is not a task: write its statements into the task",
 }

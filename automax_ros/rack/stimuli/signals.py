@@ -75,11 +75,14 @@ class RackSignals:
             *variable.type.range,
             partial(self.rack.memory.read_now, view, meant.index),
             partial(self.rack.adjust.write, meant.label),
-            partial(self._write, view, meant.index),
+            partial(self._write, meant, view),
         )
 
-    def _write(self, view: int, element: int, value: Value) -> None:
-        self.rack.write_view(view, [(element, value)], OPERATOR_WRITER)
+    def _write(self, meant: CommonElement, view: int, value: Value) -> None:
+        """Write a sample; without power the rack takes none but for inputs, which are the process's (decision)."""
+        if not self.rack.operations.powered and not self.rack.config.is_input(meant.variable):
+            return
+        self.rack.write_view(view, [(meant.index, value)], OPERATOR_WRITER)
 
 
 @dataclass(frozen=True)

@@ -235,6 +235,21 @@ def test_power_goes_and_comes_back(tmp_path):
     assert rack.task("SPEED").status is Status.STOPPED
 
 
+def test_without_power_only_inputs_take_samples(tmp_path):
+    text = (
+        "- {at: 0.001, power: {off_for: 0.02}}\n- {at: 0.002, ramp: {KEPT%: {to: 50, over: 0.01}}}\n"
+        "- {at: 0.002, square: {START_PB@: {hz: 100, for: 0.007}}}\n"
+        "- {at: 0.004, square: {REF%: {hz: 5, low: 1, high: 3}}}\n"
+    )
+    rack, _, stimulation = played(tmp_path, text, 0.0029)
+    assert [rack.value(name) for name in ("KEPT%", "START_PB@", "REF%")] == [0, True, 0]
+    rack.run(0.01)
+    assert [rack.value(name) for name in ("KEPT%", "START_PB@", "REF%")] == [0, False, 0]
+    rack.run(0.0122)
+    assert [rack.value(name) for name in ("KEPT%", "REF%")] == [0, 3]
+    assert [item.ok for item in stimulation.happened] == [True]
+
+
 def test_power_without_a_battery_takes_non_volatile_memory_along(tmp_path):
     text = "- {at: 0.001, set: {KEPT%: 8}}\n- {at: 0.0055, power: {off_for: 0.01, battery: false}}\n"
     rack, _, _ = played(tmp_path, text, 0.02)
