@@ -166,7 +166,7 @@ class _Reader:
     # Statements
 
     def _end(self, word: Token, tokens: _Tokens) -> None:
-        """Take END, as other programs have it; no source at hand says whether a configuration task has one (decision)."""
+        """Take END, as other programs have it; no source says whether a configuration task has one (decision)."""
 
     def _io(self, word: Token, tokens: _Tokens) -> None:
         declared, span = self._variable(tokens)
