@@ -64,7 +64,7 @@ class UdcModule:
         self._local = tuple(sorted(views.showing(bank.view, APPLICATION)))
         self._memory = LocalMemory(parts.memory, {view for view, _ in self._local if view != bank.view})
         self._copies: Copies | None = None
-        self._count = 0
+        self._count = self._missed = 0
         self._rest: list[ScheduledTask] = []
         self._current: ScheduledTask | None = None
         self._scanning = False
@@ -102,7 +102,7 @@ class UdcModule:
     def stopped_all(self) -> None:
         """Lose what a UDC loses at STOP ALL: the locals of its tasks and its local memory (2.4.5)."""
         self._break_off()
-        self._count = 0
+        self._count = self._missed = 0
         self._memory.image.clear(self._local)
         for item in self.tasks:
             item.task.compiled.layout.lose_locals(item.task.state)
@@ -130,6 +130,7 @@ class UdcModule:
             "tasks": {item.name: item.state() for item in self.tasks},
             "local": [entry for entry in held if entry[2]],
             "count": self._count,
+            "missed": self._missed,
             "scan_ns": self.scan_ns,
             "scanning": self._scanning,
             "current": None if self._current is None else self._current.name,
@@ -150,7 +151,7 @@ class UdcModule:
         image = self._memory.image
         image.clear(self._local)
         image.load_image(state["local"])
-        self._count, self._scanning = state["count"], state["scanning"]
+        self._count, self._missed, self._scanning = state["count"], state["missed"], state["scanning"]
         self._current = own[state["current"]] if state["current"] is not None else None
         self._rest = [own[name] for name in state["rest"]]
         self._cancel()
@@ -191,19 +192,25 @@ class UdcModule:
             self._cancel()
             return
         self._skipped = skipped
-        self._begin(now_ns)
+        self._begin(now_ns, skipped)
         self._rest, self._scanning = self._taking_part(), True
         self._go_on(now_ns)
 
-    def _begin(self, now_ns: int) -> None:
-        """Count the scan, and copy in what the tasks read: every Nth time also the registers of the Nth scan."""
+    def _begin(self, now_ns: int, skipped: int) -> None:
+        """Count the scan, and copy in what the tasks read: every Nth time also the registers of the Nth scan.
+
+        Scans that a late host leaves out count too: the next one takes the place of an Nth one among them (decision).
+        """
         self._parts.memory.now_ns = now_ns
         every = self._scans_per_interrupt
-        self._count = self._count + 1 if self._count + 1 < every else 0
+        before = min(self._count, max(every - 1, 0))
+        present = before + skipped + 1
+        self._count = present % every if every else 0
+        self._missed = present // every - (before + 1) // every if every else 0
         self._show_count()
         image, copies = self._memory.image, self._present_copies
         image.take(copies.every.inputs)
-        if every and not self._count:
+        if every and present // every > before // every:
             image.take(copies.nth.inputs)
         if self._parts.memory.forced:
             image.take_forced()
@@ -232,11 +239,12 @@ class UdcModule:
     def _end(self, now_ns: int) -> None:
         """Copy out the registers of the Nth scan at the end of the scan before it, then interrupt (S-3006 p. 4-9)."""
         every = self._scans_per_interrupt
-        if not every or self._count != every - 1:
+        due = self._missed + (self._count == every - 1)
+        if not every or not due:
             return
         for name in self._present_copies.nth.outputs:
             self._copy_out(self._present_copies.nth, name, now_ns)
-        self._parts.interrupts.post(self._bank, ISCR, now_ns)
+        self._parts.interrupts.post(self._bank, ISCR, now_ns, skipped=due - 1)
 
     def _copy_out(self, copied: Copied, name: str, now_ns: int) -> None:
         keys = copied.outputs.get(name)

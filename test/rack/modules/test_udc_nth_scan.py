@@ -219,3 +219,23 @@ def test_a_basic_task_waits_for_the_interrupt_too(tmp_path):
     rack.start()
     rack.run(0.0301)
     assert (rack.value("SEEN%"), rack.task("BG").value("N%")) == (29, 10)
+
+
+def test_a_late_host_leaves_scans_out_but_not_their_interrupt(tmp_path):
+    """Scan k is at (k - 0.5) ms. Of 3 to 30 only the last happens, in place of 4, 9 ... 29; of 31 to 100 likewise.
+
+    TIMEOUT is 50 ms here: a host that is late by more than that must not look like a UDC that does not interrupt.
+    """
+    rack = with_interrupt(tmp_path, 5)
+    seen = Seen(rack)
+    rack.start()
+    for now_ms in (1, 2, 30, 100, 102):
+        rack.scheduler.run_due(now_ms * 1_000_000)
+    assert rack.operations.stopped is None
+    udc = [(time, scan) for time, task, scan in seen.scans if task == "WIND_A" and scan]
+    assert udc == [(500_000, 1), (1_500_000, 2), (29_500_000, 3), (99_500_000, 4), (101_500_000, 5)]
+    line = [(time, scan) for time, task, scan in seen.scans if task == "LINE" and scan]
+    assert line == [(29_500_000, 1), (99_500_000, 2)]
+    assert rack.statistics["LINE"].skipped == 5 + 13
+    assert rack.value("COUNT%") == 102 % 5
+    assert rack.value("GOT%") == 100
