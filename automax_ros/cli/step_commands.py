@@ -86,7 +86,11 @@ COMMANDS: dict[str, Command] = {
     "show": Command("show NAME ... | TASK", "the values of variables, or of all of a task", Session.show, 1, 99),
     "set": Command("set NAME=VALUE", "write a common", lambda s, w: s.assign(w, s.stepper.rack.adjust.set), 1, 99),
     "force": Command(
-        "force NAME=VALUE", "hold a common at a value", lambda s, w: s.assign(w, s.stepper.rack.adjust.force), 1, 99
+        "force NAME=VALUE",
+        "hold a common or TASK.NAME at a value",
+        lambda s, w: s.assign(w, s.stepper.rack.adjust.force),
+        1,
+        99,
     ),
     "unforce": Command("unforce [NAME ... | all]", "end forces", Session.unforce, most=99),
     "tune": Command("tune TASK.NAME=VALUE", "set a tunable", Session.tune, 1, 99),

@@ -10,7 +10,7 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.text import near_or_listed, printable, quoted, table
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import Value
-from automax_ros.core.values import number, source_text, whole_number
+from automax_ros.core.values import number, source_text, value_of, whole_number
 from automax_ros.rack.report import STATUS_WORDS
 from automax_ros.rack.settings import setting
 from automax_ros.rack.stepping.stepper import Halt, Stepper, Why
@@ -100,10 +100,21 @@ class Session:
             self.tell(line)
 
     def assign(self, words: list[str], write: Callable[[str, Value], None]) -> None:
-        """Carry out NAME=VALUE for a common; forces and values take effect between scans only."""
-        name, value = setting(self.stepper.rack.config, " ".join(words))
+        """Carry out NAME=VALUE; forces and values take effect between scans only."""
+        text = " ".join(words)
+        own = "." in text.partition("=")[0]
+        name, value = self._of_task(text) if own else setting(self.stepper.rack.config, text)
         self.between_scans()
         write(name, value)
+
+    def _of_task(self, text: str) -> tuple[str, Value]:
+        """Return name and value of TASK.NAME=VALUE."""
+        name, _, given = text.partition("=")
+        meant = self.stepper.variables.find(name)
+        value = value_of(given.strip(), meant.type, meant.length)
+        if value is None:
+            raise CommandFault(f"{quoted(given.strip())} is not a value for {meant.label}, type {meant.type.word}")
+        return meant.label, value
 
     def tune(self, words: list[str]) -> None:
         """Carry out TASK.NAME=VALUE for a tunable."""

@@ -37,9 +37,9 @@ class BackgroundCompilation:
 
     names: tuple[str, ...] = ("burst", "burst_steps")
 
-    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel) -> None:
-        """Take a checked BASIC task and the rack's views."""
-        self._program = program
+    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> None:
+        """Take a checked BASIC task, the rack's views, and the task's own variables that a force holds."""
+        self._program, self._held = program, held
         self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
         self._cost = cost_model
         self._fields: dict[str, StateField] = {
@@ -70,7 +70,8 @@ class BackgroundCompilation:
     def _function(self, name: str) -> tuple[ast.FunctionDef, frozenset[int]]:
         """Return a function, and the lines that it yields if it does."""
         modeled = name == "burst_steps"
-        emitter = Emitter(self._program, self._views, modeled, self._cost, by_lines=name == "burst_lines")
+        by_lines = name == "burst_lines"
+        emitter = Emitter(self._program, self._views, modeled, self._cost, by_lines=by_lines, held=self._held)
         lowering = WaitingLowering(emitter, {})
         lowering.lower_all(self._program.scan)
         self._fields.update(lowering.fields)

@@ -276,8 +276,8 @@ def _block_value(emitter: Emitter, given: Expression) -> ast.expr:
 
 
 def _local(emitter: Emitter, target: Expression) -> str:
-    """Return the Python local that an output is stored in, "" where it has none."""
-    if isinstance(target, Reference):
+    """Return the Python local that an output is stored in, "" where it has none or a force holds it."""
+    if isinstance(target, Reference) and target.name not in emitter.held:
         symbol = emitter.symbol(target.name)
         if symbol.latched or target.name not in emitter.views:
             return variable_name(target.name)

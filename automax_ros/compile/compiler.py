@@ -10,6 +10,10 @@ Three functions come from one lowering of the same tree:
 ``scans`` and ``scan_steps`` have a second form for tasks with forced commons: there a block's write to a forced common
 is dropped in the scan's buffer, so that later blocks see the forced value (decision).
 
+While the task's own variables are forced, ``CompiledTask.holding`` gives functions that drop what is written to these
+variables, a FOR's counting among it: a loop whose variable is held within its limits ends by the limit of statements,
+which faults the task (decision: on the hardware such a scan never ends either).
+
 ``startup`` and ``scan_steps`` return, and ``scans`` yields, True if the task executed STOP. ``state`` is the list of
 the layout's fields: loaded into locals at the start, stored back at the end, also when a scan is broken off. ``scans``
 ends when it is closed: between scans its locals hold the state, so that a scan neither loads nor stores it. ``io`` is
@@ -23,7 +27,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol, cast
 
 from automax_ros.compile import build
@@ -68,7 +72,8 @@ class Compilation(Protocol):
 class CompiledTask:
     """A task ready to run: a control-block task scans, a BASIC task has bursts, and its ``scans`` are none.
 
-    ``latched`` are the commons that a scan latches, ``written`` what blocks can change.
+    ``latched`` are the commons that a scan latches, ``written`` what blocks can change; ``held`` are the task's own
+    variables that keep their values whatever the functions write.
     """
 
     program: Program
@@ -78,6 +83,12 @@ class CompiledTask:
     startup: Startup
     scans: Scans
     _compilation: Compilation = field(repr=False, compare=False)
+    _again: Callable[[frozenset[str]], CompiledTask] = field(repr=False, compare=False)
+    held: frozenset[str] = frozenset()
+
+    def holding(self, names: frozenset[str]) -> CompiledTask:
+        """Return the same task with other variables held, by their full names: simple ones of its own, no tunables."""
+        return self if names == self.held else self._again(names)
 
     @cached_property
     def scans_forced(self) -> Scans:
@@ -118,14 +129,15 @@ class CompiledTask:
 
 def compile_program(program: Program, views: Mapping[str, int], cost_model: CostModel | None = None) -> CompiledTask:
     """Compile a checked program against a rack's views (full name -> view) of all commons it declares."""
-    if program.is_basic:
-        return _background(program, views, cost_model or CostModel())
-    return _Compilation(program, views, cost_model or CostModel()).result()
+    return _compiled(program, views, cost_model or CostModel(), frozenset())
 
 
-def _background(program: Program, views: Mapping[str, int], cost_model: CostModel) -> CompiledTask:
-    compilation = BackgroundCompilation(program, views, cost_model)
-    return CompiledTask(program, compilation.layout, (), (), _no_startup, _no_scans, compilation)
+def _compiled(program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> CompiledTask:
+    again = partial(_compiled, program, views, cost_model)
+    if not program.is_basic:
+        return _Compilation(program, views, cost_model, held).result(again)
+    compilation = BackgroundCompilation(program, views, cost_model, held)
+    return CompiledTask(program, compilation.layout, (), (), _no_startup, _no_scans, compilation, again, held)
 
 
 def _no_startup(_: StateValues, __: ScanIo) -> bool:
@@ -139,8 +151,8 @@ def _no_scans(_: StateValues, __: ScanIo) -> Generator[bool, None, None]:
 class _Compilation:
     names: tuple[str, ...] = ("startup", "scans", "scan_steps")
 
-    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel) -> None:
-        self._program = program
+    def __init__(self, program: Program, views: Mapping[str, int], cost_model: CostModel, held: frozenset[str]) -> None:
+        self._program, self._held = program, held
         self._views = {name: views[name] for name, symbol in program.symbols.items() if symbol.scope is Scope.COMMON}
         self._cost = cost_model
         self._instances = _instances(program)
@@ -154,8 +166,8 @@ class _Compilation:
             self._fields.update(instance.fields)
         self._globals: dict[str, object] = {"ScanTooLong": ScanTooLong}
 
-    def result(self) -> CompiledTask:
-        """Compile the task."""
+    def result(self, again: Callable[[frozenset[str]], CompiledTask]) -> CompiledTask:
+        """Compile the task; ``again`` does it with other variables held."""
         functions = self.functions("startup", "scans")
         return CompiledTask(
             program=self._program,
@@ -165,6 +177,8 @@ class _Compilation:
             startup=cast(Startup, functions["startup"]),
             scans=cast(Scans, functions["scans"]),
             _compilation=self,
+            _again=again,
+            held=self._held,
         )
 
     def functions(self, *names: str) -> dict[str, object]:
@@ -186,7 +200,7 @@ class _Compilation:
     def _function(self, name: str) -> tuple[str, list[ast.stmt], Emitter, StatementLowering]:
         scans = name != "startup"
         statements = self._program.scan if scans else self._program.startup
-        emitter = Emitter(self._program, self._views, name.startswith("scan_steps"), self._cost)
+        emitter = Emitter(self._program, self._views, name.startswith("scan_steps"), self._cost, held=self._held)
         emitter.forces = frozenset(self._written()) if name.endswith("_forced") else frozenset()
         emitter.by_lines = name.startswith("scan_lines")
         lowering = StatementLowering(emitter, dict(self._instances.items()))

@@ -19,6 +19,8 @@ from automax_ros.language.syntax.tree import Scope
 
 OVER = "over"
 """The local that holds the number of a statement's first overflow."""
+DROPPED = "dropped"
+"""The local that takes what is written to a held variable; nothing reads it."""
 
 
 @dataclass
@@ -28,6 +30,7 @@ class Emitter:
     ``modeled`` makes the generator form, which yields the modeled cost in ns before each access to actual memory.
     ``views`` maps the full names of commons to their views. ``in_block`` is set inside a block statement, subscripts
     included: there a latched common is the value of the latch. ``forces`` are the latched commons that may be forced.
+    ``held`` are the task's own simple variables that a force holds: what is written to them is dropped.
     """
 
     program: Program
@@ -41,6 +44,7 @@ class Emitter:
     pending_ns: int = 0
     in_block: bool = False
     forces: frozenset[str] = frozenset()
+    held: frozenset[str] = frozenset()
     by_lines: bool = False
     lines: set[int] = field(default_factory=set)
     shown: ast.Tuple = field(default_factory=lambda: build.names(()))
@@ -153,7 +157,7 @@ class Emitter:
         symbol = self.symbol(name)
         if symbol.scope is Scope.LOCAL:
             if element is None:
-                self.emit(build.assign(variable_name(name), value))
+                self.emit(build.assign(DROPPED if name in self.held else variable_name(name), value))
             else:
                 self.emit(build.set_item(variable_name(name), element, value))
             return

@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from automax_ros.core.types import DataType, Value
@@ -115,10 +115,10 @@ class Layout:
             if field.role in (Role.BLOCK, Role.STACK):
                 state[position] = field.fresh()
 
-    def lose_locals(self, state: list[StateValue]) -> None:
-        """Set the locals of a state, but not its tunables, to their values at installation."""
+    def lose_locals(self, state: list[StateValue], kept: Container[str] = ()) -> None:
+        """Set the locals of a state but those ``kept``, and not its tunables, to their values at installation."""
         for position, field in enumerate(self.fields):
-            if field.role is Role.LOCAL:
+            if field.role is Role.LOCAL and field.name not in kept:
                 state[position] = field.fresh()
 
     def flatten(self, state: Sequence[StateValue]) -> list[Value]:

@@ -127,7 +127,7 @@ class OperatorNode(ModuleNode):
             response.stopped_reason = cause.reason
         response.tasks = len(rack.tasks)
         response.running = sum(task.status is Status.RUNNING for task in rack.tasks)
-        response.forced = len(rack.memory.forced)
+        response.forced = len(rack.forces())
 
 
 def _concluded(response: Any, *, ok: bool, reason: str) -> Any:

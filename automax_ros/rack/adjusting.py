@@ -1,7 +1,7 @@
 """What an operator does to values: force and release, set, tune. Each is told to observers, refused ones too.
 
-Names are full ones: ``REF%``, ``TABLE%(3)``, a tunable with its task: ``SPEED.KP``. ``Rack.force``, ``Rack.write`` and
-``Rack.tune`` do the same for programs, and tell of no operation.
+Names are full ones: ``REF%``, ``TABLE%(3)``, a local or a tunable with its task: ``SPEED.COUNT%``, ``SPEED.KP``.
+``Rack.force``, ``Rack.write`` and ``Rack.tune`` do the same for programs, and tell of no operation.
 """
 
 from __future__ import annotations
@@ -52,27 +52,26 @@ class Adjustments:
         self._forcing, self._scheduler, self._observers, self._tune = forcing, scheduler, observers, tune
 
     def force(self, name: str, value: Value) -> None:
-        """Hold a common at a value against every write; one that is held already gets the new value.
+        """Hold a common or a local at a value against every write; one that is held already gets the new value.
 
         Raises:
-            OperationRefused: there is no such common, it cannot be forced, the value does not fit, as many are forced
+            OperationRefused: there is no such variable, it cannot be forced, the value does not fit, as many are forced
                 as the Executive allows, or the power is off.
         """
-        found = self._common("force", name)
-        if found.variable.is_array:
-            self._refuse("force", f"{found.label} cannot be forced: it is an element of an array")
-        self._carry_out("force", lambda: self._forcing.force(found.name, value, OPERATOR_WRITER))
-        self._tell("force", detail=_assignment(found.label, value))
+        task, label = self._forceable("force", name)
+        self._carry_out("force", lambda: self._forcing.force(label, value, OPERATOR_WRITER), task)
+        self._tell("force", task, detail=_assignment(label, value))
 
     def unforce(self, names: Sequence[str] | None = None) -> None:
         """End forces, all of them without ``names``; the values stay until the next write.
 
         Raises:
-            OperationRefused: one of the names is not a common or not forced, or the power is off; nothing is released.
+            OperationRefused: one of the names is not a variable or not forced, or the power is off; nothing is
+                released.
         """
         self._need_power("unforce")
         forced = [item.name for item in self._forcing.table()]
-        released = forced if names is None else [self._common("unforce", name).label for name in names]
+        released = forced if names is None else [self._forceable("unforce", name)[1] for name in names]
         for name in released:
             if name not in forced:
                 self._refuse("unforce", f"{name} is not forced")
@@ -153,6 +152,20 @@ class Adjustments:
             self._refuse(what, f"task {owner} has no tunable {quoted(bare)}: {hint}", owner)
         return task, bare
 
+    def _forceable(self, what: str, name: str) -> tuple[str, str]:
+        """Return task and full name of a variable to force; a common's task is ""."""
+        if "." not in name:
+            found = self._common(what, name)
+            if found.variable.is_array and what == "force":
+                self._refuse(what, f"{found.label} cannot be forced: it is an element of an array")
+            return "", found.label
+        self._need_power(what)
+        try:
+            meant = self._forcing.local(name)
+        except NameFault as fault:
+            self._refuse(what, f"{fault.message}: {fault.hint}" if fault.hint else fault.message)
+        return meant.task.name, meant.label
+
     def _common(self, what: str, name: str) -> CommonElement:
         self._need_power(what)
         return self._named(what, name)
@@ -160,9 +173,7 @@ class Adjustments:
     def _named(self, what: str, name: str) -> CommonElement:
         owner = name.partition(".")[0].strip().upper()
         if owner != name.strip().upper() and owner in {task.name for _, task in self._config.placed_tasks}:
-            reason = (
-                f"{quoted(name)} is a variable of task {owner}: only common variables can be forced, released or set"
-            )
+            reason = f"{quoted(name)} is a variable of task {owner}: only common variables can be set"
             self._refuse(what, reason, owner)
         try:
             return common_named(self._config, name)
@@ -173,12 +184,12 @@ class Adjustments:
         if not self._operations.powered:
             self._refuse(what, "the power is off: switch it on first")
 
-    def _carry_out(self, what: str, call: Callable[[], None]) -> None:
+    def _carry_out(self, what: str, call: Callable[[], None], task: str = "") -> None:
         self._memory.now_ns = self._scheduler.now_ns
         try:
             call()
         except MemoryValueError as error:
-            self._refuse(what, str(error))
+            self._refuse(what, str(error), task)
         self._observers.tell_writes()
 
     def _tell(self, what: str, task: str = "", *, ok: bool = True, reason: str = "", detail: str = "") -> None:

@@ -1,54 +1,71 @@
 """The forces of a rack: which variables may be held, how many, and which are (J2-3106-1 p. 18-10).
 
-A force holds a simple common of any type but STRING against every write, until it is released; it survives STOP ALL and
-power. A task's own variables cannot be forced (decision: a compiled scan keeps them to itself).
+A force holds a simple variable of any type but STRING against every write, until it is released; it survives STOP ALL
+and power. Commons are known by their names, a task's own variables with the task: ``SPEED.COUNT%``. A tunable cannot be
+forced, since nothing but the operator writes it (decision).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.executive import most_forces, version_text
+from automax_ros.rack.local_names import LocalElement, local_named
 from automax_ros.rack.names import PREDEFINED
 from automax_ros.running.memory import FORCING, CommonMemory
-from automax_ros.running.views import MemoryValueError
+from automax_ros.running.task import Task
+from automax_ros.running.views import MemoryValueError, ViewSpec, fitting
 
 
 @dataclass(frozen=True)
 class Force:
-    """A line of the force table: a common and the value at which it is held."""
+    """A line of the force table: a variable and the value at which it is held."""
 
     name: str
     value: Value
 
 
 class Forcing:
-    """Forces the commons of one rack, within what its Executive allows."""
+    """Forces the variables of one rack, within what its Executive allows."""
 
-    def __init__(self, config: RackConfig, memory: CommonMemory) -> None:
-        """Take a rack's common memory."""
-        self._config, self._memory = config, memory
+    def __init__(self, config: RackConfig, memory: CommonMemory, tasks: Callable[[], Sequence[Task]]) -> None:
+        """Take a rack's common memory, and what tells its tasks."""
+        self._config, self._memory, self._tasks = config, memory, tasks
         self.most = most_forces(config.executive)
 
     def table(self) -> list[Force]:
-        """Return what is forced, in the order of the rack file."""
+        """Return what is forced: commons in the order of the rack file, then locals, task by task."""
         memory = self._memory
         held = sorted(memory.forced)
-        return [Force(memory.specs[view].name, memory.read_now(view, element)) for view, element in held]
+        commons = [Force(memory.specs[view].name, memory.read_now(view, element)) for view, element in held]
+        return commons + [
+            Force(f"{task.name}.{name}", value) for task in self._tasks() for name, value in task.forces.items()
+        ]
+
+    def local(self, name: str) -> LocalElement:
+        """Return the task's own variable that a name with a point means.
+
+        Raises:
+            NameFault: there is none.
+        """
+        return local_named(self._tasks(), name)
 
     def force(self, name: str, value: Value, writer: int) -> None:
-        """Hold a common at a value; one that is held already gets the new value.
+        """Hold a variable at a value; one that is held already gets the new value.
 
         Raises:
             KeyError: the rack has no such variable.
             MemoryValueError: the value does not fit, the variable cannot be forced, or as many are forced as may be.
         """
+        if "." in name:
+            self._force_local(self._known(name), value, writer)
+            return
         view = self._memory.view(name)
-        reason = self._why_not(view)
-        if reason is not None:
-            raise MemoryValueError(f"{name} cannot be forced: {reason}")
+        self._require(name, self._why_not(view) or self._too_many(again=self._memory.is_forced(view)))
         self._memory.force(view, value, writer=writer)
 
     def release(self, name: str, writer: int) -> None:
@@ -57,7 +74,54 @@ class Forcing:
         Raises:
             KeyError: the rack has no such variable.
         """
-        self._memory.release(self._memory.view(name), writer=writer)
+        if "." not in name:
+            self._memory.release(self._memory.view(name), writer=writer)
+            return
+        meant = self._known(name)
+        held = {known: value for known, value in meant.task.forces.items() if known != meant.symbol.name}
+        self._hold(meant.task, held, writer)
+
+    def release_all(self, writer: int) -> None:
+        """End all forces."""
+        for task in self._tasks():
+            task.hold({})
+        self._memory.note_locals(writer, forced=False)
+        for view, element in sorted(self._memory.forced):
+            self._memory.release(view, element, writer)
+
+    def hold_again(self, task: Task, forces: Mapping[str, Value], writer: int) -> list[str]:
+        """Hold the locals of a task that was installed as before; return those that it has not, which are released."""
+        symbols = task.compiled.program.symbols
+        kept = {name: value for name, value in forces.items() if name in symbols and _may_be_held(task, name)}
+        self._hold(task, kept, writer)
+        return [f"{task.name}.{name}" for name in forces if name not in kept]
+
+    def load(self) -> None:
+        """Take over what tasks hold that went on from a state."""
+        self._memory.note_locals(forced=self._any_local(), told=False)
+
+    def _force_local(self, meant: LocalElement, value: Value, writer: int) -> None:
+        symbol, forces = meant.symbol, meant.task.forces
+        self._require(meant.label, meant.why_not_forced or self._too_many(again=symbol.name in forces))
+        fit = fitting(ViewSpec(meant.label, symbol.type), value)
+        self._hold(meant.task, {**forces, symbol.name: fit}, writer)
+
+    def _hold(self, task: Task, forces: Mapping[str, Value], writer: int) -> None:
+        task.hold(forces)
+        self._memory.note_locals(writer, forced=self._any_local())
+
+    def _any_local(self) -> bool:
+        return any(task.forces for task in self._tasks())
+
+    def _known(self, name: str) -> LocalElement:
+        try:
+            return self.local(name)
+        except NameFault as fault:
+            raise KeyError(name) from fault
+
+    def _require(self, name: str, reason: str | None) -> None:
+        if reason is not None:
+            raise MemoryValueError(f"{name} cannot be forced: {reason}")
 
     def _why_not(self, view: int) -> str | None:
         memory = self._memory
@@ -69,9 +133,18 @@ class Forcing:
         if spec.name in PREDEFINED:
             return "the rack itself writes it"
         others = memory.registers.others(view)
-        if others:
-            return f"{memory.specs[others[0]].name} is part of the same register"
-        if len(memory.forced) >= self.most and not memory.is_forced(view):
-            version = version_text(self._config.executive)
-            return f"{self.most} variables are forced, the most with executive {version}: release one first"
-        return None
+        return f"{memory.specs[others[0]].name} is part of the same register" if others else None
+
+    def _too_many(self, *, again: bool) -> str | None:
+        """Return the reason where one more is too many; a variable that is forced ``again`` is no more than before."""
+        if again or len(self.table()) < self.most:
+            return None
+        version = version_text(self._config.executive)
+        return f"{self.most} variables are forced, the most with executive {version}: release one first"
+
+
+def _may_be_held(task: Task, name: str) -> bool:
+    try:
+        return local_named([task], f"{task.name}.{name}").why_not_forced is None
+    except NameFault:
+        return False

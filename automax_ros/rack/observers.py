@@ -42,7 +42,7 @@ class RackObserver(Protocol):
         ...
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """A tunable of a task was set between two scans."""
+        """A tunable of a task was set between two scans, or a local forced or released."""
         ...
 
     def operated(self, operation: Operation) -> None:
@@ -77,7 +77,7 @@ class Observers:
                 observer.written(writes)
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """Tell that a tunable was set."""
+        """Tell that a tunable was set, or a local forced or released."""
         for observer in self._all:
             observer.tuned(task, now_ns)
 

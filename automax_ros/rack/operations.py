@@ -5,12 +5,14 @@ Stimuli, services, commands and lifecycle transitions all call these; observers 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NoReturn
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
+from automax_ros.rack.forcing import Forcing
 from automax_ros.rack.installation import Installation, RackError
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.names import AUTO_RUN
@@ -51,8 +53,10 @@ class Operations:
         events: Events,
         channels: Channels,
         observers: Observers,
+        forcing: Forcing,
     ) -> None:
         """Take the parts of a rack that is built and not yet started."""
+        self._forcing = forcing
         self._events, self._channels = events, channels
         self._config, self._modules, self._installation = config, modules, installation
         self._memory, self._scheduler, self._observers = memory, scheduler, observers
@@ -164,9 +168,10 @@ class Operations:
     def reload(self, name: str, source: SourceText, *, keep_state: bool = False) -> None:
         """Replace a task's source while the others run: an installation, so locals are 0, tunables as the source says.
 
-        With ``keep_state`` locals and tunables keep their values by name, as far as they fit (``carry_over``). A task
-        that ran is put into RUN again. With errors in the source the old task goes on. One that was deleted is there
-        again.
+        What is forced stays so as far as the new source has a simple local of that name, else it is released, and
+        observers are told so (decision). With ``keep_state`` locals and tunables keep their values by name, as far as
+        they fit (``carry_over``). A task that ran is put into RUN again. With errors in the source the old task goes
+        on. One that was deleted is there again.
 
         Raises:
             OperationRefused: there is no such task, it runs and is critical (decision: it would stop alone), or the
@@ -182,12 +187,14 @@ class Operations:
             raise
         ran = item.task.status is Status.RUNNING
         item.stop()  # A scan under way is given up first: only then the task's values are whole.
-        before, values = item.task.layout, item.task.snapshot()
+        before, values, forces = item.task.layout, item.task.snapshot(), item.task.forces
         item.install(compiled, source)
         if keep_state:
             carry_over(before, values, item.task)
+        released = self._hold_again(item, forces)
         self.deleted -= {name}
         self._tell("reload", name, detail=KEEP_STATE if keep_state else "")
+        self._tell_released(item, released)
         if ran:
             self._run_together([item], self._next_tick)
 
@@ -202,9 +209,12 @@ class Operations:
             self._refuse("delete", name, f"task {name} runs: stop it first")
         if name in self.deleted:
             self._refuse("delete", name, f"task {name} was deleted already")
+        released = [f"{name}.{local}" for local in item.task.forces]
         item.install(item.task.compiled, item.source)
+        self._hold_again(item, {})
         self.deleted |= {name}
         self._tell("delete", name)
+        self._tell_released(item, released)
 
     def power(self, off_for_ns: int, *, battery: bool = True) -> None:
         """Switch the power off, and let it come back after a time, at the latest with ``power_on``.
@@ -252,7 +262,8 @@ class Operations:
         self._expect_power(None)
         self.powered, self.battery_good = True, battery
         if not battery:
-            self._release_forces()
+            self._memory.now_ns = self._scheduler.now_ns
+            self._forcing.release_all(PRESET_WRITER)
         self._clear_memory(keep_non_volatile=battery)
         if not battery:
             for item in self._tasks.values():
@@ -318,10 +329,16 @@ class Operations:
                 expected.at_ns, _POWER, lambda _: self.power_on(battery=expected.battery)
             )
 
-    def _release_forces(self) -> None:
+    def _hold_again(self, item: ScheduledTask, forces: Mapping[str, Value]) -> list[str]:
+        """Hold those locals of an installed task that it still has; return the others, which are released."""
         self._memory.now_ns = self._scheduler.now_ns
-        for view, element in sorted(self._memory.forced):
-            self._memory.release(view, element, PRESET_WRITER)
+        released = self._forcing.hold_again(item.task, forces, PRESET_WRITER)
+        self._observers.tell_writes()
+        return released
+
+    def _tell_released(self, item: ScheduledTask, names: Sequence[str]) -> None:
+        if names:
+            self._tell("unforce", item.name, detail=" ".join(names))
 
     def _need_power(self, what: str, task: str = "") -> None:
         if not self.powered:

@@ -74,7 +74,7 @@ class Orders:
         self._rack.adjust.set(name, self._common_value("set", name, value))
 
     def force(self, name: str, value: str) -> None:
-        """Hold a common at a value."""
+        """Hold a common, or a task's own variable (``TASK.NAME``), at a value."""
         self._rack.adjust.force(name, self._common_value("force", name, value))
 
     def unforce(self, names: Sequence[str]) -> None:
@@ -141,8 +141,10 @@ class Orders:
         return ", ".join(map(source_text, value)) if isinstance(value, list) else source_text(value)
 
     def _common_value(self, what: str, name: str, text: str) -> Value:
-        """Return the value that a text writes for a common; a name that is none is left for the rack to refuse."""
+        """Return the value that a text writes for a variable; a name that is none is left for the rack to refuse."""
         self._short(what, name, MAX_NAME)
+        if "." in name:
+            return self._value(what, name, text, type_of_name("".join(name.split()).upper()), 0)
         try:
             variable = common_named(self._rack.config, name).variable
         except NameFault:

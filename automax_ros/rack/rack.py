@@ -85,7 +85,7 @@ class Rack:
         """
         self.config = config
         self.memory = CommonMemory(view_specs(config.variables))
-        self._forcing = Forcing(config, self.memory)
+        self._forcing = Forcing(config, self.memory, lambda: self.tasks)
         self.writers: tuple[WriterSpec, ...] = writers_of(config)
         self.scheduler = Scheduler()
         self._stopwatch = stopwatch
@@ -122,6 +122,7 @@ class Rack:
             self.events,
             self.channels,
             self.observers,
+            self._forcing,
         )
         self.adjust = Adjustments(
             config, self.operations, self.memory, self._inputs, self._forcing, self.scheduler, self.observers, self.tune
@@ -235,17 +236,17 @@ class Rack:
         self.observers.tell_writes()
 
     def force(self, name: str, value: Value, writer: int = OPERATOR_WRITER) -> None:
-        """Hold a common at a value against every write, between scans.
+        """Hold a common, or a task's own variable (``SPEED.COUNT%``), at a value against every write, between scans.
 
         Raises:
             KeyError: the rack has no such variable.
             MemoryValueError: the value does not fit, as many are forced as the Executive allows, or it cannot
-                be forced: a string, an array, what the rack itself writes, or a register of which both the word and
-                bits are named (J2-3106-1 p. 18-10).
+                be forced: a string, an array, a tunable, what the rack itself writes, or a register of which both the
+                word and bits are named (J2-3106-1 p. 18-10).
         """
         self.memory.now_ns = self.now_ns
         self._forcing.force(name, value, writer)
-        self.observers.tell_writes()
+        self._tell_force(name)
 
     def unforce(self, name: str, writer: int = OPERATOR_WRITER) -> None:
         """End a force; the value stays until the next write.
@@ -255,7 +256,12 @@ class Rack:
         """
         self.memory.now_ns = self.now_ns
         self._forcing.release(name, writer)
+        self._tell_force(name)
+
+    def _tell_force(self, name: str) -> None:
         self.observers.tell_writes()
+        if "." in name:
+            self.observers.tuned(self._forcing.local(name).task, self.now_ns)
 
     def forces(self) -> list[Force]:
         """Return the force table: what is forced and at which value, in the order of the rack file."""
@@ -321,6 +327,7 @@ class Rack:
         self.channels.load(state.channels)
         for module in self.modules:
             module.load(state.modules[module.config.slot])
+        self._forcing.load()
         self.events.load(state.events)
 
     def _execution(self, module: str) -> Execution:

@@ -34,7 +34,7 @@ def report_of(rack: Rack, happened: Iterable[Happened] = ()) -> dict[str, Any]:
             for view, variable in enumerate(rack.config.variables)
             if variable.bank is None
         },
-        "forced": [rack.memory.specs[view].name for view, _ in sorted(rack.memory.forced)],
+        "forced": [item.name for item in rack.forces()],
         "operations": [_operation(item) for item in happened],
     }
 

@@ -20,12 +20,13 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.core.faults import Fault
-from automax_ros.core.names import element_name
+from automax_ros.core.names import NameFault, element_name
 from automax_ros.core.safe_file import replace_file
 from automax_ros.core.types import Value
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.kept_tasks import KeptTask, kept_task, restore_task
+from automax_ros.rack.local_names import local_named
 from automax_ros.rack.rack import Rack
 from automax_ros.running.task import Status
 from automax_ros.running.views import MemoryValueError
@@ -213,18 +214,28 @@ class Retention:
         return tunables
 
     def _force(self, forced: Mapping[str, Value], notes: list[str]) -> int:
-        """Force what was forced; a common that is not there any more is told, one that cannot be forced is an error."""
+        """Force what was forced; what is not there any more is told, what cannot be forced is an error.
+
+        A local that its edited task has no longer as a simple variable is told too (decision).
+        """
         lines = {variable.name: variable.line for variable in self._rack.config.declared}
+        lines |= {name: 0 for name in forced if self._may_hold(name)}
         known = [name for name in forced if name in lines]
         notes += [f"{name[:40]} was forced and is not defined any more" for name in forced if name not in lines]
         for name in known:
             try:
                 self._rack.force(name, forced[name])
             except MemoryValueError as error:
-                raise self._misfit(
-                    f"{name} was kept as forced ({self._rack.config.path}:{lines[name]}): {error}"
-                ) from error
+                place = f" ({self._rack.config.path}:{lines[name]})" if lines[name] else ""
+                raise self._misfit(f"{name} was kept as forced{place}: {error}") from error
         return len(known)
+
+    def _may_hold(self, name: str) -> bool:
+        """Return whether a task has a local of that name that may be forced."""
+        try:
+            return "." in name and local_named(self._rack.tasks, name).why_not_forced is None
+        except NameFault:
+            return False
 
     def _begin_with(self, statuses: Mapping[str, str]) -> None:
         """Let those tasks begin that ran, as AUTO RUN does; one that is new runs too."""

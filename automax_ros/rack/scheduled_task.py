@@ -111,6 +111,8 @@ class ScheduledTask:
             "status": task.status.name,
             "scan": task.scan_number,
             "values": task.snapshot(),
+            "held": sorted(task.compiled.held),
+            "forced": dict(task.forces),
             "waiting": task.waiting(),
             "next_ns": self.trigger.next_ns,
             "place": self._execution.place(self),
@@ -129,6 +131,8 @@ class ScheduledTask:
             raise ValueError(f"task {self.task.name} cannot be {state['status']!r}")
         self.stop()
         self.task.restore(list(state["values"]))
+        values = {name: self.task.value(name) for name in state["held"]}
+        self.task.hold({name: value for name, value in values.items() if not isinstance(value, list)})
         self.task.wait_again(state["waiting"])
         self.task.status, self.task.scan_number = Status[state["status"]], state["scan"]
         if state["next_ns"] is not None:
@@ -137,6 +141,7 @@ class ScheduledTask:
         if place is not None:
             self._execution.resume(self, place, None if progress is None else self._resumed(progress))
             self.task.wait_again(state["waiting"])
+        self.task.hold(state["forced"])
 
     def whole(self, now_ns: int, skipped: int) -> None:
         """Execute a scan at one instant."""

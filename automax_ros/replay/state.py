@@ -11,11 +11,11 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError
 from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.core.ticks import seconds_text
-from automax_ros.core.types import Value
+from automax_ros.core.types import DataType, Value
 from automax_ros.language.program import Program
 from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS
 from automax_ros.running.task import Task
-from automax_ros.wire.messages import TaskState
+from automax_ros.wire.messages import HELD_MARK, TaskState
 
 _STRING = "$"
 """Only locals are strings: their names tell."""
@@ -58,7 +58,8 @@ def whole_state(bag: Path, layout: Layout, state: TaskState) -> Takeover:
         BagError: it does not fit the layout.
     """
     fields = recorded_fields(bag, state)
-    if [(item.name, item.size) for item in layout.fields] != list(zip(state.field, state.size, strict=True)):
+    recorded = [item for item in zip(state.field, state.size, strict=True) if not item[0].startswith(HELD_MARK)]
+    if [(item.name, item.size) for item in layout.fields] != recorded:
         raise BagError("AMX6831", bag, f"the states of task {state.task[:40]} have other fields than the task")
     return Takeover([value for field in layout.fields for value in _typed(bag, state, field, fields[field.name])], ())
 
@@ -137,6 +138,24 @@ def state_differences(bag: Path, task: Task, state: TaskState) -> list[tuple[str
             if not same:
                 found.append((f"{field.name}({index})" if field.is_array else field.name, value, own[position]))
             position += 1
+    return found
+
+
+def held_in(bag: Path, task: Task, state: TaskState) -> dict[str, Value]:
+    """Return the locals that a force holds after a state, with their values, as far as the task has them.
+
+    Raises:
+        BagError: the state's lists do not fit together, or a value is none that the local can have.
+    """
+    names = [name.removeprefix(HELD_MARK) for name in state.field if name.startswith(HELD_MARK)]
+    if not names:
+        return {}
+    fields = recorded_fields(bag, state)
+    known = {field.name: field for field in task.layout.fields if field.role is Role.LOCAL and not field.is_array}
+    found: dict[str, Value] = {}
+    for name in names:
+        if name in known and len(fields.get(name, ())) == 1 and known[name].type is not DataType.STRING:
+            found[name] = next(_typed(bag, state, known[name], fields[name]))
     return found
 
 

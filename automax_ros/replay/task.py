@@ -15,7 +15,7 @@ from automax_ros.replay.compare import Found, Tallies
 from automax_ros.replay.comparison import ScanComparison
 from automax_ros.replay.inputs import ScanMemory
 from automax_ros.replay.report import Kind, TaskReport
-from automax_ros.replay.state import fitting_state, log_is_empty, state_differences, whole_state
+from automax_ros.replay.state import fitting_state, held_in, log_is_empty, state_differences, whole_state
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.basic_task import make_task
@@ -149,8 +149,8 @@ class TaskReplay:
     def take_state(self, state: TaskState, log_time: int, *, counted: bool) -> None:
         """Begin with a recorded state, or compare it with ours; what an operator has done since is done here too.
 
-        Between two scans a state changes by operations alone: a tunable was set, the error log cleared, the task
-        installed again.
+        Between two scans a state changes by operations alone: a tunable was set, a local forced, the error log
+        cleared, the task installed again.
 
         Raises:
             BagError: it does not fit the task.
@@ -177,6 +177,7 @@ class TaskReplay:
             self._adopt(state)
             return
         self._tunables.set_again(self._task, state)
+        self._follow_forces(state)
         if between and log_is_empty(state):
             self._task.errors.clear()
         if counted and not self._source.edited and not self._tolerance and state.layout_hash == self._layout_hash:
@@ -194,7 +195,7 @@ class TaskReplay:
         Where the module of the task loses locals, they are lost here too.
         """
         if operation.ok and operation.what in ("stop_all", "power_off") and not self._source.keeps_locals:
-            self._task.compiled.layout.lose_locals(self._task.state)
+            self._task.lose_locals()
         installs = operation.what in ("reload", "delete") or (operation.what == "power_on" and not self._last)
         self._installed_again |= operation.ok and operation.task in ("", self.name) and installs
 
@@ -286,12 +287,19 @@ class TaskReplay:
             self._task.restore(taken.values)
         except (ValueError, OverflowError) as error:
             raise BagError("AMX6813", self._bag, f"wrong state of task {self.name}: {error}") from error
+        self._follow_forces(state)
         self._tunables.know(state)
         self._task.scan_number = self._last = state.scan
         self._task.status = Status.RUNNING
         self._stopped_in = None
         self.memory.apart.clear()
         self._synchronous = True
+
+    def _follow_forces(self, state: TaskState) -> None:
+        """Hold the locals that are forced from this state on, and release the others."""
+        held = held_in(self._bag, self._task, state)
+        if held != self._task.forces:
+            self._task.hold(held)
 
     def _take_up(self, source: ReplaySource) -> None:
         """Execute a source from now on; its states are those of what ran when it was recorded."""

@@ -32,6 +32,7 @@ class CommonMemory(Image):
         super().__init__(views)
         self.sequence = 0
         self._forced: set[tuple[int, int]] = set()
+        self._locals_forced = False
         self._force_watchers: list[Callable[[], None]] = []
         self._log: list[Write] | None = None
         self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
@@ -96,6 +97,12 @@ class CommonMemory(Image):
         """What is forced: pairs of view and element."""
         return frozenset(self._forced)
 
+    def note_locals(self, writer: int = 0, *, forced: bool, told: bool = True) -> None:
+        """Take over whether variables of tasks are forced; unless ``told``, FORCINGSTATUS@ shows it already."""
+        self._locals_forced = forced
+        if told:
+            self._forces_changed(writer)
+
     def is_forced(self, view: int) -> bool:
         """Return whether a force holds a simple view."""
         return (view, 0) in self._forced
@@ -135,9 +142,9 @@ class CommonMemory(Image):
 
     def _forces_changed(self, writer: int) -> None:
         """Keep the pre-defined FORCINGSTATUS@ TRUE while anything is forced (2.4.6), and tell who watches."""
-        view = self._index.get(FORCING)
-        if view is not None and self._cells[view] is not bool(self._forced):
-            self._store(view, 0, bool(self._forced), writer, WriteKind.OUTSIDE)
+        view, forced = self._index.get(FORCING), bool(self._forced) or self._locals_forced
+        if view is not None and self._cells[view] is not forced:
+            self._store(view, 0, forced, writer, WriteKind.OUTSIDE)
         for changed in self._force_watchers:
             changed()
 

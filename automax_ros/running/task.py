@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
@@ -65,7 +65,8 @@ class Task:
     def install(self, compiled: CompiledTask) -> None:
         """Begin again, with this or another program: state and error log are as at installation (2.4.5)."""
         self._put_down()
-        self.compiled = compiled
+        self.compiled = compiled.holding(frozenset())
+        self.forces: dict[str, Value] = {}
         self.plan = self.memory.plan([self.memory.view(name) for name in compiled.latched])
         self.written = tuple(self.memory.view(name) for name in compiled.written)
         self._state: StateValues = compiled.layout.fresh()
@@ -189,9 +190,11 @@ class Task:
             self._too_long(error)
         except BaseException:
             self.errors, self._under_way = scan.log or ErrorLog(), None
+            self._take_up_forces()
             raise
         self.scan_number += 1
         self._state, self._under_way = scan.state, None
+        self._take_up_forces()
         if outcome:
             self._over(outcome, now_ns)
         return record
@@ -279,6 +282,40 @@ class Task:
         if not low <= stored <= high:
             raise ValueError(f"{name} = {value:.8g} lies outside {low:.8g} to {high:.8g}")
         return stored
+
+    def hold(self, forces: Mapping[str, Value]) -> None:
+        """Hold these simple locals, and no others, at values of their types against every write of the task.
+
+        A scan that is under way in modeled time ends first, and as it began (decision). ``forces`` has what was asked
+        for, ``held`` what is heeded.
+        """
+        self.forces = dict(forces)
+        if self._under_way is None:
+            self._take_up_forces()
+
+    @property
+    def held(self) -> dict[str, Value]:
+        """The locals that the next scan finds held, with their values, by name."""
+        layout, state = self.compiled.layout, self._state
+        found: dict[str, Value] = {}
+        for name in sorted(self.compiled.held):
+            value = state[layout.index(name)]
+            assert not isinstance(value, list)
+            found[name] = value
+        return found
+
+    def lose_locals(self) -> None:
+        """Set the locals to their values at installation; what is forced keeps its value, tunables too."""
+        self.compiled.layout.lose_locals(self.state, self.forces)
+
+    def _take_up_forces(self) -> None:
+        """Scan from now on in the form that keeps the forced locals, which have their values."""
+        if not self.forces and not self.compiled.held:
+            return
+        self._put_down()
+        self.compiled = self.compiled.holding(frozenset(self.forces))
+        for name, value in self.forces.items():
+            self._state[self.compiled.layout.index(name)] = value
 
     def _look_at_forces(self) -> None:
         """Scan from now on in the form that heeds forces, or in the quick one."""

@@ -214,6 +214,8 @@ class UInt8MultiArray(NamedTuple):
     data: Sequence[int] = ()
 
 
+HELD_MARK = "forced "
+"""Begins the fields without values that stand first in a TaskState: the names of the locals that a force holds."""
 _OWN = (CommonImage, CommonWrite, Operation, Scan, ScanError, TaskState, Values, Variable, VariableTable, Writer)
 _STANDARD = (
     Bool,

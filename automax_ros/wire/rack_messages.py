@@ -18,6 +18,7 @@ from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import Write
 from automax_ros.wire.messages import (
+    HELD_MARK,
     NAMES,
     NO_LAYOUT,
     NO_VALUES,
@@ -284,6 +285,7 @@ class RackMessages:
         """Return a snapshot of a task's state."""
         known = self._tasks[task]
         values = task.snapshot()
+        marks = [HELD_MARK + name for name in sorted(task.compiled.held)]
         return TaskState(
             self.stamp(now_ns),
             known.slot,
@@ -291,8 +293,8 @@ class RackMessages:
             task.scan_number,
             known.layout_hash,
             known.source_hash,
-            known.fields,
-            known.sizes,
+            [*marks, *known.fields] if marks else known.fields,
+            [*([0] * len(marks)), *known.sizes] if marks else known.sizes,
             [0.0 if isinstance(value, str) else float(value) for value in values],
             [value for value in values if isinstance(value, str)],
         )

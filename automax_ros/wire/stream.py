@@ -12,6 +12,7 @@ from functools import partial
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Value
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
@@ -74,6 +75,7 @@ class _TaskStream:
         self.states: list[Take] = []
         self.each_state: list[Take] = []
         self.next_full_ns = 0
+        self.held: dict[str, Value] = {}
 
 
 class RackStream:
@@ -226,7 +228,7 @@ class RackStream:
             self._send_log(writes[own:])
         if writes:
             self._send_values({entry[4]: None for entry in writes}, now)
-        if full or not record.scan:
+        if full or not record.scan or ((stream.held or task.compiled.held) and stream.held != task.held):
             self._send_state(task, now)
         elif stream.each_state:
             self._send_state(task, now, stream.each_state)
@@ -263,7 +265,9 @@ class RackStream:
         return topics
 
     def _send_state(self, task: Task, now_ns: int, takes: Collection[Take] | None = None) -> None:
-        takes = self._tasks[task].states if takes is None else takes
+        stream = self._tasks[task]
+        if takes is None:
+            takes, stream.held = stream.states, task.held
         if takes:
             _send(self._messages.state(task, now_ns), takes)
 
@@ -315,7 +319,7 @@ class RackStream:
 
 
 def _as_installed(task: Task) -> bool:
-    return task.snapshot() == task.layout.flatten(task.layout.fresh())
+    return not task.compiled.held and task.snapshot() == task.layout.flatten(task.layout.fresh())
 
 
 def own_from(writes: Sequence[Write], writer: int) -> int:

@@ -105,7 +105,7 @@ class UdcModule:
         self._count = self._missed = 0
         self._memory.image.clear(self._local)
         for item in self.tasks:
-            item.task.compiled.layout.lose_locals(item.task.state)
+            item.task.lose_locals()
 
     def follow(self) -> None:
         """Scan while the common clock runs and a task takes part, every TICKS of its intervals."""

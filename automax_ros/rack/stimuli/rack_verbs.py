@@ -16,6 +16,7 @@ from automax_ros.core.yaml_text import Mapping as Keys
 from automax_ros.core.yaml_text import Node, Scalar, Sequence
 from automax_ros.rack.files import FileFault, stays_next_to
 from automax_ros.rack.findings import Findings
+from automax_ros.rack.local_names import local_named
 from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.scalars import boolean_value, is_plain_word, kind_of, text_value, wrong_kind
@@ -24,7 +25,7 @@ from automax_ros.rack.settings import CommonElement, common_named
 from automax_ros.rack.stimuli.controls import control_verbs
 from automax_ros.rack.stimuli.operating import OnRack, OnTask, OnValue, Reload
 from automax_ros.rack.stimuli.reading import Read, Verb, cut_short, named, time_of, value_for
-from automax_ros.rack.stimuli.signals import RackSignals
+from automax_ros.rack.stimuli.signals import RackSignals, Signal, local_signal
 from automax_ros.rack.stimuli.stage import Action
 from automax_ros.rack.stimuli.values import value_verbs
 from automax_ros.rack.task_source import read_task_source
@@ -136,12 +137,27 @@ class _Tasks:
         return OnValue(f"{task.name}.{symbol.name}", value, self.rack.adjust.tune)
 
 
-def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None:
-    """Return a common that may be forced: a simple one that is not a STRING."""
+def _forceable(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
+    """Return a variable that may be forced: a simple one that is not a STRING."""
     if "." in key.text:
-        message = f"{quoted(key.text)}: a task's own variable cannot be forced, only a common can"
-        findings.add("AMX6737", message, key.span)
+        return _local(rack, key, findings)
+    meant = _common(rack, key, findings)
+    return None if meant is None else RackSignals(rack).signal(meant)
+
+
+def _local(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
+    try:
+        meant = local_named(rack.tasks, key.text)
+    except NameFault as fault:
+        findings.add("AMX6735", fault.message, key.span, cut_short(key.text) or fault.hint)
         return None
+    if meant.why_not_forced is not None:
+        findings.add("AMX6737", f"{meant.label} cannot be forced: {meant.why_not_forced}", key.span)
+        return None
+    return local_signal(rack, meant)
+
+
+def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None:
     try:
         meant = common_named(rack.config, key.text)
     except NameFault as fault:
@@ -159,20 +175,19 @@ def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None
 
 def _force(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
     found: list[Action] = []
-    signals = RackSignals(rack)
     for key, item in named(node, what, findings):
-        meant = _common(rack, key, findings)
-        value = value_for(item, signals.signal(meant), findings) if meant is not None else None
+        meant = _forceable(rack, key, findings)
+        value = value_for(item, meant, findings) if meant is not None else None
         if meant is not None and value is not None:
-            found.append(OnValue(meant.name, value, rack.adjust.force))
+            found.append(OnValue(meant.label, value, rack.adjust.force))
     return found
 
 
 def _unforce(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
     if isinstance(node, Scalar) and node.text == ALL:
         return [OnRack(rack.adjust.unforce)]
-    commons = [_common(rack, name, findings) for name in names_of(node, what, findings)]
-    return [OnTask(item.name, partial(_release, rack)) for item in commons if item is not None]
+    variables = [_forceable(rack, name, findings) for name in names_of(node, what, findings)]
+    return [OnTask(item.label, partial(_release, rack)) for item in variables if item is not None]
 
 
 def _release(rack: Rack, name: str) -> None:

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType, Value
+from automax_ros.rack.local_names import LocalElement
 from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import CommonElement, common_named
@@ -83,6 +84,18 @@ class RackSignals:
         if not self.rack.operations.powered and not self.rack.config.is_input(meant.variable):
             return
         self.rack.write_view(view, [(meant.index, value)], OPERATOR_WRITER)
+
+
+def local_signal(rack: Rack, meant: LocalElement) -> Signal:
+    """Return a simple local of a task, which can be set in no way but by a force."""
+    kind = meant.symbol.type
+    force = partial(rack.adjust.force, meant.label)
+    return Signal(meant.label, kind, 0, *kind.range, partial(_present, meant), force, force)
+
+
+def _present(meant: LocalElement) -> Value:
+    value = meant.task.value(meant.symbol.name)
+    return value[meant.element.index] if isinstance(value, list) else value
 
 
 @dataclass(frozen=True)
