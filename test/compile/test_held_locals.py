@@ -1,4 +1,4 @@
-"""A force holds a task's own variables: whatever the compiled task writes to them, all that reads them sees the force."""
+"""A force holds a task's own variables: whatever the task writes to them, all that reads them sees the force."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from automax_ros.compile.scan_io import Suspension
 from automax_ros.running.channels import Channels
-from automax_ros.running.task import SCAN_TOO_LONG, Status, Task
+from automax_ros.running.task import Status, Task
 
 from .support import basic_task_of, compiled_of, task_of
 
@@ -19,7 +19,7 @@ EACH_WRITE = {
     "a branch": "110 IF SEEN% >= 0 THEN X% = 9",
     "READ": "105 RESTORE\n110 READ X%\n200 DATA 8",
     "a block": "110 CALL SUMMER(INPUT1=X%, INPUT2=100, OUTPUT=X%)",
-    "a block with a history": "110 CALL LAG(INPUT=1000, WLG=50.0, RESET=FALSE, OUTPUT=X%)",
+    "a block with a history": "105 Y% = 1000\n110 CALL LAG(INPUT=Y%, WLG=50.0, RESET=FALSE, OUTPUT=X%)",
     "a FOR that is over at once": "110 FOR X% = 1 TO 4\n111 Y% = Y% + 1\n112 NEXT X%",
     "GOSUB": "110 GOSUB 300\n120 GOTO 320\n300 X% = 11\n310 RETURN\n320 Y% = 0",
 }
@@ -61,7 +61,7 @@ def test_each_kind_of_write_leaves_a_held_local_as_it_is(lines: str, scan: Scan)
 
 def test_a_block_goes_on_as_if_its_output_were_not_held() -> None:
     """Only what reads the local sees the force: the history of the block that writes it is its own."""
-    lines = "110 CALL LAG(INPUT=1000, WLG=50.0, RESET=FALSE, OUTPUT=X%)"
+    lines = "105 Y% = 1000\n110 CALL LAG(INPUT=Y%, WLG=50.0, RESET=FALSE, OUTPUT=X%)"
     held, free = task_of(source(lines))[0], task_of(source(lines))[0]
     held.hold({"X%": HELD})
     held.run(), free.run()
@@ -79,7 +79,7 @@ def test_a_loop_whose_variable_is_held_inside_its_limits_faults_the_task(scan: S
     task.run()
     scan(task)
     assert task.status is Status.FAULTED
-    assert [(entry.line, entry.problem) for entry in task.errors.entries] == [(110, SCAN_TOO_LONG)]
+    assert [(entry.line, entry.problem) for entry in task.errors.entries] == [(110, "AMX7040")]
 
 
 @pytest.mark.parametrize("held", [-3, 9])

@@ -1,17 +1,23 @@
-"""Recordings of racks in which locals of tasks were forced: a replay holds them too, from any place of the recording."""
+"""Recordings of racks in which locals of tasks were forced: a replay holds them too, wherever it begins."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+from bags.live_racks import build
 
 from automax_ros.rack.rack import Rack
 
+from . import test_replay_basic_tasks as basic
 from . import test_replay_udc as udc
-from .replays import SPEED, WORK, YAML, busy, edited, recorded, replayed
+from .replays import SPEED, WORK, YAML, busy, edited, record, recorded, replayed
 
-BASIC = YAML.replace("WORK: {priority: 8}", "WORK: {priority: 8}\n      BACK: {file: BACK.BAS, priority: 9}")
 MODELED = YAML.replace("slots:", "execution: modeled\nslots:", 1)
-LONG = edited(WORK, ("I% = 0 TO 2", "I% = 0 TO 2 STEP 1"))
+
+
+def build_modeled(folder: Path) -> Rack:
+    return build(folder, MODELED, SPEED=SPEED, WORK=WORK)
 
 
 def forcing(rack: Rack, number: int) -> None:
@@ -51,3 +57,64 @@ def test_an_edited_task_has_the_same_locals_forced(bag):
     assert replayed(bag, slow, from_ns=230 * 10**6, to_ns=470 * 10**6).identical
     report = replayed(bag, slow, from_ns=530 * 10**6, to_ns=700 * 10**6)
     assert "OUT%" in {item.name for item in report.differences}
+
+
+def at_odd_instants(rack: Rack, number: int) -> None:
+    """Force in the middle of scans: WIND_B and the tasks of the Processor are under way at some of these instants."""
+    rack.write("FB%", number * 7 % 23)
+    if number % 3 == 1:
+        rack.adjust.force("WIND_A.N%", number)
+        rack.adjust.force("SPEED.N%", number)
+    if number % 9 == 4:
+        rack.operations.stop_all("for the test")
+    if number % 9 == 6:
+        rack.operations.run_all()
+    if number % 6 == 5:
+        rack.adjust.unforce(["WIND_A.N%"])
+
+
+@pytest.mark.parametrize("top", ["", "execution: modeled\n"], ids=["ideal", "modeled"])
+def test_forced_locals_of_a_udc_replay_through_stop_all(tmp_path, top):
+    yaml = udc.YAML.format(top=top)
+    bag = recorded(tmp_path / "rack", at_odd_instants, seconds=1.97, yaml=yaml, **udc.SOURCES)
+    for from_ms in (0, 433, 1111):
+        report = replayed(bag, from_ns=from_ms * 10**6)
+        assert report.identical, report.first
+        assert sum(task.scans for task in report.tasks) > 200
+
+
+def of_basic_tasks(rack: Rack, number: int) -> None:
+    basic.steps(rack, number)
+    if number % 4 == 1:
+        rack.adjust.force("READER.A%", number)
+        rack.adjust.force("SENDER.N%", number * 3)
+    if number % 4 == 3:
+        rack.unforce("SENDER.N%")
+    if number in (7, 13):
+        rack.force("READER.I%", 2)
+    if number in (8, 15):
+        rack.unforce("READER.I%")
+
+
+@pytest.mark.parametrize("execution", ["ideal", "modeled"])
+def test_forced_locals_of_basic_tasks_replay(tmp_path, execution):
+    bag = record(basic.rack_of(tmp_path, execution), tmp_path / "bag", of_basic_tasks, seconds=1.983)
+    for from_ms in (0, 330, 777, 1300):
+        report = replayed(bag, from_ns=from_ms * 10**6)
+        assert report.identical, report.differences
+
+
+def test_a_scan_under_way_is_replayed_as_it_began(tmp_path):
+    """Slices of 1.7 ms: many forces come while a modeled scan is under way."""
+    late = []
+
+    def often(rack: Rack, number: int) -> None:
+        rack.force("SPEED.SUM%", number)
+        late.append(rack.task("SPEED").held != rack.task("SPEED").forces)
+        if number % 3 == 2:
+            rack.unforce("SPEED.SUM%")
+
+    rack = build_modeled(tmp_path)
+    bag = record(rack, tmp_path / "bag", often, slices=600, seconds=1.02)
+    assert sum(late) > 5
+    assert replayed(bag).identical

@@ -168,6 +168,22 @@ def test_forces_and_releases(tmp_path):
     assert (rack.memory.forced, rack.value("FORCINGSTATUS@")) == (frozenset(), False)
 
 
+def test_locals_are_forced_and_released(tmp_path):
+    text = (
+        "- {at: 0.0015, force: {SPEED.SEEN%: 7, DRAW.N%: 5}}\n- {at: 0.0035, unforce: DRAW.N%}\n"
+        "- {at: 0.0065, unforce: all}\n"
+    )
+    rack = rack_in(tmp_path)
+    playing(rack, tmp_path, text)
+    rack.run(0.003)
+    assert (rack.task("SPEED").value("SEEN%"), rack.task("DRAW").value("N%")) == (7, 5)
+    rack.run(0.003)
+    assert [item.name for item in rack.forces()] == ["SPEED.SEEN%"]
+    assert (rack.task("SPEED").value("SEEN%"), rack.task("DRAW").value("N%")) == (7, 6)
+    rack.run(0.002)
+    assert (rack.task("SPEED").value("SEEN%"), rack.value("FORCINGSTATUS@")) == (0, False)
+
+
 def test_a_forced_common_cannot_be_set_and_a_wave_goes_on_under_the_force(tmp_path):
     text = (
         "- {at: 0, ramp: {REF%: {to: 100, over: 0.01}}}\n- {at: 0.0025, force: {REF%: 7}}\n"
