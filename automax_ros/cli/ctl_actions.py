@@ -168,7 +168,7 @@ ACTIONS: Mapping[str, Action] = {
         _values,
         _value_lines,
     ),
-    "force": Action("hold commons at values against every write", _each_assignment("force"), _assignments),
+    "force": Action("hold commons or TASK.NAME at values against every write", _each_assignment("force"), _assignments),
     "unforce": Action("end forces", _release, _released),
     "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=_values, lines=_value_lines),
     "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments),

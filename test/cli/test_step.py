@@ -205,7 +205,15 @@ def test_lines_are_edited_and_completed_on_a_terminal(automax, step):
 
 def test_a_forced_local_keeps_its_value_from_line_to_line(step):
     found = lines(
-        step("set RUN@=on", "force speed.n%=5", "watch SPEED.N%", "scan SPEED 3", "show SUM!", "unforce all", "scan SPEED")
+        step(
+            "set RUN@=on",
+            "force speed.n%=5",
+            "watch SPEED.N%",
+            "scan SPEED 3",
+            "show SUM!",
+            "unforce all",
+            "scan SPEED",
+        )
     )
     assert "SUM! 15" in found
     assert [line for line in found if line.startswith("SPEED.N% 5 ->")] == ["SPEED.N% 5 -> 6"]
