@@ -94,6 +94,7 @@ class ScheduledTask:
         """Stop the task: no scan happens until it is put into RUN again; one under way is given up."""
         self.trigger.disarm()
         self._execution.drop(self)
+        self.task.heed_forces()
         self.task.stop()
 
     def install(self, compiled: CompiledTask, source: SourceText) -> None:
@@ -179,6 +180,7 @@ class ScheduledTask:
     def fault(self, code: int) -> None:
         """Fault the task for a scan that cannot be; one under way is given up."""
         self._execution.drop(self)
+        self.task.heed_forces()
         self._after(self.task, self.task.fault(code, self._scheduler.now_ns))
 
     def _begin(self, now_ns: int, skipped: int) -> None:

@@ -181,6 +181,7 @@ class BasicTask(Task):
 
         Returns an empty record, as scan 0, if bursts are recorded.
         """
+        self.heed_forces()
         self.compiled.layout.restart(self.state)
         self.status, self.scan_number = Status.RUNNING, 0
         self._fresh()

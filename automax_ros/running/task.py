@@ -67,6 +67,7 @@ class Task:
         self._put_down()
         self.compiled = compiled.holding(frozenset())
         self.forces: dict[str, Value] = {}
+        self._forces_wait = False
         self.plan = self.memory.plan([self.memory.view(name) for name in compiled.latched])
         self.written = tuple(self.memory.view(name) for name in compiled.written)
         self._state: StateValues = compiled.layout.fresh()
@@ -114,6 +115,7 @@ class Task:
 
         Returns the record of that part, as scan 0, if scans are recorded.
         """
+        self.heed_forces()
         self.compiled.layout.restart(self.state)
         self.status, self.scan_number = Status.RUNNING, 0
         record = self._begin_record(now_ns, 0, self._io)
@@ -133,6 +135,7 @@ class Task:
         record = self._begin_record(now_ns, skipped, self._io) if self._recording else None
         self.memory.now_ns = now_ns
         if self._scans is None:
+            self.heed_forces()
             scans = self.compiled.scans_forced if self._forced else self.compiled.scans
             self._scans = scans(self._state, self._io)
         try:
@@ -165,6 +168,7 @@ class Task:
         """
         if self.status is not Status.RUNNING:
             return None
+        self.heed_forces()
         if self._scans is not None:
             self._put_down()
         self._heard.heard = []
@@ -190,11 +194,11 @@ class Task:
             self._too_long(error)
         except BaseException:
             self.errors, self._under_way = scan.log or ErrorLog(), None
-            self._take_up_forces()
-            raise
+            raise  # Forces that wait go on doing so: a scan may be given up by the garbage collector, amid anything.
         self.scan_number += 1
         self._state, self._under_way = scan.state, None
-        self._take_up_forces()
+        if self._forces_wait:
+            self.heed_forces()
         if outcome:
             self._over(outcome, now_ns)
         return record
@@ -290,8 +294,8 @@ class Task:
         for, ``held`` what is heeded.
         """
         self.forces = dict(forces)
-        if self._under_way is None:
-            self._take_up_forces()
+        self._forces_wait = True
+        self.heed_forces()
 
     @property
     def held(self) -> dict[str, Value]:
@@ -308,10 +312,11 @@ class Task:
         """Set the locals to their values at installation; what is forced keeps its value, tunables too."""
         self.compiled.layout.lose_locals(self.state, self.forces)
 
-    def _take_up_forces(self) -> None:
-        """Scan from now on in the form that keeps the forced locals, which have their values."""
-        if not self.forces and not self.compiled.held:
+    def heed_forces(self) -> None:
+        """Scan from now on in the form that keeps the forced locals, which have their values; not amid a scan."""
+        if not self._forces_wait or self._under_way is not None:
             return
+        self._forces_wait = False
         self._put_down()
         self.compiled = self.compiled.holding(frozenset(self.forces))
         for name, value in self.forces.items():

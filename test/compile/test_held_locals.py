@@ -120,6 +120,7 @@ def test_a_scan_under_way_ends_as_it_began() -> None:
     next(steps)
     task.hold({"X%": 6})
     steps.close()
+    task.heed_forces()
     assert (task.value("X%"), task.held) == (6, {"X%": 6})
 
 
