@@ -6,7 +6,7 @@ Each action is one entry of ACTIONS; requests are built here, sent by ``ctl``.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -91,9 +91,15 @@ def _each_assignment(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
 
 
 def _release(given: argparse.Namespace) -> list[Ask]:
+    names = [] if _means_all(given.names) else given.names
     if bool(given.names) == given.all:
         raise UsageError("unforce takes names, or --all")
-    return [Ask("unforce", "automax_msgs/Unforce", {"names": given.names}, " ".join(given.names) or "all")]
+    return [Ask("unforce", "automax_msgs/Unforce", {"names": names}, " ".join(names) or "all")]
+
+
+def _means_all(names: Sequence[str]) -> bool:
+    """Return whether ``all`` stands for names, as in stimuli and in `automax step`; a REAL of that name is ``ALL``."""
+    return list(names) == ["all"]
 
 
 def _reload(given: argparse.Namespace) -> list[Ask]:
@@ -106,7 +112,7 @@ def _reload(given: argparse.Namespace) -> list[Ask]:
 
 
 def _clear(given: argparse.Namespace) -> list[Ask]:
-    tasks = given.tasks or [""]
+    tasks = [""] if _means_all(given.tasks) or not given.tasks else given.tasks
     return [Ask("clear_errors", "automax_msgs/OperateTask", {"task": name}, name or "all tasks") for name in tasks]
 
 

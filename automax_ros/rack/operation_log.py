@@ -28,7 +28,8 @@ class OperationLog:
         is_fault = operation.what == "stop_all" and bool(operation.task or operation.detail)
         if self._is_own() or is_fault or (operation.ok and operation.what not in RACK_ONLY):
             return
-        of = operation.task or operation.detail.partition(" = ")[0]
+        name, assigned, _ = operation.detail.partition(" = ")
+        of = name if assigned or not operation.task else operation.task
         why = "" if operation.ok else operation.reason
         self.happened.append(Happened(operation.at_ns, operation.what, of, operation.ok, why))
 
