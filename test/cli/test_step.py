@@ -220,3 +220,9 @@ def test_a_forced_local_keeps_its_value_from_line_to_line(step):
     refused = step("force SPEED.N%=x", "force SPEED.NONE%=1")
     assert "'x' is not a value for SPEED.N%, type INTEGER" in refused.err + refused.out
     assert "task SPEED has no variable of its own 'NONE%'" in refused.err + refused.out
+
+
+def test_a_forced_local_keeps_its_value_inside_a_scan(step):
+    found = lines(step("set RUN@=on", "force SPEED.N%=5", "break SPEED:130", "go", "line", "show SPEED.N%"))
+    assert "SUM! 0 -> 5" in found
+    assert found[-1] == "SPEED.N% 5"

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from bags.live_racks import build
 
+from automax_ros.bags.recorder import RecordingOptions
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 
 from . import test_replay_basic_tasks as basic
@@ -118,3 +120,21 @@ def test_a_scan_under_way_is_replayed_as_it_began(tmp_path):
     bag = record(rack, tmp_path / "bag", often, slices=600, seconds=1.02)
     assert sum(late) > 5
     assert replayed(bag).identical
+
+
+@pytest.mark.parametrize("yaml", [YAML, MODELED], ids=["ideal", "modeled"])
+def test_each_file_of_a_split_recording_has_the_forces_that_it_begins_with(tmp_path, yaml):
+    def steps(rack: Rack, number: int) -> None:
+        forcing(rack, number)
+        if number % 6 == 3:
+            text = SPEED.replace("INPUT3=100", f"INPUT3={number + 90}")
+            rack.operations.reload("SPEED", SourceText("SPEED.BLK", text), keep_state=number > 9)
+
+    options = RecordingOptions(split_ns=170 * 10**6, every_state=True)
+    bag = recorded(tmp_path / "rack", steps, seconds=1.7, yaml=yaml, options=options)
+    files = sorted(bag.glob("*.mcap"))
+    assert len(files) == 10
+    for file in [bag, *files]:
+        report = replayed(file)
+        assert report.identical, (file, report.first)
+        assert sum(task.states for task in report.tasks) > 30
