@@ -160,7 +160,7 @@ class Operations:
         self._need_power("clear_errors")
         cleared = list(self._tasks.values()) if name is None else [self.find("clear_errors", name)]
         for item in cleared:
-            item.task.errors.clear()
+            item.task.clear_errors()
             if item.task.status is Status.FAULTED:
                 item.task.status = Status.STOPPED
         self._tell("clear_errors", name or "")

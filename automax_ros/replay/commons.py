@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Iterable
 from pathlib import Path
 
 from automax_ros.bags.common_log import CommonLog, Entry, Key
@@ -13,6 +14,9 @@ from automax_ros.rack.config import RackConfig
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.running.registers import RegisterMap
 from automax_ros.wire.messages import CommonImage, CommonWrite
+
+_FORCES_KEPT = 1000
+"""Changes of the force table that are remembered, those of an image included (decision: a bound on memory)."""
 
 
 class UnknownValue(Exception):
@@ -28,7 +32,7 @@ class RecordedCommons(CommonLog):
 
     ``backplane`` finds the registers of its modules.
     ``gaps`` counts places where writes are missing; after one nothing is known until the next image. ``forced`` are the
-    values that a force holds; ``on_forces`` are called when they change.
+    values that a force holds.
     """
 
     def __init__(self, bag: Path, facts: RunFacts, rack: RackConfig) -> None:
@@ -38,7 +42,7 @@ class RecordedCommons(CommonLog):
         self.registers = RegisterMap(view_specs(rack.variables))
         self.gaps = 0
         self.forced: frozenset[Key] = frozenset()
-        self.on_forces: list[Callable[[], None]] = []
+        self._forced_before: deque[tuple[int, frozenset[Key]]] = deque(maxlen=_FORCES_KEPT)
         self._start: list[int] = []
         size = 0
         for item in rack.variables:
@@ -73,6 +77,15 @@ class RecordedCommons(CommonLog):
         """Return whether the recording has told a value."""
         return self._cells[self._start[key[0]] + key[1]] is not None
 
+    def forced_at(self, stamp: int) -> frozenset[Key]:
+        """Return what forces held at an instant not long ago: modeled scans stand in the log where they ended."""
+        forced = self.forced
+        for changed_at, before in reversed(self._forced_before):
+            if changed_at <= stamp:
+                break
+            forced = before
+        return forced
+
     def _odd(self, name: str, value: float) -> Value:
         raise ValueError(f"{name} cannot be {value!r}")
 
@@ -83,19 +96,18 @@ class RecordedCommons(CommonLog):
     def _follow_forces(self, message: CommonImage | CommonWrite) -> None:
         """Take over which values are held: a force tells it, and after an image it is told again."""
         if isinstance(message, CommonImage):
-            self._hold(frozenset())
+            self._hold(frozenset(), message.stamp)
             return
         keys = zip(message.values.variable, message.values.element, strict=False)
         if message.kind == WriteKind.FORCE:
-            self._hold(self.forced.union(keys))
+            self._hold(self.forced.union(keys), message.stamp)
         elif message.kind == WriteKind.RELEASE:
-            self._hold(self.forced.difference(keys))
+            self._hold(self.forced.difference(keys), message.stamp)
 
-    def _hold(self, forced: frozenset[Key]) -> None:
+    def _hold(self, forced: frozenset[Key], stamp: int) -> None:
         if forced != self.forced:
+            self._forced_before.append((stamp, self.forced))
             self.forced = forced
-            for changed in self.on_forces:
-                changed()
 
     def _put(self, entries: Iterable[Entry]) -> None:
         cells, start = self._cells, self._start

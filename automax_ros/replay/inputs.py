@@ -51,6 +51,8 @@ class ScanMemory:
         self._write_count = 0
         self._committed: list[Entry] = []
         self._own: dict[Key, Value] = {}
+        self._forced: frozenset[Key] = frozenset()
+        self._on_forces: list[Callable[[], None]] = []
         self._before: dict[Key, Value] = {}
         """What stood where the recorded scan that is still to come has written already."""
 
@@ -59,12 +61,12 @@ class ScanMemory:
         return self._index[name]
 
     def is_forced(self, view: int) -> bool:
-        """Return whether a force held a simple view when the scan was recorded."""
-        return (view, 0) in self._commons.forced
+        """Return whether a force held a simple view when the recorded scan latched."""
+        return (view, 0) in self._forced
 
     def watch_forces(self, changed: Callable[[], None]) -> None:
-        """Call ``changed`` whenever the recording tells that a force begins or ends."""
-        self._commons.on_forces.append(changed)
+        """Call ``changed`` whenever another set of forces holds for a scan than for the one before."""
+        self._on_forces.append(changed)
 
     def plan(self, views: Sequence[int]) -> LatchPlan:
         """Remember what the task latches."""
@@ -110,6 +112,11 @@ class ScanMemory:
         self._read_count = self._write_count = 0
         self._in_step = True
         self._own.clear()
+        forced = commons.forced_at(scan.stamp) if scan.duration_ns else commons.forced
+        if forced != self._forced:
+            self._forced = forced
+            for changed in self._on_forces:
+                changed()
 
     def latch(self, plan: LatchPlan) -> Latched:  # noqa: ARG002
         """Return what the recorded scan latched, and of what only this task latches or has changed, what it sees."""

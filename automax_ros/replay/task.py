@@ -179,7 +179,7 @@ class TaskReplay:
         self._tunables.set_again(self._task, state)
         self._follow_forces(state)
         if between and log_is_empty(state):
-            self._task.errors.clear()
+            self._task.clear_errors()
         if counted and not self._source.edited and not self._tolerance and state.layout_hash == self._layout_hash:
             self._compare_state(state)
 

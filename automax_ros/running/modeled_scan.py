@@ -14,7 +14,7 @@ from typing import Any
 from automax_ros.compile.scan_io import StateValues
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
-from automax_ros.running.error_log import ErrorLog
+from automax_ros.running.error_log import ErrorLog, LogEntry
 from automax_ros.running.task_io import Call, ScanMemory
 from automax_ros.running.views import LatchPlan
 
@@ -91,7 +91,10 @@ class HeardMemory:
 
 @dataclass(slots=True)
 class ScanUnderWay:
-    """A scan that has begun: ``steps`` counts those it has announced, ``log`` is the error log before it, if any."""
+    """A scan that has begun: ``steps`` counts those it has announced.
+
+    ``log`` is the error log before it, ``own_errors`` what it has logged itself; None where there is nothing.
+    """
 
     began_ns: int
     skipped: int
@@ -99,6 +102,7 @@ class ScanUnderWay:
     log: ErrorLog | None
     memory: HeardMemory
     steps: int = 0
+    own_errors: ErrorLog | None = None
 
     @property
     def progress(self) -> Progress:
@@ -110,3 +114,26 @@ class ScanUnderWay:
             "steps": self.steps,
             "heard": list(self.memory.heard),
         }
+
+
+def add_error(entry: LogEntry, log: ErrorLog, scan: ScanUnderWay | None) -> None:
+    """Log an error, as that of a scan under way if there is one."""
+    log.add(entry)
+    if scan is not None:
+        if scan.own_errors is None:
+            scan.own_errors = ErrorLog()
+        scan.own_errors.add(entry)
+
+
+def cleared_errors(log: ErrorLog, scan: ScanUnderWay | None, *, inside: bool) -> ErrorLog:
+    """Return what is left of a log that is cleared, from ``inside`` the scan under way or by the operator.
+
+    After the operator's clearing there is still what a scan under way logs itself (decision).
+    """
+    if scan is None or inside:
+        log.clear()
+        if scan is not None:
+            scan.own_errors = None
+        return log
+    scan.log = None
+    return scan.own_errors.copy() if scan.own_errors else ErrorLog()

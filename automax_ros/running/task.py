@@ -13,9 +13,9 @@ from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
 from automax_ros.running.backplane import NO_MODULES, Backplane
-from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog
+from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.events import Events
-from automax_ros.running.modeled_scan import HeardMemory, Progress, ScanUnderWay
+from automax_ros.running.modeled_scan import HeardMemory, Progress, ScanUnderWay, add_error, cleared_errors
 from automax_ros.running.scan_record import ScanRecord, Status, Steps
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory
@@ -227,6 +227,14 @@ class Task:
         self._io.log(self.compiled.program.scan_loop_line, code)
         self.status = Status.FAULTED
         return record
+
+    def log_error(self, line: int, code: int) -> None:
+        """Log a run-time error of the scan that is executed."""
+        add_error(LogEntry(line, code, self.present_scan), self.errors, self._under_way)
+
+    def clear_errors(self, *, inside: bool = False) -> None:
+        """Empty the error log, from ``inside`` a scan or as the operator does."""
+        self.errors = cleared_errors(self.errors, self._under_way, inside=inside)
 
     def snapshot(self) -> list[Value]:
         """Return the task's state as flat values, in the order of ``layout``."""

@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
 from automax_ros.running.backplane import BUS_ERROR, Backplane
-from automax_ros.running.error_log import ErrorLog, LogEntry
+from automax_ros.running.error_log import ErrorLog
 from automax_ros.running.events import Events
 from automax_ros.running.printing import format_print
 from automax_ros.running.scan_record import ScanRecord
@@ -43,6 +43,10 @@ class Host(Protocol):
 
     @property
     def present_scan(self) -> int: ...  # noqa: D102
+
+    def log_error(self, line: int, code: int) -> None: ...  # noqa: D102
+
+    def clear_errors(self, *, inside: bool = False) -> None: ...  # noqa: D102
 
 
 class ScanMemory(Protocol):
@@ -92,7 +96,7 @@ class TaskIo:
 
     def log(self, line: int, code: int) -> None:
         """Log a run-time error of this scan."""
-        self._task.errors.add(LogEntry(line, code, self._task.present_scan))
+        self._task.log_error(line, code)
 
     def print_line(self, values: tuple[Value, ...], separators: str) -> None:
         """Print to the task's log."""
@@ -104,11 +108,12 @@ class TaskIo:
 
     def errors_logged(self) -> bool:
         """Return whether the error log holds an entry (TST_ERRLOG@)."""
-        return self._task.errors.count > 0
+        logged: bool = self._hear(lambda: self._task.errors.count > 0)
+        return logged
 
     def clear_errors(self) -> None:
         """Clear the error log (CLR_ERRLOG)."""
-        self._task.errors.clear()
+        self._task.clear_errors(inside=True)
 
     def io_read(self, slot: int, register: int) -> tuple[int, int]:
         """Return a register's word and 0, or 0 and the bus error of a register that does not answer."""

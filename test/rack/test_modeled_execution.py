@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.task import Status
 
 TASK = """10 COMMON {name}%
@@ -309,3 +311,48 @@ def commits_of(rack: Rack, seconds: float) -> list[str]:
     rack.memory.keep_log()
     rack.run(seconds)
     return [rack.memory.specs[write.view].name for write in rack.memory.drain()]
+
+
+ERRORS = """10 COMMON A%
+15 LOCAL NIL%, I%, N%
+20 CALL SCAN_LOOP(TICKS=1)
+30 N% = N% / NIL%
+40 FOR I% = 1 TO 40
+50 A% = A% + 1
+60 NEXT I%
+70 N% = N% / NIL%
+80 END
+"""
+
+
+@pytest.mark.parametrize("later", [False, True])
+def test_an_error_log_that_is_cleared_in_the_middle_of_a_scan_keeps_what_the_scan_logs(tmp_path, later):
+    """Two errors a scan: the second scan has logged one of its two when the log is cleared."""
+    rack = rack_of(tmp_path, {"A": (5, 1)}, tick="5.5")
+    rack.operations.reload("A", SourceText("A.BLK", ERRORS))
+    rack.start()
+    rack.run(0.0058)
+    task = rack.task("A")
+    assert (task.progress is not None, task.errors.count) == (True, 3)
+    rack.operations.clear_errors("A")
+    assert task.errors.entries == [LogEntry(30, 7024, 2)]
+    assert ErrorLog().flatten() == task.snapshot()[-LOG_NUMBERS:]
+    if later:
+        state, rack = rack.state(), rack_of(tmp_path, {"A": (5, 1)}, tick="5.5")
+        rack.operations.reload("A", SourceText("A.BLK", ERRORS))
+        rack.load(state)
+        task = rack.task("A")
+    rack.run(0.003)
+    assert task.progress is None
+    assert task.errors.entries == [LogEntry(30, 7024, 2), LogEntry(70, 7024, 2)]
+    assert task.snapshot()[-LOG_NUMBERS:] == task.errors.flatten()
+
+
+def test_a_scan_that_is_given_up_after_its_error_log_was_cleared_leaves_it_empty(tmp_path):
+    rack = rack_of(tmp_path, {"A": (5, 1)}, tick="5.5")
+    rack.operations.reload("A", SourceText("A.BLK", ERRORS))
+    rack.start()
+    rack.run(0.0058)
+    rack.operations.clear_errors("A")
+    rack.operations.stop("A")
+    assert rack.task("A").errors.count == 0

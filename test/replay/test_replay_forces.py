@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from bags.live_racks import build
 
 from automax_ros.rack.rack import Rack
 
-from .replays import SPEED, busy, edited, recorded, replayed
+from .replays import SPEED, WORK, YAML, busy, edited, record, recorded, replayed
 
 # Later blocks of the scan read what an earlier one writes: they must see the forced value.
 CHAINED = edited(
@@ -49,3 +50,22 @@ def test_an_edited_task_runs_against_the_same_forces(bag):
     assert replayed(bag, halved, from_ns=210 * 10**6, to_ns=490 * 10**6).identical
     report = replayed(bag, halved, from_ns=510 * 10**6, to_ns=790 * 10**6)
     assert "OUT%" in {item.name for item in report.differences}
+
+
+def test_forces_that_change_in_the_middle_of_modeled_scans_replay_too(tmp_path):
+    """Slices of 5.6 ms, scans each 5.5 ms: in turn a force begins, changes and ends at all places of a scan."""
+
+    def each(rack: Rack, number: int) -> None:
+        rack.write("REF%", number * 37 % 500)
+        if number % 2:
+            rack.force("OUT%", number)
+        else:
+            rack.unforce("OUT%")
+
+    (tmp_path / "rack").mkdir()
+    yaml = YAML.replace("rack: LINE1\n", "rack: LINE1\nexecution: modeled\n")
+    rack = build(tmp_path / "rack", yaml, SPEED=CHAINED, WORK=WORK)
+    bag = record(rack, tmp_path / "bag", each, slices=110, seconds=110 * 0.0056)
+    report = replayed(bag)
+    assert report.identical, report.differences[:3]
+    assert report.scans > 150
