@@ -97,7 +97,7 @@ class CommonClock:
         self._looks = False
         drivers = self._drivers()
         if len(drivers) > 1:
-            self._fault(f"{drivers[0]} and {drivers[1]} both drive the common clock", SECOND_DRIVER)
+            self._fault(f"{drivers[0]} and {drivers[1]} both drive the common clock (AMX7072)", SECOND_DRIVER)
             drivers = []
         if bool(drivers) is not self.runs:
             self.since_ns = now_ns if drivers else None

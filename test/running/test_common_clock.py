@@ -69,7 +69,7 @@ def test_a_second_driver_is_code_38_and_the_clock_stops():
     own.scheduler.run_until(500)
     own.write("ISCR4%", 0x40)
     own.scheduler.run_until(1000)
-    assert own.faults == [("udc_3 and udc_4 both drive the common clock", "38")]
+    assert own.faults == [("udc_3 and udc_4 both drive the common clock (AMX7072)", "38")]
     assert own.changes == [0, None]
     assert not own.clock.runs
 

@@ -26,6 +26,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX7040", "scan stopped: too many statements", hardware="14"),
     Problem("AMX7070", "overlap: the last scan was still under way", hardware="14"),
     Problem("AMX7071", "no event within its TIMEOUT"),
+    Problem("AMX7072", "two modules drive the common clock", hardware="38"),
     Problem("AMX7050", "channel or port is not open"),
     Problem("AMX7051", "another task reads the channel"),
     Problem("AMX7052", "TYPE is not the channel's"),
