@@ -38,6 +38,7 @@ STATEMENT_ESTIMATES_US = {
     "Assignment": 6.0,
     "If": 4.0,
     "For": 8.0,
+    "Next": 6.0,
     "Goto": 2.0,
     "Gosub": 4.0,
     "Return": 3.0,
@@ -59,7 +60,7 @@ STATEMENT_ESTIMATES_US = {
     "Get": 30.0,
     "Put": 40.0,
 }
-"""Estimated microseconds on a 7010 by kind of BASIC statement; others take none (decision)."""
+"""Estimated microseconds on a 7010 by kind of BASIC statement, Next for each turn; others take none (decision)."""
 SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8, Model.PC3000: 0.7}
 """How many times the 7010's estimate a BASIC statement takes on each module (decision: the ratios of tables 4 to 6)."""
 
@@ -103,10 +104,17 @@ class CostModel:
         if isinstance(statement, Remark):
             time = self._time(REMARK_TIMES) if statement.costs else None
             return 0 if time is None else _to_ns(time.base)
+        return self._estimate_ns(type(statement).__name__)
+
+    @property
+    def turn_ns(self) -> int:
+        """The estimated time of NEXT, for each turn of a FOR loop that reaches it."""
+        return self._estimate_ns("Next")
+
+    def _estimate_ns(self, statement: str) -> int:
         if self.model is Model.NONE:
             return 0
-        estimate = STATEMENT_ESTIMATES_US.get(type(statement).__name__, 0.0)
-        return _to_ns(estimate * SLOWER_THAN_7010.get(self.model, 1.0))
+        return _to_ns(STATEMENT_ESTIMATES_US.get(statement, 0.0) * SLOWER_THAN_7010.get(self.model, 1.0))
 
     def _scan_part(self, times: Times, program: Program) -> int:
         time = self._time(times)

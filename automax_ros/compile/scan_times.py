@@ -218,6 +218,8 @@ class _Suite:
             return {_Way.NEXT: NOTHING}
         body = self.ways(statement.body)
         turn = body.get(_Way.NEXT)
+        if turn is not None:
+            turn = turn.plus(Span(self.model.turn_ns, self.model.turn_ns))
         most_before = (turns - 1) * turn.most if turns and turn else 0
         left: _Ways = {
             way: Span(span.least, most_before + span.most) for way, span in body.items() if way is not _Way.NEXT

@@ -121,6 +121,7 @@ class StatementLowering:
             self._repeating += 1
             self._lower_straight(statement.body)
             self._repeating -= 1
+            emitter.add_cost(emitter.cost_model.turn_ns)
             with emitter.statement(emitter.line):
                 overflowed = end_turn(emitter, loop)
             if overflowed is not None:
@@ -245,6 +246,7 @@ class StatementLowering:
             emitter.emit(build.when(test, [flow.to_next()], [leave]))
         self._begin_block(flow)
         self._flow_all(flow, statement.body)
+        emitter.add_cost(emitter.cost_model.turn_ns)
         emitter.book_cost()
         with emitter.statement(emitter.line):
             overflowed = end_turn(emitter, loop)

@@ -152,7 +152,9 @@ def test_only_what_is_executed_takes_time(jump):
     assert extra("IF A% = 4 THEN", summer, "END_IF") == pytest.approx(condition)
     assert extra("IF A% = 4 THEN", summer, "ELSE", summer, summer, "END_IF") == pytest.approx(condition + 22.56)
     turns = extra("FOR B% = 1 TO 3", summer.replace("=B%)", "=C%)"), "NEXT B%")
-    assert turns == pytest.approx(STATEMENT_ESTIMATES_US["For"] + 3 * 11.28)
+    assert turns == pytest.approx(STATEMENT_ESTIMATES_US["For"] + 3 * (11.28 + STATEMENT_ESTIMATES_US["Next"]))
+    empty = extra("FOR B% = 1 TO 3", "NEXT B%")
+    assert empty == pytest.approx(STATEMENT_ESTIMATES_US["For"] + 3 * STATEMENT_ESTIMATES_US["Next"])
     read = extra("T%(A%) = T%(A% + 5)")
     assert read == pytest.approx(STATEMENT_ESTIMATES_US["Assignment"])
 
