@@ -115,10 +115,12 @@ class _Inlet:
             self._write(message)
 
     def _write(self, message: Any) -> None:
+        rack, scale = self._node.site.rack, self._variable.scale
         try:
-            scale = self._variable.scale
+            if not rack.operations.powered and not rack.config.is_input(self._variable):
+                raise MemoryValueError(f"the power is off, and {self._variable.name} is not an input")
             values = _elements(self._variable, message) if scale is None else [(0, self._counts(scale, message.data))]
-            self._node.site.rack.write_view(self._view, values, ROS_WRITER)
+            rack.write_view(self._view, values, ROS_WRITER)
         except MemoryValueError as error:
             refusal = f"write refused: {error}"
             self._node.site.health.note("refused write", self._variable.name, lambda: refusal)

@@ -19,6 +19,7 @@ slots:
 common:
   PRESSURE%: {slot: 6, register: 0, ros: in, scale: {counts: [0, 4095], value: [0.0, 10.0]}, unit: bar}
   SPEED%: {slot: 7, register: 3, ros: out, scale: {counts: [-4095, 4095], value: [-1750.0, 1750.0]}, unit: rpm}
+  REF%: {ros: in}
 """
 TASK = "10 COMMON PRESSURE%, SPEED%\n20 CALL SCAN_LOOP(TICKS=1)\n30 SPEED% = -PRESSURE%\n40 END\n"
 
@@ -99,3 +100,17 @@ def test_bars_in_and_revolutions_out(live, client):
         until(live, client, told)
     assert value("PRESSURE%") == 0
     assert [text for text in live.health.news() if "PRESSURE%" in text]
+
+
+def test_without_power_only_inputs_change(live, client):
+    from std_msgs.msg import Float32, Int16
+
+    pressure = client.node.create_publisher(Float32, "/scaled/common/PRESSURE/set", 10)
+    reference = client.node.create_publisher(Int16, "/scaled/common/REF/set", 10)
+    until(live, client, lambda: pressure.get_subscription_count() and reference.get_subscription_count())
+    live.rack.operations.power_off()
+    reference.publish(Int16(data=7))
+    until(live, client, lambda: live.health.counts["refused write"])
+    pressure.publish(Float32(data=10.0))
+    until(live, client, lambda: live.rack.value("PRESSURE%") == 4095)
+    assert live.rack.value("REF%") == 0
