@@ -9,7 +9,7 @@ from pathlib import Path
 from automax_ros.bags.columns import Column, Table, column, require_another_file, unwritable
 from automax_ros.bags.common_log import Cell
 from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
-from automax_ros.bags.whole_file import written_whole
+from automax_ros.bags.whole_file import open_at_once, written_whole
 from automax_ros.core.ticks import seconds_text
 
 TIME = "time_s"
@@ -76,7 +76,10 @@ def write_csv(table: Table, output: Path) -> int:
     cells = [""] * len(formats)
     count = 0
     try:
-        with written_whole(output) as place, place.open("w", encoding="utf-8", newline="") as file:
+        with (
+            written_whole(output) as place,
+            open(place, "w", encoding="utf-8", newline="", opener=open_at_once) as file,
+        ):
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([TIME, *(item.label for item in table.columns)])
             for time, changed in table.rows():

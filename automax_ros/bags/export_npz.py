@@ -13,7 +13,7 @@ from automax_ros.bags.columns import Column, Table, unwritable
 from automax_ros.bags.common_log import Cell
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.export import TIME
-from automax_ros.bags.whole_file import written_whole
+from automax_ros.bags.whole_file import open_at_once, written_whole
 from automax_ros.core.ticks import NS_PER_S
 
 MAX_BYTES = 256 << 20
@@ -52,7 +52,7 @@ def write_npz(bag: Path, table: Table, output: Path) -> int:
     arrays["names"] = np.array([TIME, *(item.label for item in table.columns)])
     arrays["units"] = np.array(["s", *(item.unit for item in table.columns)])
     try:
-        with written_whole(output) as place, place.open("wb") as file:
+        with written_whole(output) as place, open(place, "wb", opener=open_at_once) as file:
             np.savez_compressed(file, **arrays)  # type: ignore[arg-type]  # none is named allow_pickle
     except OSError as error:
         raise unwritable(output, error) from error

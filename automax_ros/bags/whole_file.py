@@ -6,12 +6,16 @@ import contextlib
 import errno
 import os
 import stat
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 _MOST_TRIES = 100
 _LONGEST_SUFFIX = 16
+_READER_S = 1.0
+"""How long a pipe may be without a reader: whoever is started at the same time gets there (decision)."""
+_PAUSE_S = 0.01
 
 
 @contextmanager
@@ -19,13 +23,14 @@ def written_whole(path: Path) -> Iterator[Path]:
     """Give the path to write to, in the same folder and with the same suffix; ``path`` is replaced when the block ends.
 
     If the block ends with an exception the new file is removed, and ``path`` stays as it was. A pipe, /dev/stdout
-    and whatever else is not a regular file is given itself.
+    and whatever else is not a regular file is given itself, open until the block ends.
 
     Raises:
-        OSError: the folder or the file there cannot be written.
+        OSError: the folder or the file there cannot be written, or it is a pipe that nobody reads.
     """
     if is_direct(path):
-        yield path
+        with held_open(path):
+            yield path
         return
     target = Path(os.path.realpath(path))  # a link stays a link
     mode = _mode_of(target)
@@ -39,6 +44,41 @@ def written_whole(path: Path) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             temporary.unlink()
         raise
+
+
+def open_at_once(path: str | os.PathLike[str], flags: int) -> int:
+    """Open a path for writing, as ``open`` takes it for its ``opener``; never wait for a pipe's reader without end.
+
+    Raises:
+        OSError: it cannot be opened; a pipe is refused that nobody has begun to read within a second (decision).
+    """
+    latest = time.monotonic() + _READER_S
+    while True:
+        try:
+            descriptor = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+            break
+        except OSError as error:
+            if error.errno != errno.ENXIO or not stat.S_ISFIFO(os.stat(path).st_mode):
+                raise
+            if time.monotonic() > latest:
+                raise OSError(errno.ENXIO, "it is a pipe and nobody reads it", os.fspath(path)) from error
+        time.sleep(_PAUSE_S)
+    os.set_blocking(descriptor, True)
+    return descriptor
+
+
+@contextmanager
+def held_open(path: Path) -> Iterator[None]:
+    """Keep what is not a regular file open while the block runs, so that a pipe's reader sees no end before it.
+
+    Raises:
+        OSError: it cannot be written, or it is a pipe that nobody reads.
+    """
+    descriptor = open_at_once(path, os.O_WRONLY)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def is_direct(path: Path) -> bool:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Protocol
 
 from automax_ros.cli.numbers import number
+from automax_ros.cli.output_files import opened_for_writing
 from automax_ros.cli.usage import UsageError
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
@@ -158,11 +159,8 @@ def _run_motor(case: BridgeCase, arguments: argparse.Namespace) -> None:
     if arguments.csv is None:
         last = _simulate(case, circuit, duration_s, None)
     else:
-        try:
-            with arguments.csv.open("w", newline="", encoding="utf-8") as file:
-                last = _simulate(case, circuit, duration_s, csv.writer(file, lineterminator="\n"))
-        except OSError as error:
-            raise UsageError(f"{arguments.csv} cannot be written: {error.strerror or error}") from error
+        with opened_for_writing(arguments.csv) as file:
+            last = _simulate(case, circuit, duration_s, csv.writer(file, lineterminator="\n"))
     if arguments.json:
         print(json.dumps(last, indent=2))
     else:

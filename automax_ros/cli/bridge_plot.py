@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.usage import UsageError
 from automax_ros.drive.scr import FORWARD, PHASES, REVERSE, phase_of
 from automax_ros.drive.steady import BridgeCase, Moment, SteadyState, waveforms
@@ -42,9 +43,11 @@ def plot(case: BridgeCase, state: SteadyState, path: Path) -> None:
         fontsize=10,
     )
     try:
-        figure.savefig(path, dpi=150)
+        with written_whole(path) as place:
+            figure.savefig(place, dpi=150)
     except (OSError, ValueError) as error:  # ValueError: a suffix that names no format of pictures
-        raise UsageError(f"{path} cannot be written: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise UsageError(f"{path} cannot be written: {reason}") from error
 
 
 def _draw_voltages(axis: Any, time_ms: list[float], moments: list[Moment], case: BridgeCase) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
+from automax_ros.bags.whole_file import held_open, is_direct, open_at_once, written_whole
 from automax_ros.cli.usage import UsageError
 
 
@@ -23,9 +25,9 @@ def opened_for_writing(path: Path | None) -> Iterator[TextIO]:
         yield sys.stdout
         return
     try:
-        stream = path.open("w", encoding="utf-8", newline="")
+        stream = open(path, "w", encoding="utf-8", newline="", opener=open_at_once)  # noqa: SIM115
     except (OSError, ValueError) as error:
-        raise UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
+        raise _unwritable(path, error) from error
     with stream:
         yield stream
 
@@ -42,22 +44,57 @@ def require_writable(path: Path) -> None:
         raise UsageError(f"{path} cannot be written: it is a folder")
 
 
+@contextmanager
+def held_for_writing(path: Path | None) -> Iterator[None]:
+    """Keep a pipe open from before the work for it until that is written; nothing to do for a regular file.
+
+    Whoever reads a pipe must do so before the work begins (decision): hours of a run are not lost at its end.
+
+    Raises:
+        UsageError: nobody reads it, or it cannot be written.
+    """
+    with ExitStack() as held:
+        if path is not None:
+            try:
+                if is_direct(path):
+                    held.enter_context(held_open(path))
+            except (OSError, ValueError) as error:
+                raise _unwritable(path, error) from error
+        yield
+
+
+def require_folder(key: str, folder: Path) -> None:
+    """Refuse a folder that could not be made or written into, before the work for it begins.
+
+    Raises:
+        UsageError: something else stands there or above it, or it must not be written.
+    """
+    try:
+        there = next(place for place in (folder, *folder.absolute().parents) if place.exists() or place.is_symlink())
+        if not there.is_dir():
+            raise UsageError(f"{key}: {there} is not a folder")
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise UsageError(f"{key}: {there} must not be written")
+    except (OSError, ValueError, RuntimeError) as error:
+        raise UsageError(f"{key}: {folder} cannot be used: {getattr(error, 'strerror', None) or error}") from error
+
+
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
-    """Write data as JSON, as a whole or not at all where the file is a regular one.
+    """Write data as JSON, as a whole or not at all where the file is a regular one; a link stays a link (decision).
 
     Raises:
         UsageError: it cannot be written.
     """
     text = json.dumps(report, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     try:
-        if path.exists() and not path.is_file():
-            path.write_text(text, encoding="utf-8")
-            return
-        partial = path.with_name(f"{path.name}.part")
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
+        with written_whole(path) as place, open(place, "w", encoding="utf-8", opener=open_at_once) as stream:
+            stream.write(text)
     except (OSError, ValueError) as error:
-        raise UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
+        raise _unwritable(path, error) from error
+
+
+def _unwritable(path: Path, error: Exception) -> UsageError:
+    return UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}")
 
 
 PICTURE_FORMATS = (".png", ".svg", ".pdf")

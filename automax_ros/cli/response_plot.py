@@ -7,6 +7,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.usage import UsageError
 from automax_ros.tuning.frequency import decibels, logarithmic
 from automax_ros.tuning.response import BlockResponse, Point, followed
@@ -43,7 +44,8 @@ def plot(response: BlockResponse, path: Path) -> None:
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
     with matplotlib.rc_context({"svg.hashsalt": "automax"}):
         try:
-            figure_of(response).savefig(path, dpi=130, metadata=metadata)
+            with written_whole(path) as place:
+                figure_of(response).savefig(place, dpi=130, metadata=metadata)
         except OSError as error:
             raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
-from automax_ros.cli.output_files import require_different_files, require_writable
+from automax_ros.cli.output_files import held_for_writing, require_different_files, require_folder, require_writable
 from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
 from automax_ros.cli.record_options import add_record_arguments, recording_options
 from automax_ros.cli.ros import prepare_ros
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_watch_argument(parser, "the first published ones")
     parser.add_argument(
         "--state",
-        type=Path,
+        type=_folder,
         metavar="DIR",
         help="keep what outlives a power cycle in this folder from run to run (default on the wall clock: "
         ".automax/RACK next to the rack file; simulated: nowhere)",
@@ -73,13 +73,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _folder(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("names no folder")
+    return Path(text)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
     duration_ns = arguments.duration
     if arguments.simulated and arguments.record is not None and duration_ns is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
     _check_files(arguments)
-    with stop_signals() as stop:
+    with stop_signals() as stop, held_for_writing(arguments.report):
         if not arguments.simulated:
             prepare_ros(WITHOUT_ROS)
         config = config_of(arguments.config, allow_outside=arguments.allow_outside)
@@ -113,7 +119,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_files(arguments: argparse.Namespace) -> None:
-    """Refuse a report that cannot be written, or that would be written over what is read."""
+    """Refuse a report that cannot be written, or that would be written over what is read, and a state's folder."""
+    if arguments.state is not None:
+        require_folder("--state", arguments.state)
     if arguments.report is not None:
         require_writable(arguments.report)
         read = {"CONFIG": arguments.config, "--stimuli": arguments.stimuli}

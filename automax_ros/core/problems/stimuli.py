@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.core.problems.problem import Problem
+from automax_ros.core.problems.problem import Problem, Severity
 
 PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6730", "stimuli file cannot be read"),
@@ -19,4 +19,5 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6741", "tunable in a stimuli file"),
     Problem("AMX6742", "module or plant without such a control"),
     Problem("AMX6743", "too many entries in a stimuli file"),
+    Problem("AMX6744", "stimuli file without entries", Severity.WARNING),
 )

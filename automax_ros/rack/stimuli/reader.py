@@ -69,6 +69,8 @@ def _read(path: Path, verbs: Mapping[str, Verb], elsewhere: tuple[str, ...]) -> 
     if not findings.errors:
         root = read_yaml(source.text, findings.yaml_flaw, "a stimuli file", nodes=_MOST_NODES)
     stimuli = _Reader(verbs, elsewhere, findings).read(root) if root is not None else ()
+    if not stimuli and not findings.errors:
+        findings.add("AMX6744", "the stimuli file holds no entries: it lets nothing happen", _START)
     return StimuliFile(None if findings.errors else tuple(stimuli), findings.in_order(), source)
 
 
