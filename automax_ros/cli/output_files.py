@@ -36,12 +36,17 @@ def require_writable(path: Path) -> None:
     """Refuse a file that could not be written, before the work for it begins.
 
     Raises:
-        UsageError: it is a folder, or there is no such folder for it.
+        UsageError: it is a folder, there is no such folder for it, or one of both must not be written.
     """
     if not path.parent.is_dir():
         raise UsageError(f"{path} cannot be written: there is no folder {path.parent}")
     if path.is_dir():
         raise UsageError(f"{path} cannot be written: it is a folder")
+    target = Path(os.path.realpath(path))
+    if not is_direct(path) and not all(
+        os.access(place, os.W_OK) for place in (target, target.parent) if place.exists()
+    ):
+        raise UsageError(f"{path} cannot be written: it, or its folder, must not be written")
 
 
 @contextmanager

@@ -120,6 +120,14 @@ def test_a_folder_that_must_not_be_written_is_refused_before_the_run(automax, ru
     assert (result.code, "X must not be written" in result.err) == (2, True)
 
 
+def test_a_report_that_must_not_be_written_is_refused_before_the_run(automax, run, monkeypatch):
+    automax.write("end.json", "mine")
+    monkeypatch.setattr("automax_ros.cli.output_files.os.access", lambda place, _: place.name != "end.json")
+    result = run("--report", "end.json", "--record", "out")
+    assert (result.code, "must not be written" in result.err) == (2, True)
+    assert not (automax.folder / "out").exists()
+
+
 def test_a_new_folder_is_made_for_the_state(automax, run):
     assert run("--state", "new/deep").code == 0
 
