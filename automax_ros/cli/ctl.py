@@ -1,7 +1,8 @@
 """Operate a rack that runs, from any process of its ROS 2 domain.
 
-RACK is the rack's name or namespace, or its YAML file. The rack must say `operator: true`; what is asked happens
-between two scans and is recorded. Exit code 0: done; 1: the rack refused something; 2: wrong usage, or no such rack.
+RACK is the rack's name or namespace, or its YAML file or folder. The rack must say `operator: true`; what is asked
+happens between two scans and is recorded. Exit code 0: done; 1: the rack refused something; 2: wrong usage, or
+no such rack.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ DEFAULT_TIMEOUT_S = "5"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax ctl`` and of its actions."""
-    parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file")
+    parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file or folder")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
     for name, action in ACTIONS.items():
         own = actions.add_parser(name, help=action.help, description=action.help)
@@ -73,16 +74,16 @@ def _ok(answer: Any) -> bool:
     return bool(getattr(answer, "ok", getattr(answer, "success", True)))
 
 
-def _reason(answer: Any) -> str:
-    return str(getattr(answer, "reason", getattr(answer, "message", "")))
+def _reason(ask: Ask, answer: Any) -> str:
+    return ask.worded(getattr(answer, "reason", getattr(answer, "message", "")))
 
 
 def _print(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
     for ask, answer in answers:
         for text in getattr(answer, "findings", ()):
-            print(text, file=sys.stderr)
+            print(ask.worded(text), file=sys.stderr)
         if not _ok(answer):
-            print(f"automax ctl: {' '.join((what, ask.of)).strip()}: refused: {_reason(answer)}", file=sys.stderr)
+            print(f"automax ctl: {' '.join((what, ask.of)).strip()}: refused: {_reason(ask, answer)}", file=sys.stderr)
         elif action.read is None:
             print(f"{what} {ask.of}: done" if ask.of else f"{what}: done")
         else:
@@ -93,9 +94,9 @@ def _print(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
 def _print_json(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
     found = []
     for ask, answer in answers:
-        entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": _ok(answer), "reason": _reason(answer)}
+        entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": _ok(answer), "reason": _reason(ask, answer)}
         if getattr(answer, "findings", ()):
-            entry["findings"] = list(answer.findings)
+            entry["findings"] = [ask.worded(text) for text in answer.findings]
         if action.read is not None and _ok(answer):
             entry["answer"] = action.read(answer)
         found.append(entry)

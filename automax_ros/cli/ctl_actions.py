@@ -6,6 +6,7 @@ Each action is one entry of ACTIONS; requests are built here, sent by ``ctl``.
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,12 +20,16 @@ from automax_ros.rack.task_source import read_task_source
 
 @dataclass(frozen=True)
 class Ask:
-    """One request: the service, its type as ``package/Type``, the request's fields, and what it is about."""
+    """One request: the service, its type as ``package/Type``, the request's fields, and what it is about.
+
+    ``worded`` puts the rack's words into the person's, who knows files of this computer.
+    """
 
     service: str
     type_name: str
     fields: Mapping[str, Any] = field(default_factory=dict)
     of: str = ""
+    worded: Callable[[str], str] = str
 
 
 @dataclass(frozen=True)
@@ -108,7 +113,14 @@ def _reload(given: argparse.Namespace) -> list[Ask]:
     except FileFault as fault:
         raise UsageError(f"{given.file} {fault}") from fault
     fields = {"task": given.task, "source": source.text, "keep_state": given.keep_state}
-    return [Ask("reload", "automax_msgs/Reload", fields, f"{given.task} with {given.file}")]
+    worded = _naming_file(given.task.strip().upper(), given.file)
+    return [Ask("reload", "automax_msgs/Reload", fields, f"{given.task} with {given.file}", worded)]
+
+
+def _naming_file(task: str, file: Path) -> Callable[[str], str]:
+    """Return what names a file where the rack names the text of it that was sent: ``SPEED.BLK:1:1``."""
+    sent = re.compile(rf"^{re.escape(task)}\.[A-Za-z]+(?=[: ])", re.MULTILINE)
+    return lambda text: sent.sub(lambda _: str(file), text)
 
 
 def _clear(given: argparse.Namespace) -> list[Ask]:

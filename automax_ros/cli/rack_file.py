@@ -32,6 +32,11 @@ def load_rack_file(path: Path, *, allow_outside: bool) -> LoadResult:
     return result
 
 
+def is_rack_folder(path: Path) -> bool:
+    """Whether a path is a folder with a ``rack.yaml``."""
+    return (path / DEFAULT_RACK_FILE).is_file()
+
+
 def is_text(result: LoadResult) -> bool:
     """Whether a rack file could be read as text; too large, or not UTF-8, it counts as unreadable."""
     return not any(item.code in _NOT_A_TEXT for item in result.diagnostics)
@@ -57,7 +62,7 @@ def _meant(path: Path) -> Path:
     if not path.is_dir():
         return path
     found = path / DEFAULT_RACK_FILE
-    if not found.is_file():
+    if not is_rack_folder(path):
         hint = f"name the rack's YAML file; `automax new {path}` makes one from the folder's tasks"
         raise UsageError(f"{path} is a folder without a {DEFAULT_RACK_FILE}", hint)
     return found

@@ -5,36 +5,36 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from automax_ros.cli.rack_file import is_rack_folder, load_rack_file
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import quoted
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
 from automax_ros.rack.ros_names import namespace
 
 _SPACE = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*){0,7}")
 
 
 def names_file(text: str) -> bool:
-    """Return whether a text names a rack's YAML file rather than a rack."""
+    """Return whether a text names a rack's YAML file, or a folder with a ``rack.yaml``, rather than a rack."""
     path = Path(text)
-    return path.suffix.lower() in {".yaml", ".yml"} or path.is_file()
+    return path.suffix.lower() in {".yaml", ".yml"} or path.is_file() or is_rack_folder(path)
 
 
 def config_of(path: Path) -> RackConfig:
-    """Return what a rack's YAML file says.
+    """Return what a rack's YAML file says, or the ``rack.yaml`` of a folder.
 
     Raises:
-        UsageError: it has errors.
+        UsageError: it has errors, cannot be read or is a task.
     """
-    result = load(path, allow_outside=True)
+    result = load_rack_file(path, allow_outside=True)
     if result.config is None or has_errors(result.diagnostics):
         raise UsageError(f"{path} is not a sound rack file", f"`automax check {path}` shows what is wrong")
     return result.config
 
 
 def space_of(text: str) -> str:
-    """Return the namespace with its slash, such as ``/pm1``, of a rack's name, namespace or YAML file.
+    """Return the namespace with its slash, such as ``/pm1``, of a rack's name, namespace, YAML file or folder.
 
     Raises:
         UsageError: it is none of these.
@@ -45,5 +45,5 @@ def space_of(text: str) -> str:
     if space and "/" not in space:
         space = namespace(space)
     if not _SPACE.fullmatch(space):
-        raise UsageError(f"{quoted(text)} is neither a rack's name or namespace nor a YAML file")
+        raise UsageError(f"{quoted(text)} is neither a rack's name or namespace nor a YAML file or its folder")
     return f"/{space.lstrip('/')}"

@@ -1,8 +1,8 @@
 """Record a rack that runs, from any process of its ROS 2 domain.
 
-RACK is the rack's name or namespace, or its YAML file. The bag is the one that `automax run --record` makes: it begins
-where the rack has sent an image of its common memory, and tasks can be replayed from their first full scan and state
-on; the recorder asks the rack for both. Ctrl-C ends it.
+RACK is the rack's name or namespace, or its YAML file or folder. The bag is the one that `automax run --record` makes:
+it begins where the rack has sent an image of its common memory, and tasks can be replayed from their first full scan
+and state on; the recorder asks the rack for both. Ctrl-C ends it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _GAPS_SHOWN = 20
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax record``."""
-    parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file")
+    parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file or folder")
     parser.add_argument(
         "--output", "-o", type=Path, metavar="DIR", help="the new rosbag2 folder (default: rack and time)"
     )

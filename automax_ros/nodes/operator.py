@@ -6,21 +6,27 @@ Services, all in the rack's namespace: ``run``, ``stop``, ``clear_errors`` (auto
 (automax_msgs/ReadErrors), ``tasks`` (automax_msgs/ReadTasks), ``status`` (automax_msgs/ReadStatus).
 
 A request is carried out between two scans; the answer says whether, and if not, why. The text of a reloaded source
-comes from the caller: no path of the rack's computer is opened (decision).
+comes from the caller: no path of the rack's computer is opened (decision). It is checked and compiled on a thread of
+its own while the rack scans, one at a time: another reload is refused meanwhile (decision: a bound on what callers
+can ask for at once).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from automax_msgs.msg import LoggedError, TaskInfo
 from automax_msgs.srv import OperateTask, ReadErrors, ReadStatus, ReadTasks, ReadValues, Reload, SetValue, Unforce
 from std_srvs.srv import Trigger
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.nodes.later import Later, Respond, allow_later
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.rack.installation import Prepared
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.orders import Orders, ReloadRefused
 from automax_ros.running.task import Status
@@ -48,7 +54,9 @@ class OperatorNode(ModuleNode):
         self._serve(SetValue, "force", lambda request, _: orders.force(request.name, request.value))
         self._serve(SetValue, "tune", lambda request, _: orders.tune(request.name, request.value))
         self._serve(Unforce, "unforce", lambda request, _: orders.unforce(list(request.names)))
-        self._serve(Reload, "reload", self._reload)
+        self._compiler = ThreadPoolExecutor(max_workers=1, thread_name_prefix="reload")
+        self._reloading, self._closed = "", False
+        allow_later(self.create_service(Reload, "reload", self._reload))
         self._serve(ReadValues, "get", self._get)
         self._serve(ReadValues, "forces", self._forces)
         self._serve(ReadErrors, "errors", self._errors)
@@ -57,25 +65,68 @@ class OperatorNode(ModuleNode):
 
     def _serve(self, kind: Any, name: str, answer: Answer) -> None:
         def answered(request: Any, response: Any) -> Any:
-            ok, reason = True, ""
             with self.site.present():
                 try:
                     answer(request, response)
-                except OperationRefused as refused:
-                    ok, reason = False, str(refused)
                 except Exception as error:
-                    self.guard.report(f"a request to {name} was refused", error)
-                    ok, reason = False, f"{type(error).__name__}: {str(error)[:300]}"
-            return _concluded(response, ok=ok, reason=reason)
+                    return self._refused(name, response, error)
+            return _concluded(response, ok=True, reason="")
 
         self.create_service(kind, name, answered)
 
-    def _reload(self, request: Any, response: Any) -> None:
+    def _refused(self, name: str, response: Any, error: Exception) -> Any:
+        if isinstance(error, OperationRefused):
+            return _concluded(response, ok=False, reason=str(error))
+        self.guard.report(f"a request to {name} was refused", error)
+        return _concluded(response, ok=False, reason=f"{type(error).__name__}: {str(error)[:300]}")
+
+    def _reload(self, request: Any, response: Any) -> Any:
         try:
-            response.findings = self._orders.reload(request.task, request.source, keep_state=request.keep_state)
-        except ReloadRefused as refused:
-            response.findings = list(refused.findings)
-            raise
+            with self.site.present():
+                self._refuse_second(request.task)
+                name, source = self._orders.admit_reload(request.task, request.source)
+                self._reloading = name
+        except Exception as error:
+            return self._refused("reload", response, error)
+
+        def begin(respond: Respond) -> None:
+            self._prepare(name, source, lambda prepared: finish(prepared, respond))
+
+        def finish(prepared: Future[Prepared], respond: Respond) -> None:
+            if self._closed:
+                return
+            try:
+                with self.site.present():
+                    if not self._orders.is_current(prepared.result()):
+                        begin(respond)
+                        return
+                    self._reloading = ""
+                    self._orders.install(prepared.result(), keep_state=request.keep_state)
+            except Exception as error:
+                self._reloading = ""
+                response.findings = list(error.findings) if isinstance(error, ReloadRefused) else []
+                respond(self._refused("reload", response, error))
+            else:
+                respond(_concluded(response, ok=True, reason=""))
+
+        return Later(begin)
+
+    def _prepare(self, name: str, source: SourceText, finish: Callable[[Future[Prepared]], None]) -> None:
+        """Prepare a source on the thread for it; then the executor calls ``finish``."""
+        executor = self.executor
+        working = self._compiler.submit(self._orders.prepare, name, source)
+        working.add_done_callback(lambda prepared: executor.create_task(finish, prepared))
+
+    def _refuse_second(self, task: str) -> None:
+        if self._reloading:
+            reason = f"the new source of {self._reloading} is still being compiled: ask again when that is done"
+            self._orders.refuse_reload(task, reason)
+
+    def destroy_node(self) -> None:
+        """Leave the graph; a source that is being compiled is not installed."""
+        self._closed = True
+        self._compiler.shutdown(wait=False, cancel_futures=True)
+        super().destroy_node()
 
     def _get(self, request: Any, response: Any) -> None:
         _fill(response, self._orders.get(list(request.names)))

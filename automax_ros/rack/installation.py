@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.compile.cost import CostModel, Model
@@ -27,6 +28,27 @@ class RackError(Exception):
         self.findings = list(findings)
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """Another source for a task, checked and compiled, that may be installed.
+
+    Attributes:
+        task: its name.
+        source: the source.
+        compiled: what it was compiled to, None with a fault.
+        programs: those of all tasks once it is installed.
+        among: those of all tasks that it was checked against.
+        fault: why it cannot be installed.
+    """
+
+    task: str
+    source: SourceText
+    compiled: CompiledTask | None
+    programs: Mapping[str, Program]
+    among: Mapping[str, Program]
+    fault: RackError | None = None
+
+
 class Installation:
     """All tasks of a rack, compiled; ``warnings`` are what their checks found short of errors."""
 
@@ -39,7 +61,7 @@ class Installation:
         self._config = config
         self._views = {variable.name: view for view, variable in enumerate(config.variables)}
         self._compiled: dict[str, CompiledTask] = {}
-        self._programs: dict[str, Program] = {}
+        self._programs: Mapping[str, Program] = {}
         self.sources: dict[str, SourceText] = {}
         self.warnings: list[Finding] = []
         checked = check_tasks(config)
@@ -50,7 +72,7 @@ class Installation:
         for task, source, result in checked:
             assert result.program is not None
             self.sources[task.name] = source
-            self._programs[task.name] = result.program
+            self._programs = {**self._programs, task.name: result.program}
             if result.diagnostics:
                 self.warnings.append((source, result.diagnostics))
             self._compiled[task.name] = self._compile(task.name, result.program)
@@ -59,16 +81,37 @@ class Installation:
         """Return a task of the rack's file."""
         return self._compiled[task]
 
-    def compile(self, task: str, source: SourceText) -> CompiledTask:
-        """Check and compile another source for a task of the rack.
+    def prepare(self, task: str, source: SourceText) -> Prepared:
+        """Check and compile another source for a task of the rack; any thread may, for nothing is changed."""
+        among = self._programs
+        try:
+            program = self._checked(task, source, among)
+            compiled = self._compile(task, program)
+        except RackError as fault:
+            return Prepared(task, source, None, among, among, fault)
+        return Prepared(task, source, compiled, {**among, task: program}, among)
+
+    def is_current(self, prepared: Prepared) -> bool:
+        """Return whether no task was reloaded since a source was checked against them."""
+        return prepared.among is self._programs
+
+    def take(self, prepared: Prepared) -> CompiledTask:
+        """Let a prepared source be the task's program, and return it compiled.
 
         Raises:
             RackError: the source has errors.
         """
+        if prepared.fault is not None:
+            raise prepared.fault
+        assert prepared.compiled is not None
+        self._programs = prepared.programs
+        return prepared.compiled
+
+    def _checked(self, task: str, source: SourceText, among: Mapping[str, Program]) -> Program:
         module = self._module(task)
         result = check_source(source, task, module.tick_ns, commons_of(self._config), module.times)
         if result.program is not None:
-            found = findings_by_task(self._config, self._programs | {task: result.program})
+            found = findings_by_task(self._config, {**among, task: result.program})
             result = with_findings(result, found.pop(task, ()))
             self._refuse_misfit(task, source, found)
         if result.program is None or has_errors(result.diagnostics):
@@ -77,8 +120,7 @@ class Installation:
         if result.program.kind is not kind:
             what = "a BASIC task" if kind is TaskKind.BASIC else "a control-block task"
             raise RackError(f"task {task} is {what}: {source.name} is another kind of task, restart the rack with it")
-        self._programs[task] = result.program
-        return self._compile(task, result.program)
+        return result.program
 
     def _refuse_misfit(self, task: str, source: SourceText, found: Mapping[str, Sequence[Diagnostic]]) -> None:
         """Refuse a source with which another task, as it runs now, would have errors (decision)."""

@@ -13,7 +13,7 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.forcing import Forcing
-from automax_ros.rack.installation import Installation, RackError
+from automax_ros.rack.installation import Installation, Prepared, RackError
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.names import AUTO_RUN
 from automax_ros.rack.observers import Observers, Operation
@@ -40,7 +40,7 @@ class Operations:
     """Operates one rack. ``stopped`` is what stopped all tasks, None while the rack runs.
 
     ``ran_at_power_off`` are the tasks that AUTO RUN starts again, ``deleted`` those that cannot run until
-    they are reloaded; ``battery_good`` is what BATTERYSTATUSn@ show.
+    they are reloaded; ``battery_good`` is what BATTERYSTATUSn@ show. ``installation`` prepares what ``install`` takes.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Operations:
         """Take the parts of a rack that is built and not yet started."""
         self._forcing = forcing
         self._events, self._channels = events, channels
-        self._config, self._modules, self._installation = config, modules, installation
+        self._config, self._modules, self.installation = config, modules, installation
         self._memory, self._scheduler, self._observers = memory, scheduler, observers
         self._tasks = {item.task.name: item for module in modules for item in module.tasks}
         self._ticks = {item.task.name: module.config.tick_ns for module in modules for item in module.tasks}
@@ -178,10 +178,28 @@ class Operations:
                 power is off.
             RackError: the source has errors.
         """
-        item = self.find("reload", name)
-        self._refuse_critical("reload", item)
+        self.admit_reload(name)
+        self.install(self.installation.prepare(name, source), keep_state=keep_state)
+
+    def admit_reload(self, name: str) -> None:
+        """Do nothing where a task may be reloaded now, whatever its new source is.
+
+        Raises:
+            OperationRefused: as ``reload``.
+        """
+        self._refuse_critical("reload", self.find("reload", name))
+
+    def install(self, prepared: Prepared, *, keep_state: bool = False) -> None:
+        """Do what is left of a ``reload`` whose source was prepared, while no other task was reloaded since.
+
+        Raises:
+            OperationRefused, RackError: as ``reload``.
+        """
+        name, source = prepared.task, prepared.source
+        self.admit_reload(name)
+        item = self._tasks[name]
         try:
-            compiled = self._installation.compile(name, source)
+            compiled = self.installation.take(prepared)
         except RackError as error:
             self._tell("reload", name, ok=False, reason=str(error))
             raise

@@ -1,12 +1,13 @@
 """What an operator asks of a rack in words: names and values as texts, as services and commands bring them.
 
 A text that means nothing is refused with a reason, and the refusal is told to observers, as the rack's own refusals
-are. Everything happens between two scans: whoever calls has seen to that.
+are. Everything but ``prepare`` happens between two scans: whoever calls has seen to that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from automax_ros.core.diagnostics import SourceText, render
@@ -16,7 +17,7 @@ from automax_ros.core.text import printable, quoted
 from automax_ros.core.types import DataType, Value, type_of_name
 from automax_ros.core.values import source_text, value_of, wanted
 from automax_ros.rack.files import MAX_BYTES
-from automax_ros.rack.installation import RackError
+from automax_ros.rack.installation import Prepared, RackError
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
@@ -85,7 +86,7 @@ class Orders:
 
     def tune(self, name: str, value: str) -> None:
         """Set a tunable, ``TASK.NAME``."""
-        self._short("tune", name, MAX_NAME)
+        self._named("tune", name)
         kind = type_of_name("".join(name.split()).upper())
         held = self._value("tune", name, value, kind, 0)
         self._rack.adjust.tune(name, 0 if isinstance(held, str) else held)
@@ -96,17 +97,43 @@ class Orders:
         Raises:
             ReloadRefused: the source has errors; the old one goes on.
         """
+        self.install(self.prepare(*self.admit_reload(task, source)), keep_state=keep_state)
+        return []
+
+    def admit_reload(self, task: str, source: str) -> tuple[str, SourceText]:
+        """Return the task that a reload concerns and its new source: first part of a reload, short.
+
+        What is found is named by the task, such as ``SPEED.BLK:1:1``: the text is not the rack's file (decision).
+        """
         name = self._task("reload", task)
         if len(source) > MAX_BYTES:
             self._refuse("reload", f"a source of {len(source)} characters: at most {MAX_BYTES} are read", name)
-        present = self._rack.sources.get(name)
-        text = SourceText(present.name if present else name, source)
+        self._rack.operations.admit_reload(name)
+        return name, SourceText(f"{name}{Path(self._rack.sources[name].name).suffix}", source)
+
+    def prepare(self, name: str, source: SourceText) -> Prepared:
+        """Check and compile a source: second part of a reload, long; on any thread, while the rack scans."""
+        return self._rack.operations.installation.prepare(name, source)
+
+    def is_current(self, prepared: Prepared) -> bool:
+        """Return whether a source was prepared for the tasks as they are now; else it is prepared again."""
+        return self._rack.operations.installation.is_current(prepared)
+
+    def install(self, prepared: Prepared, *, keep_state: bool = False) -> None:
+        """Let the task have its prepared source: last part of a reload, short.
+
+        Raises:
+            ReloadRefused: the source has errors; the old one goes on.
+        """
         try:
-            self._rack.operations.reload(name, text, keep_state=keep_state)
+            self._rack.operations.install(prepared, keep_state=keep_state)
         except RackError as error:
             found = [render(item, where) for where, items in error.findings for item in items]
             raise ReloadRefused(str(error), found[:_MOST_FINDINGS]) from error
-        return []
+
+    def refuse_reload(self, task: str, reason: str) -> NoReturn:
+        """Refuse a reload for a reason of the caller's."""
+        self._refuse("reload", reason, self._task("reload", task))
 
     def get(self, names: Sequence[str]) -> list[tuple[str, str]]:
         """Return commons, their elements, and variables of tasks (``TASK.NAME``): each name with its value's text."""
@@ -142,7 +169,7 @@ class Orders:
 
     def _common_value(self, what: str, name: str, text: str) -> Value:
         """Return the value that a text writes for a variable; a name that is none is left for the rack to refuse."""
-        self._short(what, name, MAX_NAME)
+        self._named(what, name)
         if "." in name:
             return self._value(what, name, text, type_of_name("".join(name.split()).upper()), 0)
         try:
@@ -158,6 +185,12 @@ class Orders:
             reason = f"{quoted(text)} is not a value for {printable(name)}: it takes {wanted(kind, length)}"
             self._refuse(what, reason)
         return value
+
+    def _named(self, what: str, name: str) -> None:
+        self._short(what, name, MAX_NAME)
+        if not name.strip():
+            wants = "TASK.NAME" if what == "tune" else "a common, an element, or TASK.NAME to force"
+            self._refuse(what, f"the name is empty: it takes {wants}")
 
     def _task(self, what: str, name: str) -> str:
         self._short(what, name, MAX_NAME)

@@ -3,8 +3,10 @@
 import argparse
 
 import pytest
+from system.support import RACKS
 
 from automax_ros.cli.ctl_actions import ACTIONS
+from automax_ros.cli.rack_space import space_of
 from automax_ros.cli.usage import UsageError
 
 
@@ -25,3 +27,28 @@ def test_all_means_all_as_in_stimuli():
 def test_unforce_wants_names_or_all(words):
     with pytest.raises(UsageError, match="takes names, or --all"):
         asked("unforce", *words)
+
+
+def test_what_is_found_in_a_sent_source_is_named_by_the_file_that_was_given(tmp_path):
+    file = tmp_path / "edited.blk"
+    file.write_text("10 END\n")
+    parser = argparse.ArgumentParser()
+    ACTIONS["reload"].add_arguments(parser)
+    (ask,) = ACTIONS["reload"].asks(parser.parse_args(["speed", str(file)]))
+    found = "SPEED.BLK:1:1: error[AMX2001]: END\n  1 | 10 END\nSPEED.BLK:2:3: note: here"
+    assert ask.worded(found) == f"{file}:1:1: error[AMX2001]: END\n  1 | 10 END\n{file}:2:3: note: here"
+    assert ask.worded("SPEED.BLK has errors: task SPEED") == f"{file} has errors: task SPEED"
+    assert ask.worded("sd/LINE.BLK:1:1: error") == "sd/LINE.BLK:1:1: error"
+
+
+def test_a_rack_is_named_by_its_folder_as_well_as_by_its_file(tmp_path, monkeypatch):
+    assert space_of(str(RACKS / "operated")) == space_of(str(RACKS / "operated" / "rack.yaml")) == "/operated"
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "PM1").mkdir()
+    assert space_of("PM1") == "/pm1"
+    (tmp_path / "PM1" / "rack.yaml").write_text((RACKS / "operated" / "rack.yaml").read_text())
+    for name in ("LINE.BLK", "SPEED.BLK"):
+        (tmp_path / "PM1" / name).write_text((RACKS / "operated" / name).read_text())
+    assert space_of("PM1") == "/operated"
+    with pytest.raises(UsageError, match="is a task"):
+        space_of("PM1/LINE.BLK")

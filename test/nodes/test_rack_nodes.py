@@ -2,12 +2,14 @@
 
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
-from system.support import TYPES, wait_until
+from system.support import RACKS, TYPES, wait_until
 
+from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.installation import RackError
@@ -275,3 +277,51 @@ def test_what_is_done_under_the_lock_happens_in_the_present(context):
         with nodes.lock:
             assert nodes.rack.now_ns >= 70 * NS_PER_MS
         assert nodes.health.counts["failed callback"] == 0, "without an executor there is nothing to spin"
+
+
+def test_a_rack_scans_while_a_new_source_is_compiled(context, executor, monkeypatch):
+    """The compiler is held up until ten more scans have passed; a second reload is refused meanwhile."""
+    from automax_msgs.srv import Reload
+    from rclpy.node import Node
+
+    from automax_ros.nodes import RackNodes
+
+    folder = RACKS / "operated"
+    source = (folder / "SPEED.BLK").read_text()
+    go_on, compiling = threading.Event(), threading.Event()
+
+    def slow(*given):
+        compiling.set()
+        assert go_on.wait(20), "nothing goes on"
+        return compile_program(*given)
+
+    user = Node("user", context=context)
+    client = user.create_client(Reload, "/operated/reload")
+    executor.add_node(user)
+    with RackNodes(folder / "rack.yaml", context=context) as nodes:
+        told = []
+        monkeypatch.setattr(nodes.rack.observers, "operated", told.append)
+        monkeypatch.setattr("automax_ros.rack.installation.compile_program", slow)
+        nodes.add_to(executor)
+        nodes.start()
+        spin_until(executor, client.service_is_ready)
+        first = client.call_async(Reload.Request(task="LINE", source=(folder / "LINE.BLK").read_text()))
+        spin_until(executor, compiling.is_set)
+        before = nodes.rack.statistics["SPEED"].scans
+        spin_until(executor, lambda: nodes.rack.statistics["SPEED"].scans > before + 10, 10)
+        second = client.call_async(Reload.Request(task="LINE", source=source))
+        spin_until(executor, second.done)
+        assert not second.result().ok
+        assert "the new source of LINE is still being compiled" in second.result().reason
+        assert not first.done()
+        assert [(item.what, item.ok) for item in told] == [("reload", False)]
+        go_on.set()
+        spin_until(executor, first.done)
+        assert (first.result().ok, first.result().reason) == (True, "")
+        assert [(item.what, item.ok) for item in told] == [("reload", False), ("reload", True)]
+        wrong = client.call_async(Reload.Request(task="LINE", source="10 END!"))
+        spin_until(executor, wrong.done)
+        assert not wrong.result().ok
+        assert wrong.result().findings[0].startswith("LINE.BLK:1:")
+        assert not told[-1].ok
+    user.destroy_node()

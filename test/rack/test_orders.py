@@ -110,6 +110,9 @@ def test_values_are_read_from_texts_as_everywhere(rack, told):
         ("tune", ("SPEED.TRIM%", "11"), "0 to 10"),
         ("tune", ("SPEED.TRIM%", "fast"), "is not a value"),
         ("tune", ("SPEED.NIL%", "1"), "no tunable"),
+        ("tune", (" ", "1"), "the name is empty"),
+        ("set", ("", "1"), "the name is empty"),
+        ("force", ("", "1"), "the name is empty"),
         ("tune", ("NIL.TRIM%", "1"), "no task"),
         ("run", ("SPEED",), "runs already"),
         ("run", ("NIL",), "no task"),
@@ -142,6 +145,7 @@ def test_a_source_with_errors_is_refused_with_what_is_wrong_and_a_good_one_runs(
     with pytest.raises(ReloadRefused) as refused:
         orders.reload("SPEED", SPEED.replace("OUTPUT=OUT%", "OUTPUT=NIL%"))
     assert any("NIL%" in item and "110" in item for item in refused.value.findings)
+    assert all(item.startswith("SPEED.BLK:4:") for item in refused.value.findings)
     orders.tune("SPEED.TRIM%", "7")
     orders.reload("speed", SPEED.replace("INPUT1=REF%", "INPUT1=1000"), keep_state=True)
     rack.run(0.02)
@@ -163,3 +167,19 @@ def test_stop_all_and_run_all(rack, told):
     orders.clear_errors()
     orders.run("speed")
     assert [item.what for item in told.operations] == ["stop_all", "run_all", "stop", "clear_errors", "run"]
+
+
+def test_a_source_that_was_prepared_before_another_reload_is_known_to_be_old(rack, told):
+    orders = Orders(rack)
+    named = orders.admit_reload("SPEED", SPEED.replace("TRIM%, OUTPUT", "7, OUTPUT"))
+    first = orders.prepare(*named)
+    assert orders.is_current(first)
+    assert (rack.run(0.02), rack.value("OUT%")) == (None, 101)
+    orders.reload("SPEED", SPEED)
+    assert not orders.is_current(first)
+    again = orders.prepare(*named)
+    assert orders.is_current(again)
+    orders.install(again)
+    rack.run(0.02)
+    assert rack.value("OUT%") == 107
+    assert [(item.what, item.ok) for item in told.operations] == [("reload", True), ("reload", True)]
