@@ -132,7 +132,7 @@ def test_killed_at_many_moments(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("ros_domain_id")
 def test_a_live_rack_killed(tmp_path: Path) -> None:
     pytest.importorskip("rclpy")
-    end = killed_after(tmp_path, 2.7)
+    end = killed_after(tmp_path, 2.7, "--state", str(tmp_path / "state"))
     assert end > 2 * NS_PER_S
     report = assert_little_is_lost(tmp_path / "bag", end)
     assert report is not None

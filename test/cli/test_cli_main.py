@@ -116,7 +116,7 @@ def test_full_disk_is_told_without_a_traceback(tmp_path):
         "blocks",
         "check rack.yaml",
         "run rack.yaml --simulated --duration 0.1",
-        "run rack.yaml --duration 0.01",
+        "run rack.yaml --duration 0.01 --state state",
         "bag info bag",
     ],
 )

@@ -3,6 +3,7 @@
 import argparse
 import ast
 import importlib
+import keyword
 from pathlib import Path
 
 import pytest
@@ -15,9 +16,15 @@ PREFIXED = {"record_"}
 """Options that are read by a name put together from this and a word."""
 
 
+def module_of(name: str) -> str:
+    """The module of a subcommand; one whose name Python keeps for itself ends with an underscore."""
+    module = name.replace("-", "_")
+    return f"{module}_" if keyword.iskeyword(module) else module
+
+
 def options_of(name: str) -> set[str]:
     parser = argparse.ArgumentParser()
-    importlib.import_module(f"automax_ros.cli.{name.replace('-', '_')}").add_arguments(parser)
+    importlib.import_module(f"automax_ros.cli.{module_of(name)}").add_arguments(parser)
     found: set[str] = set()
     parsers = [parser]
     while parsers:
@@ -31,7 +38,7 @@ def options_of(name: str) -> set[str]:
 
 def files_of(name: str) -> list[Path]:
     """The files of a subcommand: its own, and those of the command line that they import."""
-    found, waiting = set(), [name.replace("-", "_"), *(path.stem for path in FOLDER.glob(f"{name}_*.py"))]
+    found, waiting = set(), [module_of(name), *(path.stem for path in FOLDER.glob(f"{name}_*.py"))]
     while waiting:
         path = FOLDER / f"{waiting.pop()}.py"
         if path in found or not path.exists():

@@ -174,7 +174,7 @@ def test_random_tasks_commit_when_a_simulator_says(column, tasks, tick_ms):
 @pytest.mark.soak
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("column", [0, 1], ids=MODULES)
-@given(written(), st.sampled_from(["0.5", "1.0", "1.7", "2.5", "5.5"]))
+@given(written(), st.sampled_from(["0.5", "1.0", "1.5", "2.5", "5.5"]))
 @repeatable(1500)
 def test_random_tasks_commit_when_a_simulator_says_long(column, tasks, tick_ms):
     commits_as_simulated(tasks, tick_ms, column)

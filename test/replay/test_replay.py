@@ -23,7 +23,7 @@ def example_rack(folder: Path | None = None, **tasks: str) -> Rack:
     """The example rack; with a folder a copy of it, some of its sources replaced."""
     if folder is not None:
         folder.mkdir()
-        for file in EXAMPLE.iterdir():
+        for file in filter(Path.is_file, EXAMPLE.iterdir()):
             (folder / file.name).write_bytes(file.read_bytes())
         for name, text in tasks.items():
             (folder / f"{name}.BLK").write_text(text)

@@ -177,7 +177,7 @@ def test_fault_stops_all_tasks(ros_domain_id):
         client.until(lambda: levels()["processor_0: LOOP"] == DiagnosticStatus.ERROR)
         assert levels()["processor_0: OTHER"] == DiagnosticStatus.WARN
         client.until(lambda: counts[-1].data == 0)  # STOP ALL zeroes volatile commons
-        process.wait_for_line("STOP ALL: task LOOP")
+        process.wait_for_line("STOP ALL (code 14): task LOOP")
         ended = process.end(signal.SIGINT)
     assert ended.code == 1
     assert re.fullmatch(
