@@ -20,7 +20,7 @@ VALUES = {
     "duration": "seconds to run; empty: until Ctrl-C",
     "state": "folder that keeps non-volatile values; empty: next to the rack file",
     "stimuli": "file of what operator and process do, by rack time; empty: none",
-    "report": "JSON file that tells how the run ended; empty: none",
+    "report": "JSON file that says how the run ended; empty: none",
     "record": "bag folder to record into; empty: none",
     "record_split_mb": "megabytes after which the recording begins a new file; empty: one file",
     "record_split_s": "seconds after which the recording begins a new file; empty: one file",

@@ -14,8 +14,10 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from automax_ros.cli.ctl_actions import ACTIONS, Action, Ask
+from automax_ros.cli.ctl_watch import values_of, watch
 from automax_ros.cli.rack_space import space_of
 from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds_above_0
 
@@ -53,6 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         with RackClient(space) as client:
             client.find(arguments.timeout)
+            if action.repeats:
+                return _watched(client, asks[0], arguments)
             answers = [(ask, _answer(client, ask, arguments.timeout)) for ask in asks]
     except NotOperable as fault:
         raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault
@@ -61,6 +65,26 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _print(action, arguments.action, answers)
     return 0 if all(_ok(answer) for _, answer in answers) else 1
+
+
+class _Refused(Exception):
+    """What was asked for was refused; the text says why."""
+
+
+def _watched(client: RackClient, ask: Ask, arguments: argparse.Namespace) -> int:
+    def read() -> list[dict[str, str]]:
+        answer = _answer(client, ask, arguments.timeout)
+        if not _ok(answer):
+            raise _Refused(_reason(ask, answer))
+        return values_of(answer)
+
+    try:
+        with stop_signals() as stop:
+            watch(read, arguments, lambda: stop.requested)
+    except _Refused as refusal:
+        print(f"automax ctl: watch {ask.of}: refused: {refusal}", file=sys.stderr)
+        return 1
+    return 0
 
 
 def _answer(client: RackClient, ask: Ask, wait_ns: int) -> Any:

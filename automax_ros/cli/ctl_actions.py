@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from automax_ros.cli.ctl_watch import add_watch_arguments, values_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted
 from automax_ros.rack.files import FileFault
@@ -36,7 +37,7 @@ class Ask:
 class Action:
     """An action: its line of help, its arguments, its requests, and for a reading what an answer holds.
 
-    ``read`` returns data for JSON, ``lines`` how a person reads them.
+    ``read`` returns data for JSON, ``lines`` how a person reads them. One that ``repeats`` asks again and again.
     """
 
     help: str
@@ -44,6 +45,7 @@ class Action:
     add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
     read: Callable[[Any], Any] | None = None
     lines: Callable[[Any], Iterable[str]] = lambda _: ()
+    repeats: bool = False
 
 
 def _tasks(parser: argparse.ArgumentParser) -> None:
@@ -132,10 +134,6 @@ def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[As
     return lambda _: [Ask(service, type_name)]
 
 
-def _values(answer: Any) -> list[dict[str, str]]:
-    return [{"name": name, "value": text} for name, text in zip(answer.found, answer.values, strict=True)]
-
-
 def _value_lines(data: Any) -> Iterable[str]:
     return (f"{item['name']} = {item['value']}" for item in data)
 
@@ -183,12 +181,20 @@ ACTIONS: Mapping[str, Action] = {
         "read commons, array elements, variables of tasks",
         lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names})],
         _names,
-        _values,
+        values_of,
         _value_lines,
+    ),
+    "watch": Action(
+        "read them again and again, and print what has changed",
+        lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names}, " ".join(given.names))],
+        add_watch_arguments,
+        values_of,
+        _value_lines,
+        repeats=True,
     ),
     "force": Action("hold commons or TASK.NAME at values against every write", _each_assignment("force"), _assignments),
     "unforce": Action("end forces", _release, _released),
-    "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=_values, lines=_value_lines),
+    "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=values_of, lines=_value_lines),
     "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments),
     "reload": Action("replace the source of a task while the others run", _reload, _reloaded),
     "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),

@@ -31,6 +31,16 @@ def ctl(*arguments: str | Path):
 
 
 def test_a_rack_is_operated_from_another_process(rack, tmp_path):
+    watched = ctl("watch", "REF%", "COUNT!", "--every", "0.1", "--duration", "1.5", "--json")
+    told = [json.loads(line) for line in watched.out.splitlines()]
+    assert watched.code == 0
+    assert [item["name"] for item in told].count("REF%") == 1, "told once: it does not change"
+    counts = [int(item["value"]) for item in told if item["name"] == "COUNT!"]
+    assert counts == sorted(set(counts))
+    assert len(counts) > 3
+    unknown = ctl("watch", "NIL%")
+    assert (unknown.code, unknown.out) == (1, "")
+    assert "automax ctl: watch NIL%: refused: " in unknown.err
     assert ctl("stop", "LINE").out == "stop LINE: done\n"
     refused = ctl("stop", "SPEED")
     assert (refused.code, refused.out) == (1, "")
