@@ -6,16 +6,16 @@ import contextlib
 import errno
 import os
 import stat
-import time
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 _MOST_TRIES = 100
 _LONGEST_SUFFIX = 16
-_READER_S = 1.0
-"""How long a pipe may be without a reader: whoever is started at the same time gets there (decision)."""
 _PAUSE_S = 0.01
+_MOST_PAUSES = 100
+"""A pipe may be without a reader for a second: whoever is started at the same time gets there (decision)."""
 
 
 @contextmanager
@@ -52,19 +52,17 @@ def open_at_once(path: str | os.PathLike[str], flags: int) -> int:
     Raises:
         OSError: it cannot be opened; a pipe is refused that nobody has begun to read within a second (decision).
     """
-    latest = time.monotonic() + _READER_S
-    while True:
+    for _ in range(_MOST_PAUSES):
         try:
             descriptor = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
-            break
         except OSError as error:
             if error.errno != errno.ENXIO or not stat.S_ISFIFO(os.stat(path).st_mode):
                 raise
-            if time.monotonic() > latest:
-                raise OSError(errno.ENXIO, "it is a pipe and nobody reads it", os.fspath(path)) from error
-        time.sleep(_PAUSE_S)
-    os.set_blocking(descriptor, True)
-    return descriptor
+            threading.Event().wait(_PAUSE_S)
+        else:
+            os.set_blocking(descriptor, True)
+            return descriptor
+    raise OSError(errno.ENXIO, "it is a pipe and nobody reads it", os.fspath(path))
 
 
 @contextmanager

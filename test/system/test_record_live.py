@@ -204,7 +204,7 @@ def test_existing_folder_is_not_recorded_into(tmp_path):
     ("arguments", "words"),
     [
         (("a b",), "neither a rack's name or namespace nor a YAML file"),
-        (("none.yaml",), "none.yaml is not a sound rack file"),
+        (("none.yaml",), "none.yaml: the rack file cannot be read"),
         (("TYPES", "--duration", "0"), "--duration: 0 s is too short: give more"),
         (("TYPES", "--wait", "x"), "--wait: "),
     ],

@@ -127,9 +127,21 @@ def test_damaged_state_is_a_clear_error(ros_domain_id, rack, simulated):
     assert "hint: remove it to start the rack as installed" in ended.err
 
 
-def test_folder_that_cannot_be_written(rack):
+def test_folder_that_cannot_be_one_is_refused_before_the_run(rack):
     (rack.parent / "kept").write_text("a file stands there")
-    run = ("run", rack, "--simulated", "--duration", "0.1", "--set", "LEVEL%=9")
-    ended = automax(*run, "--state", rack.parent / "kept")
+    ended = automax("run", rack, "--simulated", "--duration", "0.1", "--state", rack.parent / "kept")
+    assert ended.code == 2
+    assert "kept is not a folder" in ended.err
+    assert "ran" not in ended.out
+
+
+def test_folder_that_goes_while_the_rack_runs_is_told(ros_domain_id, rack):
+    kept = rack.parent / "kept"
+    kept.mkdir()
+    with Automax("run", rack, "--state", kept, "--set", "LEVEL%=9") as process:
+        process.wait_for_line("Ctrl-C ends the run")
+        kept.rmdir()
+        kept.write_text("a file stands there")
+        ended = process.end(signal.SIGINT)
     assert ended.code == 1
     assert "values of this run will not outlive it: " in ended.out
