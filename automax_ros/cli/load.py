@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from automax_ros.cli.rack_file import load_rack_file
+from automax_ros.cli.rack_file import add_outside_argument, load_rack_file
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import table
@@ -25,9 +25,7 @@ from automax_ros.rack.tasks_check import check_tasks
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax load``."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file, or its folder")
-    parser.add_argument(
-        "--allow-outside", action="store_true", help="let the rack file name task sources outside its own folder"
-    )
+    add_outside_argument(parser)
     parser.add_argument("--json", action="store_true", help="print one list of modules for programs to read")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
 from pathlib import Path
 
@@ -16,6 +17,25 @@ DEFAULT_RACK_FILE = "rack.yaml"
 """What a folder means where a rack file is asked for."""
 _CANNOT_BE_READ = "AMX6000"
 _NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
+
+
+def add_set_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--set``, any number of times, as ``settings``."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help="write a common variable before the tasks start; may be given again",
+    )
+
+
+def add_outside_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--allow-outside``."""
+    parser.add_argument(
+        "--allow-outside", action="store_true", help="let the rack file name task sources outside its own folder"
+    )
 
 
 def load_rack_file(path: Path, *, allow_outside: bool) -> LoadResult:

@@ -14,6 +14,7 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError
 from automax_ros.cli.output_files import held_for_writing, require_different_files, require_folder, require_writable
 from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
+from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
 from automax_ros.cli.record_options import add_record_arguments, recording_options
 from automax_ros.cli.ros import prepare_ros
 from automax_ros.cli.run_plan import RunPlan
@@ -42,14 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
     )
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="settings",
-        help="write a common variable before the tasks start; may be given again",
-    )
+    add_set_argument(parser)
     add_record_arguments(parser)
     add_watch_argument(parser, "the first published ones")
     parser.add_argument(
@@ -68,9 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write how the run ended: tasks, commons, forces, operations"
     )
-    parser.add_argument(
-        "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
-    )
+    add_outside_argument(parser)
 
 
 def _folder(text: str) -> Path:

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FrameType
 
 from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
+from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
 from automax_ros.cli.step_commands import completions, obey
 from automax_ros.cli.step_session import Session
 from automax_ros.cli.step_text import place_text
@@ -36,14 +37,7 @@ _DELIMITERS = " \t\n=:"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax step``."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="settings",
-        help="write a common variable before the tasks start; may be given again",
-    )
+    add_set_argument(parser)
     parser.add_argument(
         "--stimuli", type=Path, metavar="FILE", help="let happen what this YAML file says, by rack time"
     )
@@ -52,9 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="let scans take no time, so that they can be held at lines, whatever CONFIG says",
     )
-    parser.add_argument(
-        "--allow-outside", action="store_true", help="let the file name task sources outside its own folder"
-    )
+    add_outside_argument(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

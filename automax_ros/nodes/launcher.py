@@ -9,15 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rclpy.context import Context
-
 from automax_ros.core.types import Value
-from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.rack_nodes import RackNodes
 from automax_ros.rack.rack import Rack
-
-_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 
 
 class LiveRack:
@@ -34,11 +30,7 @@ class LiveRack:
         """
         self.rack = rack
         self.stopping = False
-        self._context = Context()
-        try:
-            self._context.init(args=_NO_CONSOLE)
-        except RuntimeError as error:
-            raise RosUnavailable(f"ROS 2 does not start: {error}") from error
+        self._context = joined_context()
         self._executor = make_executor(self._context)
         self._nodes = RackNodes(rack, context=self._context)
         self._nodes.add_to(self._executor)

@@ -6,16 +6,14 @@ import os
 import time
 from typing import Any
 
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.nodes.context import joined_context
 
-_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 _LOOK_S = 0.05
 _SETTLED_NS = 2 * NS_PER_S
 """A rack whose table has been seen for so long without its operator has none (decision)."""
@@ -37,11 +35,7 @@ class RackClient:
     def __init__(self, space: str) -> None:
         """Join the graph."""
         self._space = space
-        self._context = Context()
-        try:
-            self._context.init(args=_NO_CONSOLE)
-        except RuntimeError as error:
-            raise RosUnavailable(f"ROS 2 does not start: {error}") from error
+        self._context = joined_context()
         quiet = [Parameter("start_type_description_service", value=False)]
         self._node = Node(
             f"ctl_{os.getpid()}",

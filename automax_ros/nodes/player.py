@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from ament_index_python import get_resources
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
@@ -25,7 +24,7 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import RawMessage
 from automax_ros.bags.playback import PlayTopic, Renaming, Survey
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.guard import Guard
 from automax_ros.nodes.topics import message_class, ros_qos
@@ -46,7 +45,6 @@ ACKNOWLEDGE_NS = 2 * NS_PER_S
 _LONGEST_WAIT_NS = 50 * NS_PER_MS
 _CHORE_NS = 20 * NS_PER_MS
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
-_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 
 
 @dataclass
@@ -81,11 +79,7 @@ class Player:
         self.paused = False
         self.position = survey.begin
         self._survey, self._renaming, self._rate = survey, renaming, rate
-        self._context = Context()
-        try:
-            self._context.init(args=_NO_CONSOLE)
-        except RuntimeError as error:
-            raise RosUnavailable(f"ROS 2 does not start: {error}") from error
+        self._context = joined_context()
         space = renaming.space(survey.spaces[0]) if survey.spaces else renaming.topic("")
         self._node = Node("player", namespace=space or "/", context=self._context, enable_rosout=False)
         self._node.create_service(Trigger, "~/pause", self._pause)

@@ -24,7 +24,7 @@ from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.live.topics import LiveTopics, TopicKind
 from automax_ros.bags.writer import StorageOptions
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.topics import message_class
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import table_of
@@ -44,7 +44,6 @@ _KNOCK_NS = NS_PER_S
 _MOST_KNOCKS = 5
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _FILES = TopicKind("std_msgs/msg/String", LATCHED)
-_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
 
 
 class RawSubscription:
@@ -115,11 +114,7 @@ class LiveRecorder:
         self.recording: LiveRecording | None = None
         self.lost_values: Counter[str] = Counter()
         self._space = space
-        self._context = Context()
-        try:
-            self._context.init(args=_NO_CONSOLE)
-        except RuntimeError as error:
-            raise RosUnavailable(f"ROS 2 does not start: {error}") from error
+        self._context = joined_context()
         self._node = RecorderNode(space, self._context)
         self._topics = LiveTopics(space)
         self._table = b""

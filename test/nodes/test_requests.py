@@ -4,14 +4,15 @@ import time
 from pathlib import Path
 
 import pytest
-from system.support import TYPES, Client
+from system.support import TYPES
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 
+from .support import until
+
 ROOT = Path(__file__).parents[2]
-PATIENCE_NS = 60 * NS_PER_S
 
 
 @pytest.fixture
@@ -22,25 +23,6 @@ def live(ros_domain_id):
     made.start([])
     yield made
     made.close()
-
-
-@pytest.fixture
-def client(ros_domain_id):
-    with Client() as made:
-        yield made
-
-
-def until(live, client, condition):
-    """Let rack and client live until a condition is true."""
-
-    def on_idle(_: int) -> None:
-        for _ in range(5):
-            client.executor.spin_once(timeout_sec=0)
-        live.stopping = bool(condition())
-
-    live.stopping = False
-    live.run(live.rack.now_ns + PATIENCE_NS, on_idle)
-    assert condition(), "it never came true"
 
 
 def answer(live, client, kind, service, request):

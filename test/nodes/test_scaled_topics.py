@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+
+from .support import until
 
 RACK = """\
 rack: SCALED
@@ -35,25 +36,6 @@ def live(ros_domain_id, tmp_path: Path):
     made.start([])
     yield made
     made.close()
-
-
-@pytest.fixture
-def client(ros_domain_id):
-    from system.support import Client
-
-    with Client() as made:
-        yield made
-
-
-def until(live, client, condition):
-    def on_idle(_: int) -> None:
-        for _ in range(5):
-            client.executor.spin_once(timeout_sec=0)
-        live.stopping = bool(condition())
-
-    live.stopping = False
-    live.run(live.rack.now_ns + 60 * NS_PER_S, on_idle)
-    assert condition(), "it never came true"
 
 
 def test_bars_in_and_revolutions_out(live, client):

@@ -1,0 +1,18 @@
+"""A live rack and a client that take turns in one thread."""
+
+from automax_ros.core.ticks import NS_PER_S
+
+PATIENCE_NS = 60 * NS_PER_S
+
+
+def until(live, client, condition):
+    """Let rack and client live until a condition is true."""
+
+    def on_idle(_: int) -> None:
+        for _ in range(5):
+            client.executor.spin_once(timeout_sec=0)
+        live.stopping = bool(condition())
+
+    live.stopping = False
+    live.run(live.rack.now_ns + PATIENCE_NS, on_idle)
+    assert condition(), "it never came true"
