@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.blocks.declaration import Platform
-from automax_ros.cli.rack_file import add_outside_argument
 from automax_ros.cli.task_files import (
     Target,
     add_target_arguments,
@@ -54,7 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files", nargs="+", type=Path, metavar="FILE", help="a task (.BLK, .BAS) or a rack file (.yaml, .yml)"
     )
     add_target_arguments(parser)
-    add_outside_argument(parser)
+    parser.add_argument(
+        "--allow-outside", action="store_true", help="let a rack file name task sources outside its own folder"
+    )
     parser.add_argument("--json", action="store_true", help="print one list of problems for programs to read")
 
 
