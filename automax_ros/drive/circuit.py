@@ -147,6 +147,11 @@ class Circuit(Conduction):
         return numbers_of(self._net.mask)
 
     @property
+    def idle_s(self) -> float:
+        """How long no armature current has flowed up to now, s; 0 while it flows."""
+        return 0.0 if self._net.active else (self.now_ns - self._ended_ns) * 1e-9
+
+    @property
     def emf_v(self) -> float:
         """The EMF in the last interval, V."""
         return self._emf
@@ -297,6 +302,8 @@ class Circuit(Conduction):
         self._nets.clear()
         angle = self.line.angle(self.now_ns)
         net = self._enter(old.mask | left_on, phases, sin(angle), cos(angle))
+        if old.active and not net.active:
+            self._ended_ns = float(self.now_ns)
         gone = old.mask & ~net.mask
         if gone:
             self.bridge.put_out(gone, float(self.now_ns))

@@ -37,7 +37,7 @@ class Conduction(Stateful):
 
     _kept = (
         "now_ns", "current_a", "events_lost", "_modes", "_newest", "_emf", "_sample_ns", "_current_before", "_charge",
-        "_volt_s", "_zero_s", "_overlap_s", "_square", "_pieces",
+        "_volt_s", "_zero_s", "_ended_ns", "_overlap_s", "_square", "_pieces",
     )  # fmt: skip
 
     def __init__(self, line: AcLine, bridge: Bridge, machine: Machine, *, trace: bool, energy: bool) -> None:
@@ -54,6 +54,7 @@ class Conduction(Stateful):
         self._nets: dict[int, Network] = {}
         self._modes: Phases = _NO_MODES
         self._newest = [0, 0]
+        self._ended_ns = float(line.start_ns)
         self._emf = machine.emf(0.0)
         self._events: deque[tuple[EventKind, int, float, int, float]] = deque(maxlen=EVENTS_KEPT)
         bridge.wiring = replace(bridge.wiring, open_phases=sum(1 << x for x in line.missing))
@@ -170,6 +171,8 @@ class Conduction(Stateful):
         if out >> 12:
             self._open(out, t)
         net = self._enter((old.mask | on) & ~out, phases, sine, cosine)
+        if old.active and not net.active:
+            self._ended_ns = start_ns + t * 1e9
         gone = old.mask & ~net.mask
         if gone:
             self.bridge.put_out(gone, start_ns + t * 1e9)

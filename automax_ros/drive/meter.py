@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from automax_ros.drive.wiring import Wiring
 
 
+_STEEPEST = 3.0
+"""Largest ratio of a current's peak to its mean while it flows that is looked for (decision)."""
+
+
 class Sample:
     """Exact integrals since the sample before.
 
@@ -55,6 +59,17 @@ class Sample:
     def mean_voltage_v(self) -> float:
         """Mean voltage over the armature's terminals, V."""
         return self.volt_s / self.duration_s if self.duration_s else 0.0
+
+    def exceeds(self, level_a: float) -> bool:
+        """Return whether the magnitude of the current was above a level (A) at some instant.
+
+        Only the last 64 intervals are looked at (those that the circuit keeps).
+        """
+        conducting_s = self.duration_s - self.zero_current_s
+        # No pulse of a bridge is steeper than a triangle by more than this: most samples need no search.
+        if conducting_s <= 0.0 or abs(self.charge_c) * _STEEPEST < level_a * conducting_s:
+            return False
+        return any(max(map(abs, Piece(*piece).extremes())) > level_a for piece in self._pieces)
 
     @property
     def rms_current_a(self) -> float:

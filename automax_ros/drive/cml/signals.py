@@ -1,0 +1,104 @@
+"""What passes between the current minor loop and its 57C406: whole numbers only, so that a record keeps them exactly.
+
+The 57C406 interrupts six times a line cycle. At each interrupt it tells what it has ``Measured`` since the one before,
+and takes a ``Command`` for the time up to the next (decision: nothing is published of this interface).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+LINE = 1 << 0
+"""There is a sync voltage: the phase that the 57C406 synchronizes on is alive."""
+ROTATION_ABC = 1 << 1
+"""The phases pass in the order A, B, C: not the standard one, which is C, B, A (52.1.5)."""
+OVERCURRENT = 1 << 2
+"""The armature current has been above the level of the last command at some instant since the last interrupt."""
+PERMISSIVE = 1 << 3
+"""The run permissive input of the drive digital I/O module."""
+EXTERNAL_TRIP = 1 << 4
+"""The external instantaneous electronic trip (IET) input of the drive digital I/O module."""
+SWITCH_A = 1 << 5
+SWITCH_B = 1 << 6
+"""The test switch of the 57C406 in position A, in position B; neither in the centre."""
+RESET_SWITCH = 1 << 7
+"""The fault reset switch of the 57C406 is closed."""
+VOLTAGE = 1 << 8
+"""A 57C405 gives the armature voltage."""
+
+RATED = 100_000
+"""The rated armature current in the units of ``Measured.current`` (thousandths of a percent)."""
+
+FMCR, RMCR = 1, 2
+"""The contactor relays of the drive digital I/O module, as ``Command.relays`` has them."""
+
+
+class Measured(NamedTuple):
+    """What the 57C406 has measured since the last interrupt, and how its inputs, switches and registers stand.
+
+    Attributes:
+        status: the bits above.
+        current: mean armature current, thousandths of a percent of the rated one, signed.
+        zero_us: how long no current flowed, us.
+        tail_us: how long none has flowed up to this interrupt without a break, us; 0 while it flows.
+        since_sync_ns: time since phase T1 of the drive was last at its maximum, ns; 0 without LINE.
+        voltage: armature voltage at this interrupt, tenths of a volt, signed; the EMF while no current flows.
+        tach_threshold: register 4136, degrees.
+        phase_step: register 4137, us.
+        period_step: register 4138, us.
+        options: register 4146.
+    """
+
+    status: int
+    current: int = 0
+    zero_us: int = 0
+    tail_us: int = 0
+    since_sync_ns: int = 0
+    voltage: int = 0
+    tach_threshold: int = 109
+    phase_step: int = 4
+    period_step: int = 2
+    options: int = 0
+
+
+class Pulse(NamedTuple):
+    """A gate window: it begins ``after_ns`` after the interrupt and is ``length_ns`` long; ``gates`` are gate bits.
+
+    Bits 0 to 5 are the SCRs 1 to 6, bits 8 to 13 the SCRs 11 to 16 (decision: the gate command word of DIAG_DATA).
+    """
+
+    after_ns: int
+    length_ns: int
+    gates: int
+
+
+class Command(NamedTuple):
+    """What the 57C406 shall do until the next interrupt.
+
+    Attributes:
+        next_ns: time from this interrupt to the next, ns.
+        relays: which contactor relays are on, FMCR and RMCR.
+        pulses: the gate windows, which replace those that have not begun.
+        level: current at which OVERCURRENT comes, % of rated.
+    """
+
+    next_ns: int
+    relays: int = 0
+    pulses: tuple[Pulse, ...] = ()
+    level: int = 400
+    block: bool = False
+    """Gate windows that have begun end at once too (a coast stop)."""
+
+
+def gate_bits(*numbers: int) -> int:
+    """Return the gate bits of SCRs 1 to 6 and 11 to 16."""
+    word = 0
+    for number in numbers:
+        word |= 1 << (number - 1 if number < 10 else number - 3)
+    return word
+
+
+def gate_numbers(word: int) -> tuple[int, ...]:
+    """Return the SCRs of gate bits, ascending."""
+    low = [bit + 1 for bit in range(6) if word >> bit & 1]
+    return (*low, *(bit + 3 for bit in range(8, 14) if word >> bit & 1))

@@ -1,0 +1,81 @@
+"""What the 57C406 does with a plant: it measures between interrupts and gives the gates what the loop commands.
+
+No registers, no rack: ``rack/modules`` has the module around it, a bench or a PMI can do without one.
+"""
+
+from __future__ import annotations
+
+from math import fmod, pi
+
+from automax_ros.drive.cml.signals import (
+    LINE,
+    OVERCURRENT,
+    RATED,
+    ROTATION_ABC,
+    VOLTAGE,
+    Command,
+    Measured,
+    gate_numbers,
+)
+from automax_ros.drive.plant import DrivePlant
+
+LARGEST = (1 << 31) - 1
+
+
+class DriveController:
+    """Measures a plant at interrupts and carries out commands; without a plant there is no line."""
+
+    def __init__(self, plant: DrivePlant | None) -> None:
+        """Begin with gates off."""
+        self.plant = plant
+        self.level = 400
+
+    def measure(self, now_ns: int, status: int = 0, registers: tuple[int, int, int, int] = (109, 4, 2, 0)) -> Measured:
+        """Let the plant's time pass to an interrupt and return what was measured since the one before.
+
+        Args:
+            now_ns: the instant, ns.
+            status: bits of inputs and switches; VOLTAGE where a 57C405 is wired to the armature.
+            registers: 4136, 4137, 4138, 4146.
+        """
+        plant = self.plant
+        if plant is None:
+            return Measured(status, 0, 0, 0, 0, 0, *registers)
+        plant.advance(now_ns)
+        circuit, line = plant.circuit, plant.line
+        sample = plant.sample()
+        if 0 not in line.missing:
+            status |= LINE
+        if line.rotation.value < 0:
+            status |= ROTATION_ABC
+        amps = sample.mean_current_a
+        if sample.exceeds(self.level * plant.rated_amps / 100):
+            status |= OVERCURRENT
+        idle_us = int(circuit.idle_s * 1e6)
+        volts = 0.0
+        if status & VOLTAGE:
+            volts = circuit.emf_v if idle_us else sample.mean_voltage_v
+        turn = fmod(line.angle(now_ns), 2 * pi)
+        return Measured(
+            status,
+            max(-LARGEST, min(LARGEST, round(amps / plant.rated_amps * RATED))),
+            round(sample.zero_current_s * 1e6),
+            idle_us,
+            round((turn if turn >= 0 else turn + 2 * pi) / line.omega * 1e9) if status & LINE else 0,
+            round(volts * 10),
+            *registers,
+        )
+
+    def command(self, command: Command, at_ns: int) -> None:
+        """Carry out what the loop commands at an instant, ns: relays, and gates until the next interrupt."""
+        plant = self.plant
+        if plant is None:
+            return
+        plant.advance(at_ns)
+        self.level = command.level
+        plant.relay(on=command.relays != 0)
+        if command.block:
+            plant.bridge.cancel(plant.now_ns)
+        for after_ns, length_ns, gates in command.pulses:
+            on_ns = at_ns + after_ns
+            plant.circuit.fire(on_ns, on_ns + length_ns, *gate_numbers(gates))
