@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence as Numbers
 from dataclasses import dataclass
 
-from automax_ros.drive.cml.firing import Firing
+from automax_ros.drive.cml.current_control import CurrentControl
 from automax_ros.drive.cml.inputs import Inputs
 from automax_ros.drive.cml.latching import TICK_NS, Latched
 from automax_ros.drive.cml.outputs import Outputs
 from automax_ros.drive.cml.pll import Pll
-from automax_ros.drive.cml.reference import FULL, ReferenceChain
-from automax_ros.drive.cml.regulator import Regulator
 from automax_ros.drive.cml.sequence import Phase, Sequence
-from automax_ros.drive.cml.signals import FMCR, PERMISSIVE, RATED, RMCR, Command, Measured, Pulse
+from automax_ros.drive.cml.signals import FMCR, PERMISSIVE, RMCR, Command, Measured, Pulse
 from automax_ros.drive.state import Stateful
 
 
@@ -43,7 +41,7 @@ class Outcome:
 class CurrentMinorLoop(Stateful):
     """The loop of one drive; ``tests_scrs``: BAD_SCR_OUT is programmed, so the shorted SCR test is done (52.3.1)."""
 
-    _kept = ("_started", "_tick", "_counts")
+    _kept = ("_started", "_tick")
 
     def __init__(self, *, tests_scrs: bool = False) -> None:
         """Begin as before task initialisation."""
@@ -54,17 +52,12 @@ class CurrentMinorLoop(Stateful):
         """The task is put into RUN: the next scan is its first."""
         self._started = False
         self._tick = -1
-        self._counts = 0
         self.outputs = Outputs()
         self.latched = Latched()
         self.pll = Pll()
-        self.firing = Firing()
-        self.chain = ReferenceChain()
-        self.regulator = Regulator()
+        self.control = CurrentControl()
         self.sequence = Sequence()
-        self._parts = (
-            self.outputs, self.latched, self.pll, self.firing, self.chain, self.regulator, self.sequence
-        )  # fmt: skip
+        self._parts = (self.outputs, self.latched, self.pll, self.sequence, *self.control.parts)
 
     def scan(self, now_ns: int, measured: Measured, inputs: Inputs) -> Outcome:
         """Execute one scan at an interrupt.
@@ -86,10 +79,9 @@ class CurrentMinorLoop(Stateful):
         problems += self.latched.scan(inputs)
         if ticked:
             problems += self._look(now_ns, measured, inputs)
-        self._feed_back(measured)
-        idle = measured.zero_us * 6000 >= self.pll.period_ns
+        self.control.feed_back(measured, self.latched.lim_bar, self.pll.period_ns)
         self.sequence.scan(now_ns, dropout_s=self.latched.max_m_dropout, discontinuous=measured.zero_us > 0)
-        pulses = self._drive(idle)
+        pulses = self._drive(measured)
         running = self.sequence.running
         self.outputs.dc_cml_state = running
         self.outputs.sync_locked = self.pll.locked
@@ -112,37 +104,17 @@ class CurrentMinorLoop(Stateful):
         before = sequence.phase
         sequence.tick(now_ns, run=latched.cml_run, may_start=may_start, relay=relay)
         if before is Phase.STANDBY and sequence.phase is Phase.CLOSING:
-            self.chain.begin()
-            self.regulator.begin(0.0)
-            self.firing.begin()
+            self.control.begin()
         return problems
 
-    def _feed_back(self, measured: Measured) -> None:
-        """Scale the current of the last scan: 4095 counts at LIM_BAR."""
-        counts = measured.current * FULL * 100 / (RATED * self.latched.lim_bar)
-        interval_us = self.pll.period_ns / 6000
-        self._counts = self.regulator.feedback(counts, measured.zero_us, interval_us)
-        if self.sequence.running:
-            self.outputs.i_fdbk = self._counts
-            self.outputs.dc_time = min(measured.zero_us, 3472)
-            self.outputs.fdbk_gain = self.regulator.fdbk_gain
-
-    def _drive(self, idle: bool) -> tuple[Pulse, ...]:  # noqa: ARG002
+    def _drive(self, measured: Measured) -> tuple[Pulse, ...]:
         """Regulate and plan the pulses up to the next interrupt."""
-        pll, latched, outputs = self.pll, self.latched, self.outputs
         if not self.sequence.running:
-            return self.firing.pulses(pll.position, pll.period_ns, 0, 0, False)
-        interval_s = pll.period_ns / 6e9
-        reference = latched.reference if self.sequence.phase is Phase.RUN else 0
-        wanted = self.chain.scan(reference, latched.ref_rate, latched.ref_lag, interval_s)
-        bridge = 2 if wanted < 0 else 1
-        error = (wanted - self._counts) * (1 if bridge == 1 else -1)
-        highest_us = pll.period_ns / 2000
-        delta = self.regulator.scan(error, latched.kp, latched.pi_w_lead, 1.0, interval_s, highest_us)
-        outputs.ref_rate_out, outputs.ref_lag_out = round(self.chain.rate_out), round(wanted)
-        outputs.integral_gain, outputs.delta = self.regulator.integral_gain, round(delta)
-        outputs.bridge_pol = bridge == 2
-        return self.firing.pulses(pll.position, pll.period_ns, round(delta * 1000), bridge, False)
+            return self.control.off(self.pll)
+        reference = self.latched.reference if self.sequence.phase is Phase.RUN else 0
+        pulses = self.control.scan(measured, reference, self.latched, self.pll, reverse=False)
+        self.control.show(self.outputs)
+        return pulses
 
     # What is kept
 
