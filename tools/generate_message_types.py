@@ -19,9 +19,11 @@ SERVED = frozenset({"LoggedError", "TaskInfo"})
 STANDARD = (
     "builtin_interfaces/msg/Time",
     "rosgraph_msgs/msg/Clock",
+    "sensor_msgs/msg/JointState",
     "std_msgs/msg/Bool",
     "std_msgs/msg/Float32",
     "std_msgs/msg/Float32MultiArray",
+    "std_msgs/msg/Header",
     "std_msgs/msg/Int16",
     "std_msgs/msg/Int16MultiArray",
     "std_msgs/msg/Int32",

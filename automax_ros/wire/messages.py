@@ -132,6 +132,50 @@ class VariableTable(NamedTuple):
     writers: Sequence[Writer] = ()
 
 
+class PlantState(NamedTuple):
+    """What the plant of a drive did since the message before, and how it stands."""
+
+    stamp: int
+    plant: str
+    slot: int
+    drive: str
+    duration_s: float
+    current_a: float
+    voltage_v: float
+    current_rms_a: float
+    torque_nm: float
+    load_nm: float
+    speed_rpm: float
+    position_rad: float
+    field: float
+    bridge: int
+    contactor: bool
+    line_hz: float
+    line_v: float
+    faults: Sequence[str]
+    line_j: float
+    loss_j: float
+    stored_j: float
+    shaft_j: float
+
+
+class Header(NamedTuple):
+    """std_msgs/Header."""
+
+    stamp: int
+    frame_id: str = ""
+
+
+class JointState(NamedTuple):
+    """sensor_msgs/JointState."""
+
+    header: Header
+    name: Sequence[str]
+    position: Sequence[float]
+    velocity: Sequence[float]
+    effort: Sequence[float]
+
+
 class Clock(NamedTuple):
     """rosgraph_msgs/Clock."""
 
@@ -216,11 +260,24 @@ class UInt8MultiArray(NamedTuple):
 
 HELD_MARK = "forced "
 """Begins the fields without values that stand first in a TaskState: the names of the locals that a force holds."""
-_OWN = (CommonImage, CommonWrite, Operation, Scan, ScanError, TaskState, Values, Variable, VariableTable, Writer)
+_OWN = (
+    CommonImage,
+    CommonWrite,
+    Operation,
+    PlantState,
+    Scan,
+    ScanError,
+    TaskState,
+    Values,
+    Variable,
+    VariableTable,
+    Writer,
+)
 _STANDARD = (
     Bool,
     Float32,
     Float32MultiArray,
+    Header,
     Int16,
     Int16MultiArray,
     Int32,
@@ -234,6 +291,7 @@ CLASSES: dict[str, type[tuple[object, ...]]] = {
     **{f"automax_msgs/msg/{cls.__name__}": cls for cls in _OWN},
     **{f"std_msgs/msg/{cls.__name__}": cls for cls in _STANDARD},
     "rosgraph_msgs/msg/Clock": Clock,
+    "sensor_msgs/msg/JointState": JointState,
 }
 """The class of each message type by its full name; a time has none."""
 NAMES: dict[type[tuple[object, ...]], str] = {cls: name for name, cls in CLASSES.items()}
