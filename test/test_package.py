@@ -27,7 +27,7 @@ MESSAGES = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"
 
 # Ground floor first: a room may import itself and those before it.
 ROOMS = [
-    "core", "blocks", "logix", "language", "compile", "running", "tuning", "drive", "rack", "wire", "bags", "replay",
+    "core", "blocks", "logix", "language", "compile", "drive", "running", "tuning", "rack", "wire", "bags", "replay",
     "nodes", "cli",
 ]  # fmt: skip
 ROOMS_WITH_ROS = {"nodes", "cli"}

@@ -37,6 +37,7 @@ from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec,
 from automax_ros.running.basic_task import BasicTask, make_task
 from automax_ros.running.channels import Channels
 from automax_ros.running.common_clock import CommonClock
+from automax_ros.running.drives import Drives
 from automax_ros.running.events import Events
 from automax_ros.running.execution import IDEAL, Execution
 from automax_ros.running.interrupts import Interrupts
@@ -96,6 +97,7 @@ class Rack:
         self.backplane = backplane_of(config)
         self.events = Events()
         self.channels = Channels()
+        self.drives = Drives()
         self._interrupts = Interrupts(self.memory, self.events)
         self._inputs = ProcessInputs(self.memory, self.scheduler)
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
@@ -107,6 +109,7 @@ class Rack:
             clock=self._clock,
             interrupts=self._interrupts,
             inputs=self._inputs,
+            drives=self.drives,
             install=self._install,
             execution=self._execution if execution is None else lambda _: execution,
             tell_writes=self.observers.tell_writes,

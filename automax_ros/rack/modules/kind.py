@@ -20,6 +20,7 @@ from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.triggers import MakeTrigger
 from automax_ros.running.backplane import Backplane
 from automax_ros.running.common_clock import CommonClock
+from automax_ros.running.drives import Drives
 from automax_ros.running.events import Events
 from automax_ros.running.execution import Execution
 from automax_ros.running.interrupts import Interrupts
@@ -235,6 +236,7 @@ class Parts:
 
     ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells
     observers of writes that no scan has made. ``writer`` returns the id under which a module with interrupts writes.
+    A 57C406 attaches itself to ``drives``.
     """
 
     memory: CommonMemory
@@ -244,6 +246,7 @@ class Parts:
     clock: CommonClock
     interrupts: Interrupts
     inputs: ProcessInputs
+    drives: Drives
     install: Install
     execution: Callable[[str], Execution]
     tell_writes: Callable[[], None]
