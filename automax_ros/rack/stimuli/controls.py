@@ -8,6 +8,7 @@ from functools import partial
 
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.rack.controls import MODULE_CONTROLS, Controls
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Operable
 from automax_ros.rack.rack import Rack
@@ -17,8 +18,6 @@ from automax_ros.rack.stimuli.operating import Control
 from automax_ros.rack.stimuli.reading import Verb, named
 from automax_ros.rack.stimuli.stage import Action
 
-MODULE_CONTROLS = {"test_switch": ("A", "B", "centre"), "fault_reset_switch": ("true",)}
-"""The controls of modules with their positions."""
 _ANY_NUMBER: tuple[str, ...] = ()
 _SCRS = tuple(str(number) for bridge in (1, 11) for number in range(bridge, bridge + 6))
 PLANT_CONTROLS = {
@@ -42,7 +41,7 @@ def control_verbs(rack: Rack) -> Mapping[str, Verb]:
 
 
 def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
-    by_slot = {module.config.slot: module for module in rack.modules}
+    controls, by_slot = Controls(rack), {module.config.slot: module for module in rack.modules}
     found: list[Action] = []
     for key, item in named(node, what, findings):
         slot = integer_value(key, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
@@ -53,7 +52,7 @@ def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Actio
             if module is None:
                 continue
             if isinstance(module, Operable) and control.verb in module.controls:
-                found.append(Control(key.text, module, control.verb, control.value))
+                found.append(Control(str(slot), control.verb, control.value, controls.module))
             else:
                 message = f"the {module.config.model} in slot {slot} has no {control.verb}"
                 findings.add("AMX6742", message, control.key.span)

@@ -10,7 +10,6 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.problems import Severity
 from automax_ros.core.types import Value
 from automax_ros.rack.installation import RackError
-from automax_ros.rack.modules.kind import Operable
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.stage import Stage
@@ -72,16 +71,16 @@ class Reload:
 
 @dataclass(frozen=True)
 class Control:
-    """Moves a control of a module, such as a test switch."""
+    """Moves a control of what ``of`` names, such as a module's test switch."""
 
     of: str
-    module: Operable
-    verb: str
+    control: str
     value: str
+    move: Callable[[str, str, str], None]
 
     def do(self, _: Stage) -> None:
         """Move it."""
-        self.module.operate(self.verb, self.value)
+        self.move(self.of, self.control, self.value)
 
 
 def _first_error(error: RackError) -> str:

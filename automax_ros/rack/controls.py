@@ -1,0 +1,56 @@
+"""What a person moves or breaks in and around a rack: controls of modules, faults of plants.
+
+Stimuli, services and commands call this; observers are told of each, of refused ones too. Neither needs the rack's
+power (decision): a switch is a lever, and a plant stands outside.
+"""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.rack.modules.kind import Operable
+from automax_ros.rack.observers import Operation
+from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.rack import Rack
+
+MODULE_CONTROLS = {"test_switch": ("A", "B", "centre"), "fault_reset_switch": ("true",)}
+"""The controls of modules with their positions."""
+
+
+class Controls:
+    """The controls of one rack.
+
+    Raises:
+        OperationRefused: all methods, where there is no such thing, it has no such control, or it cannot be moved so.
+    """
+
+    def __init__(self, rack: Rack) -> None:
+        self._rack = rack
+
+    def module(self, slot: str, control: str, value: str) -> None:
+        """Move a control of the module in a slot to a position, in any case: ``7``, ``test_switch``, ``A``."""
+        told = f"{slot} {control} {value}"
+        modules = {str(module.config.slot): module for module in self._rack.modules}
+        module = modules.get(slot)
+        if module is None:
+            self._refuse("module", told, f"the rack has no module in slot {slot}")
+        if not isinstance(module, Operable) or control not in module.controls:
+            has = near_or_listed(control, module.controls) if isinstance(module, Operable) else "it has no controls"
+            self._refuse("module", told, f"the {module.config.model} in slot {slot} has no {quoted(control)}: {has}")
+        positions = MODULE_CONTROLS.get(control, ())
+        position = next((item for item in positions if item.lower() == value.lower()), value)
+        if positions and position not in positions:
+            self._refuse("module", told, f"{control} cannot be {quoted(value)}: it takes {', '.join(positions)}")
+        try:
+            module.operate(control, position)
+        except OperationRefused as refused:
+            self._refuse("module", told, str(refused))
+        self._tell("module", f"{slot} {control} {position}")
+
+    def _tell(self, what: str, detail: str, *, reason: str = "", ok: bool = True) -> None:
+        self._rack.observers.operated(Operation(self._rack.now_ns, what, "", ok, reason, detail))
+
+    def _refuse(self, what: str, detail: str, reason: str) -> NoReturn:
+        self._tell(what, detail, reason=reason, ok=False)
+        raise OperationRefused(reason)
