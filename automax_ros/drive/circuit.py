@@ -173,6 +173,12 @@ class Circuit(Conduction):
         angle = self.line.angle(self.now_ns)
         return self._phases(self._net, self.current_a, sin(angle), cos(angle))
 
+    @property
+    def line_a(self) -> float:
+        """The greatest of the line's phase currents, A, without sign."""
+        net = self._net
+        return max(map(abs, self.phase_currents())) if net.active or net.modes else 0.0
+
     # What can break
 
     def short_scr(self, number: int, *, shorted: bool = True) -> None:

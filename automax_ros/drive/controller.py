@@ -64,6 +64,7 @@ class DriveController:
             round((turn if turn >= 0 else turn + 2 * pi) / line.omega * 1e9) if status & LINE else 0,
             round(volts * 10),
             *registers,
+            min(LARGEST, round(circuit.line_a / plant.rated_amps * RATED)),
         )
 
     def command(self, command: Command, at_ns: int) -> None:

@@ -47,6 +47,8 @@ class Measured(NamedTuple):
         phase_step: register 4137, us.
         period_step: register 4138, us.
         options: register 4146.
+        line: the greatest phase current of the line at this interrupt, thousandths of a percent of the rated armature
+            current, without sign. It tells a short from phase to phase, which the armature does not see.
     """
 
     status: int
@@ -59,6 +61,7 @@ class Measured(NamedTuple):
     phase_step: int = 4
     period_step: int = 2
     options: int = 0
+    line: int = 0
 
 
 class Pulse(NamedTuple):

@@ -1,0 +1,45 @@
+"""DIAG_DATA: where the current minor loop writes the record of a scan in the array of two pages (52.3.2, table 2).
+
+The array is dimensioned (37,1): 38 rows of two columns, a column is a page. Element (row, page) has the index
+``row * 2 + page``. Row 0 of page 0 is PAGE_NUMBER, row 1 of a page its NEXT_ENTRY, and record n, 1 to 12, stands in
+the rows 3n - 1, 3n and 3n + 1: I_FDBK, REF_LAG_OUT, gate command word. (decision: the rows of table 2, which is not
+printed legibly; 2 + 12 x 3 rows are all there are)
+"""
+
+from __future__ import annotations
+
+RECORDS = 12
+"""Records of a page (52.3.2)."""
+ROWS, PAGES = 38, 2
+SIZE = ROWS * PAGES
+"""Elements of the array."""
+PAGE_NUMBER = 0
+"""Index of the element that says which page is written: 0 is page 0, anything else page 1."""
+
+Record = tuple[int, int, int]
+"""I_FDBK, REF_LAG_OUT and the gates that make the feedback of the next scan."""
+
+
+def page_of(page_number: int) -> int:
+    """Return the page that PAGE_NUMBER selects, 0 or 1."""
+    return 1 if page_number else 0
+
+
+def next_entry_index(page: int) -> int:
+    """Return the index of a page's NEXT_ENTRY."""
+    return PAGES + page
+
+
+def writes(page: int, next_entry: int, record: Record) -> tuple[tuple[int, int], ...]:
+    """Return what to write for a record: (index, value) of its three words, then of NEXT_ENTRY.
+
+    Args:
+        page: 0 or 1.
+        next_entry: the page's NEXT_ENTRY; 0, and what is out of range, means the first record (decision: 52.3.2 has it
+            clamped to 0).
+        record: the words of the scan.
+    """
+    number = next_entry if 1 <= next_entry <= RECORDS else 1
+    first = (3 * number - 1) * PAGES + page
+    words = tuple((first + PAGES * place, word) for place, word in enumerate(record))
+    return (*words, (next_entry_index(page), number % RECORDS + 1))
