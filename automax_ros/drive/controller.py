@@ -13,6 +13,7 @@ from automax_ros.drive.cml.signals import (
     RATED,
     ROTATION_ABC,
     VOLTAGE,
+    VOLTS,
     Command,
     Measured,
     gate_numbers,
@@ -62,21 +63,30 @@ class DriveController:
             round(sample.zero_current_s * 1e6),
             idle_us,
             round((turn if turn >= 0 else turn + 2 * pi) / line.omega * 1e9) if status & LINE else 0,
-            round(volts * 10),
+            max(-LARGEST, min(LARGEST, round(volts * VOLTS / plant.data.parameters.line_v))),
             *registers,
             min(LARGEST, round(circuit.line_a / plant.rated_amps * RATED)),
         )
 
-    def command(self, command: Command, at_ns: int) -> None:
-        """Carry out what the loop commands at an instant, ns: relays, and gates until the next interrupt."""
+    def command(self, command: Command, interrupt_ns: int, now_ns: int = 0) -> None:
+        """Carry out what the loop commands until the next interrupt: relays and gates.
+
+        Args:
+            command: what it commands.
+            interrupt_ns: the instant of the interrupt, from which pulses count, ns.
+            now_ns: the present where it is later, ns: pulses that should have begun begin at once.
+        """
         plant = self.plant
         if plant is None:
             return
-        plant.advance(at_ns)
+        now_ns = max(now_ns, interrupt_ns)
+        plant.advance(now_ns)
         self.level = command.level
         plant.relay(on=command.relays != 0)
         if command.block:
             plant.bridge.cancel(plant.now_ns)
         for after_ns, length_ns, gates in command.pulses:
-            on_ns = at_ns + after_ns
-            plant.circuit.fire(on_ns, on_ns + length_ns, *gate_numbers(gates))
+            on_ns = interrupt_ns + after_ns
+            off_ns = on_ns + length_ns
+            if off_ns > now_ns:
+                plant.circuit.fire(on_ns if on_ns > now_ns else now_ns, off_ns, *gate_numbers(gates))

@@ -30,9 +30,10 @@ class CurrentControl(Stateful):
         dc_time: DC_TIME of the last scan, us.
         bridge: 1 or 2.
         discontinuous: whether the current was zero at some time in the last scan.
+        block: whether gates that are on shall end at once.
     """
 
-    _kept = ("i_fdbk", "dc_time", "bridge", "discontinuous")
+    _kept = ("i_fdbk", "dc_time", "bridge", "discontinuous", "block")
 
     def __init__(self) -> None:
         """Begin with everything off."""
@@ -40,6 +41,7 @@ class CurrentControl(Stateful):
         self.dc_time = 0
         self.bridge = 1
         self.discontinuous = False
+        self.block = False
         self.chain = ReferenceChain()
         self.regulator = Regulator()
         self.firing = Firing()

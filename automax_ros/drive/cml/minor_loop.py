@@ -86,7 +86,9 @@ class CurrentMinorLoop(Stateful):
         self.outputs.dc_cml_state = running
         self.outputs.sync_locked = self.pll.locked
         self.outputs.line_period = self.pll.period_us
-        command = Command(self.pll.next_ns, self.sequence.relays, pulses, self.latched.ioc_thresh, not running)
+        command = Command(
+            self.pll.next_ns, self.sequence.relays, pulses, self.latched.ioc_thresh, not running or self.control.block
+        )
         return Outcome(
             command,
             self.outputs.row() if ticked else None,

@@ -29,6 +29,9 @@ VOLTAGE = 1 << 8
 RATED = 100_000
 """The rated armature current in the units of ``Measured.current`` (thousandths of a percent)."""
 
+VOLTS = 10_000
+"""``Measured.voltage`` where armature voltage and nominal line-to-line voltage (rms) are equal (decision)."""
+
 FMCR, RMCR = 1, 2
 """The contactor relays of the drive digital I/O module, as ``Command.relays`` has them."""
 
@@ -42,7 +45,8 @@ class Measured(NamedTuple):
         zero_us: how long no current flowed, us.
         tail_us: how long none has flowed up to this interrupt without a break, us; 0 while it flows.
         since_sync_ns: time since phase T1 of the drive was last at its maximum, ns; 0 without LINE.
-        voltage: armature voltage at this interrupt, tenths of a volt, signed; the EMF while no current flows.
+        voltage: armature voltage over the drive's nominal line-to-line voltage, ``VOLTS`` for 1, signed, as the
+            scaling of 52.6.1 makes it, which follows the line; the EMF while no current flows; 0 without VOLTAGE.
         tach_threshold: register 4136, degrees.
         phase_step: register 4137, us.
         period_step: register 4138, us.
@@ -81,7 +85,7 @@ class Command(NamedTuple):
     Attributes:
         next_ns: time from this interrupt to the next, ns.
         relays: which contactor relays are on, FMCR and RMCR.
-        pulses: the gate windows, which replace those that have not begun.
+        pulses: the gate windows that begin before the next interrupt; those of earlier commands stay.
         level: current at which OVERCURRENT comes, % of rated.
     """
 
@@ -90,7 +94,7 @@ class Command(NamedTuple):
     pulses: tuple[Pulse, ...] = ()
     level: int = 400
     block: bool = False
-    """Gate windows that have begun end at once too (a coast stop)."""
+    """All earlier gate windows end at once (a coast stop, a bridge change)."""
 
 
 def gate_bits(*numbers: int) -> int:
