@@ -237,7 +237,7 @@ def _change_verdict(case: DriveCase, small: bool) -> tuple[Verdict, str]:
     switched = case.fast_change.value
     state = f"register 4146 bit 0: {case.fast_change.text}"
     if not small:
-        verdict = {0: Verdict.FINE, None: Verdict.ATTENTION}.get(switched, Verdict.WRONG)
+        verdict = Verdict.ATTENTION if switched is None else Verdict.WRONG if switched else Verdict.FINE
         return verdict, f"too large, leave it off ({state})"
     if switched == 0:
         return Verdict.FINE, f"small enough; it is off ({state})"
