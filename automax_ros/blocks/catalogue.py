@@ -10,6 +10,3 @@ CATALOGUE: dict[str, Block] = {
     for block in sorted((block for family in FAMILIES for block in family.blocks), key=lambda block: block.name)
 }
 """Every control block, in alphabetical order."""
-
-NOT_YET: frozenset[str] = frozenset({"DC_DRIVE_CML"})
-"""Blocks of the manual that the emulator does not have yet."""

@@ -139,6 +139,8 @@ class Output:
     """An output parameter: always a variable, never inverted.
 
     ``holds``: it is written only where the step function says so; otherwise its variable is neither read nor written.
+    With ``dimensions``, numbers of elements, it is a whole array of just these. ``alias`` is another spelling of its
+    name in the manual, which is taken with a warning.
     """
 
     name: str
@@ -148,6 +150,8 @@ class Output:
     required: bool = True
     holds: bool = False
     wants_common: bool = False
+    dimensions: tuple[int, ...] = ()
+    alias: str = ""
 
     @property
     def variable(self) -> str:
@@ -319,10 +323,24 @@ Step = Callable[..., tuple[Any, ...]]
 
 
 @dataclass(frozen=True)
+class LineScan:
+    """That interrupts in step with an AC line, not the clock, begin the scans of a block's task (52.0).
+
+    ``frequency`` is the literal that tells the line's frequency in Hz, ``per_cycle`` the number of scans in a cycle,
+    ``tick_ns`` the one tick that the Processor may have.
+    """
+
+    frequency: str
+    per_cycle: int
+    tick_ns: int
+
+
+@dataclass(frozen=True)
 class Block:
     """A control block. ``function`` is its equation in one or a few lines, ``notes`` what a user must know besides.
 
-    ``step`` is None for the block that ``begins_scan`` (SCAN_LOOP) alone: the task itself carries it out. ``logs``
+    ``step`` is None for a block that ``begins_scan`` alone: the task itself carries it out; ``line_scan`` says that
+    interrupts begin it. ``logs``
     are the problems whose number the step function returns. ``structure`` says what the block does with a data
     structure: the states of the block that makes it are the structure's, and the step functions of those that use it
     take them too, to read, or to write a buffer in place. ``expected_on`` are Processors whose every task should call
@@ -346,6 +364,7 @@ class Block:
     runs_on: frozenset[Platform] = EVERYWHERE
     notes: tuple[str, ...] = ()
     begins_scan: bool = False
+    line_scan: LineScan | None = None
     expected_on: frozenset[Platform] = frozenset()
     expected_since: str = ""
     searched_to: str = ""
@@ -366,5 +385,5 @@ class Block:
         return self.logs if self.coefficients is None else (*self.logs, f"AMX{COEFFICIENT_LIMITED}")
 
     def parameter(self, keyword: str) -> Input | Output | None:
-        """Return the parameter of that name, None where the block has none."""
-        return next((item for item in self.parameters if item.name == keyword), None)
+        """Return the parameter of that name or alias, None where the block has none."""
+        return next((item for item in self.parameters if keyword in (item.name, getattr(item, "alias", ""))), None)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from automax_ros.blocks.arithmetic import ABSOLUTE_VALUE, DIFFERENCE, INVERTER, MULTIPLY_DIVIDE, SUMMER
 from automax_ros.blocks.averages import RUNNING_AVERAGE, SAMPLED_AVERAGE
 from automax_ros.blocks.bits import BIT_SELECT, PACK_BITS, UNPACK_BITS
+from automax_ros.blocks.cml import DC_DRIVE_CML
 from automax_ros.blocks.columns import READ_BITS, READ_WORDS, WRITE_BITS, WRITE_WORDS
 from automax_ros.blocks.comparison import ALARM, COMPARE
 from automax_ros.blocks.counter import COUNTER
@@ -39,7 +40,12 @@ class Family:
 
 
 FAMILIES: tuple[Family, ...] = (
-    Family("scan", "The scan", "Every task begins its scan with SCAN_LOOP and ends it with END.", (SCAN_LOOP,)),
+    Family(
+        "scan",
+        "The scan",
+        "Every task but that of a drive begins its scan with SCAN_LOOP, and each ends it with END.",
+        (SCAN_LOOP,),
+    ),
     Family(
         "arithmetic",
         "Arithmetic",
@@ -77,6 +83,12 @@ FAMILIES: tuple[Family, ...] = (
             PID,
             PROP_INT,
         ),
+    ),
+    Family(
+        "drive",
+        "The current loop of a drive",
+        "One block is a task of its own: it fires the bridge of a DC motor at the interrupts of a 57C406.",
+        (DC_DRIVE_CML,),
     ),
     Family("protection", "Protection of a drive", "For UDC tasks.", (TACHLOSS_OVERSPEED, THERMAL_OVERLOAD)),
 )

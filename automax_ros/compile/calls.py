@@ -152,7 +152,7 @@ def lower_block(emitter: Emitter, instance: BlockInstance) -> None:
 def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
     bound, block = instance.bound, instance.bound.block
     values = {item.variable: _input(emitter, bound, item) for item in block.inputs if _is_value(block, item)}
-    outputs = _places(emitter, bound)
+    outputs = places_of(emitter, bound)
     facts = bound.facts
     for name in CALL_FACTS:
         if name in facts:
@@ -169,8 +169,8 @@ def _lower_block(emitter: Emitter, instance: BlockInstance) -> None:
         if holds:
             _store_when(emitter, inlined.writes, stores)
         else:
-            _store_all(emitter, stores)
-    _drop_forced(emitter, [place.target for place in outputs])
+            store_all(emitter, stores)
+    drop_forced(emitter, [place.target for place in outputs])
 
 
 def _cost_of_search(emitter: Emitter, bound: BoundCall, inlined: Inlined) -> None:
@@ -183,7 +183,7 @@ def _cost_of_search(emitter: Emitter, bound: BoundCall, inlined: Inlined) -> Non
         emitter.emit(build.add_to("cost", build.binary(build.constant(element_ns), "*", count)))
 
 
-def _drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
+def drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
     """Emit that forced commons among a block's targets have the forced value, whatever the block gave them."""
     names = [target.name for target in targets if isinstance(target, Reference) and target.name in emitter.forces]
     for name in dict.fromkeys(names):
@@ -192,7 +192,7 @@ def _drop_forced(emitter: Emitter, targets: Sequence[Expression]) -> None:
 
 
 @dataclass(frozen=True)
-class _Place:
+class Place:
     """Where an output goes: ``local`` is its Python name, "" where it lies in actual memory or in an array.
 
     Of an array element ``index`` and ``in_range`` are what the subscripts tell before the block.
@@ -205,15 +205,15 @@ class _Place:
     in_range: ast.expr | None = None
 
 
-def _places(emitter: Emitter, bound: BoundCall) -> list[_Place]:
+def places_of(emitter: Emitter, bound: BoundCall) -> list[Place]:
     """Return where the outputs go, in the order of the CALL; their subscripts are evaluated here, before the block."""
     declared = {output.name: output for output in bound.block.outputs}
     given = [(declared[name], target) for name, target in bound.arguments.items() if name in declared]
     changing = frozenset(_local(emitter, target) for _, target in given)
-    places: list[_Place] = []
+    places: list[Place] = []
     for output, target in given:
         assert isinstance(target, (Reference, Element))
-        place = _Place(output, target, _local(emitter, target))
+        place = Place(output, target, _local(emitter, target))
         if isinstance(target, Element):
             index, in_range = lower_index(emitter, target, changing)
             place = replace(place, index=index, in_range=in_range)
@@ -233,7 +233,7 @@ def _input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:
     """Return what the step gets for an input: as programmed, its default, or 0 where the block does without it."""
     given = bound.arguments.get(item.name)
     if given is not None:
-        return _block_value(emitter, given)
+        return block_value(emitter, given)
     assert isinstance(item.type, DataType)
     return build.constant(bound.defaults.get(item.name, item.type.zero))
 
@@ -263,12 +263,12 @@ def _no_table(_index: ast.expr) -> ast.expr:
     return build.constant(0)
 
 
-def _block_value(emitter: Emitter, given: Expression) -> ast.expr:
+def block_value(emitter: Emitter, given: Expression) -> ast.expr:
     """Return what a block sees of a parameter."""
     if isinstance(given, (IntegerLiteral, RealLiteral, BooleanLiteral)):
         return build.constant(given.value)
     if isinstance(given, Unary):
-        return build.inverse(_block_value(emitter, given.operand))
+        return build.inverse(block_value(emitter, given.operand))
     if isinstance(given, Element):
         return lower_element(emitter, given).node
     assert isinstance(given, Reference)
@@ -284,7 +284,7 @@ def _local(emitter: Emitter, target: Expression) -> str:
     return ""
 
 
-def _free(bindings: dict[str, ast.expr], outputs: list[_Place]) -> frozenset[str]:
+def _free(bindings: dict[str, ast.expr], outputs: list[Place]) -> frozenset[str]:
     """Return the targets that a block may compute in: always written, no input reads them, no other output's target."""
     read = {name for binding in bindings.values() for name in names_in(binding)}
     targets = [place.local for place in outputs]
@@ -292,19 +292,20 @@ def _free(bindings: dict[str, ast.expr], outputs: list[_Place]) -> frozenset[str
     return frozenset(target for target in always - read if targets.count(target) == 1)
 
 
-def _store_when(emitter: Emitter, test: ast.expr, stores: list[tuple[_Place, ast.expr]]) -> None:
+def _store_when(emitter: Emitter, test: ast.expr, stores: list[tuple[Place, ast.expr]]) -> None:
     """Emit the stores of outputs that hold: where they are not written, nothing looks at them either."""
     fixed = value_of(test)
     if fixed is not None:
-        _store_all(emitter, stores if fixed else [])
+        store_all(emitter, stores if fixed else [])
         return
     emitter.book_cost()
     with emitter.suite() as suite:
-        _store_all(emitter, stores)
+        store_all(emitter, stores)
     emitter.emit(build.when(test, suite))
 
 
-def _store_all(emitter: Emitter, stores: list[tuple[_Place, ast.expr]]) -> None:
+def store_all(emitter: Emitter, stores: list[tuple[Place, ast.expr]]) -> None:
+    """Emit the stores of values into outputs."""
     for place, value in stores:
         if place.index is not None:
             write_at(emitter, place.target.name, place.index, place.in_range, emitter.keep(value))
@@ -325,7 +326,7 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, values: dict[s
         values.update((name, build.constant(value)) for name, value in zip(declared.names, results, strict=True))
         return
     prefix = instance.prefix
-    now = [emitter.keep(_block_value(emitter, bound.arguments[name])) for name in instance.evaluated]
+    now = [emitter.keep(block_value(emitter, bound.arguments[name])) for name in instance.evaluated]
     seen = [f"{prefix}seen_{name.lower()}" for name in instance.evaluated]
     function = f"{prefix}coefficients"
     emitter.extra_globals[function] = coefficient_function(bound.block, period_s, literals, instance.evaluated)

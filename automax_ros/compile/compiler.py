@@ -37,6 +37,7 @@ from automax_ros.compile.calls import BlockInstance, instance_of
 from automax_ros.compile.cost import CostModel
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.layout import Layout, StateField
+from automax_ros.compile.minor_loop import lower_minor_loop
 from automax_ros.compile.pynames import block_prefix, forced_name, latched_name, variable_name
 from automax_ros.compile.scan_io import BackgroundIo, LineForm, ScanIo, ScanLines, ScanTooLong, StateValues, Wish
 from automax_ros.compile.statements import STOPPED, StatementLowering
@@ -208,6 +209,8 @@ class _Compilation:
             emitter.line = self._program.scan_loop_line
             emitter.add_cost(self._cost.scan_loop_ns(self._program))
             self._latch(emitter)
+            if self._program.cml is not None:
+                lower_minor_loop(emitter, self._program.cml)
         lowering.lower_all(statements)
         self._fields.update(lowering.fields)
         body = emitter.body
@@ -235,12 +238,10 @@ class _Compilation:
 
     def _written(self) -> tuple[str, ...]:
         """Return the latched commons that a block may change, in the order of the latch."""
-        outputs = {
-            target.name
-            for instance in self._instances.values()
-            for output in instance.bound.block.outputs
-            if isinstance(target := instance.bound.arguments.get(output.name), Reference)
-        }
+        bounds = [instance.bound for instance in self._instances.values()]
+        if self._program.cml is not None:
+            bounds.append(self._program.cml)
+        outputs = {target.name for bound in bounds for target in bound.targets if isinstance(target, Reference)}
         return tuple(name for name in self._latched if name in outputs)
 
     def _commit(self, emitter: Emitter) -> list[ast.stmt]:

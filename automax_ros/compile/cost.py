@@ -59,8 +59,12 @@ STATEMENT_ESTIMATES_US = {
     "PrintFile": 60.0,
     "Get": 30.0,
     "Put": 40.0,
+    "MinorLoop": 250.0,
 }
-"""Estimated microseconds on a 7010 by kind of BASIC statement, Next for each turn; others take none (decision)."""
+"""Estimated microseconds on a 7010 by kind of BASIC statement, Next for each turn; others take none (decision).
+
+MinorLoop is a scan of DC_DRIVE_CML, the latch of the commons left out: no manual prints its time.
+"""
 SLOWER_THAN_7010 = {Model.MODEL_6010: 4.0, Model.MODEL_6011: 4.0, Model.UDC: 0.8, Model.PC3000: 0.7}
 """How many times the 7010's estimate a BASIC statement takes on each module (decision: the ratios of tables 4 to 6)."""
 
@@ -92,8 +96,13 @@ class CostModel:
         return self.model is not Model.NONE and type(statement).__name__ in STATEMENT_ESTIMATES_US
 
     def scan_loop_ns(self, program: Program) -> int:
-        """Return the time of SCAN_LOOP, the latch included."""
+        """Return the time of SCAN_LOOP, or what takes its place, with its latch."""
         return self._scan_part(SCAN_LOOP.times, program)
+
+    @property
+    def loop_ns(self) -> int:
+        """The estimated time of a scan of a current minor loop."""
+        return self._estimate_ns("MinorLoop")
 
     def end_ns(self, program: Program) -> int:
         """Return the time of END, the write-back included."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -71,6 +71,15 @@ class ScanIo(Protocol):
 
     def io_write(self, slot: int, register: int, value: int) -> int:
         """Write a register of an I/O module; return the problem or 0."""
+        ...
+
+    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:
+        """Execute a scan of the drive's current minor loop.
+
+        ``inputs`` are in the order of the block's declaration, None for one that has no default and is not programmed;
+        ``records`` is a local DIAG_DATA, which the loop writes. Returns the outputs but DIAG_DATA in the order of the
+        declaration, or None where none is written.
+        """
         ...
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from automax_ros.blocks.channels import programmed_channels
 from automax_ros.blocks.declaration import Block
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
 from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.language.syntax.tree import (
@@ -149,6 +150,9 @@ class Program:
     that starts the scan, None where the clock does. ``scan_loop_line`` is the BASIC line of SCAN_LOOP.
 
     A BASIC task has no SCAN_LOOP: its statements are ``scan``, ``ticks`` is 0, and ``files`` are what it opens.
+
+    ``cml`` is the CALL that begins the scans of a task in step with an AC line, in place of SCAN_LOOP; there ``ticks``
+    is 0. It is None for other tasks.
     """
 
     name: str
@@ -167,6 +171,7 @@ class Program:
     source_hash: str = ""
     kind: TaskKind = TaskKind.CONTROL_BLOCK
     files: tuple[OpenedFile, ...] = ()
+    cml: BoundCall | None = None
 
     @property
     def is_basic(self) -> bool:
@@ -175,5 +180,14 @@ class Program:
 
     @property
     def period_ns(self) -> int:
-        """The scan period, TICKS x tick rate."""
-        return self.ticks * self.tick_ns
+        """The scan period: TICKS x tick rate, or the part of a line cycle that lies between two interrupts."""
+        if self.cml is None or self.cml.block.line_scan is None:
+            return self.ticks * self.tick_ns
+        return NS_PER_S // (self.cml.block.line_scan.per_cycle * self.line_hz)
+
+    @property
+    def line_hz(self) -> int:
+        """The frequency in Hz of the AC line that begins the scans, 0 for a task that does not follow one."""
+        if self.cml is None or self.cml.block.line_scan is None:
+            return 0
+        return int(self.cml.facts[self.cml.block.line_scan.frequency.lower()])

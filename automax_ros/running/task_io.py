@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, Protocol, cast
 
@@ -130,6 +130,10 @@ class TaskIo:
         view, element = place
         self.write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
         return 0
+
+    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
+        """Execute the current minor loop of a drive: a task that has none writes no outputs."""
+        return None
 
 
 class RecordingIo(TaskIo):

@@ -61,6 +61,7 @@ def test_declarations_are_the_only_blocks_there_are():
     assert {block.name for block in declared} == set(CATALOGUE)
 
 
-def test_one_block_begins_the_scan_and_has_no_step():
-    assert [block.name for block in CATALOGUE.values() if block.begins_scan] == ["SCAN_LOOP"]
-    assert [block.name for block in CATALOGUE.values() if block.step is None] == ["SCAN_LOOP"]
+def test_two_blocks_begin_the_scan_and_have_no_step():
+    assert [block.name for block in CATALOGUE.values() if block.begins_scan] == ["DC_DRIVE_CML", "SCAN_LOOP"]
+    assert [block.name for block in CATALOGUE.values() if block.step is None] == ["DC_DRIVE_CML", "SCAN_LOOP"]
+    assert [block.name for block in CATALOGUE.values() if block.line_scan] == ["DC_DRIVE_CML"]

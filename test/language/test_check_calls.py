@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from automax_ros.blocks.catalogue import CATALOGUE, NOT_YET
+from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Platform
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import stored_real
@@ -232,13 +232,6 @@ def test_initial_values_before_scan_loop_are_no_conflict() -> None:
         "40 CALL DIFFERENCE(INPUT1=REF%, INPUT2=A%, OUTPUT=A%)\n50 END\n"
     )
     assert codes(text) == []
-
-
-def test_block_of_the_manual_that_is_missing_here_is_told_as_such():
-    assert not NOT_YET & CATALOGUE.keys()
-    for name in sorted(NOT_YET):
-        found = one(call(f"{name}(INPUT=A%)"))
-        assert (found.code, found.message) == ("AMX4070", f"the emulator does not have the block {name} yet")
 
 
 def test_hexadecimal_constant_without_its_0_gets_a_hint():

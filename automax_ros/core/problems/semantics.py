@@ -101,5 +101,15 @@ _BASIC_TASKS = (
     Problem("AMX4120", "port without an end to the wait", Severity.WARNING),
     Problem("AMX4121", "SET of a hardware event"),
 )
+_DRIVES = (
+    Problem("AMX4180", "SCAN_LOOP in the task of a drive"),
+    Problem("AMX4181", "task of a drive on a Processor with another tick"),
+    Problem("AMX4182", "drive without tach loss protection", Severity.WARNING),
+    Problem("AMX4183", "drive without overspeed protection", Severity.WARNING),
+    Problem("AMX4184", "BAD_SCR_NUM is never written", Severity.WARNING),
+    Problem("AMX4185", "overcurrent level cannot be calculated"),
+    Problem("AMX4186", "misprinted name of a parameter", Severity.WARNING),
+    Problem("AMX4187", "dynamic block in the task of a drive"),
+)
 
-PROBLEMS: tuple[Problem, ...] = (*_DECLARATIONS, *_EXPRESSIONS, *_FLOW, *_EVENTS, *_BLOCKS, *_BASIC_TASKS)
+PROBLEMS: tuple[Problem, ...] = (*_DECLARATIONS, *_EXPRESSIONS, *_FLOW, *_EVENTS, *_BLOCKS, *_BASIC_TASKS, *_DRIVES)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from automax_ros.blocks.catalogue import NOT_YET
 from automax_ros.blocks.declaration import Block, Given, Input, Output, Platform, Special
 from automax_ros.core.diagnostics import Note, Span
-from automax_ros.core.ticks import MAX_TICKS, UDC_MAX_TICKS
+from automax_ros.core.ticks import MAX_TICKS, NS_PER_MS, UDC_MAX_TICKS
 from automax_ros.language.checks.coefficients import check_coefficients
 from automax_ros.language.checks.constant_values import literal_of
 from automax_ros.language.checks.context import Context
@@ -29,9 +28,6 @@ def check_call(context: Context, call: Call) -> None:
     if block is None:
         message = f"there is no block {call.block}"
         hint = context.suggest.hint(call.block, context.catalogue)
-        if call.block in NOT_YET:
-            message = f"the emulator does not have the block {call.block} yet"
-            hint = "`automax blocks` lists those it has"
         context.report("AMX4070", message, context.place_of(call.block, call.span), hint)
         return
     before = context.errors
@@ -65,8 +61,13 @@ def _elements(context: Context, block: Block, values: Mapping[str, Expression]) 
 
 
 def check_scan_loop(context: Context, call: Call) -> None:
-    """Check the task's SCAN_LOOP and keep its TICKS, on which the limits of coefficients depend."""
+    """Check the CALL that begins the scan and keep its TICKS, on which the limits of coefficients depend."""
     check_call(context, call)
+    block = context.catalogue.get(call.block)
+    if block is not None and block.line_scan is not None and context.tick_ns != block.line_scan.tick_ns:
+        message = f"{block.name} needs a Processor with the tick of {block.line_scan.tick_ns / NS_PER_MS:g} ms"
+        hint = f"here the tick is {context.tick_ns / NS_PER_MS:g} ms (52.0)"
+        context.report("AMX4181", message, context.place_of(call.block, call.span), hint)
     ticks = next((item.value for item in call.arguments if item.keyword == "TICKS"), None)
     if not isinstance(ticks, IntegerLiteral):
         return
@@ -88,11 +89,15 @@ def _arguments_by_keyword(context: Context, block: Block, call: Call) -> Argumen
     given: Arguments = {}
     for argument in call.arguments:
         parameter = block.parameter(argument.keyword)
-        if argument.keyword in given:
-            note = (Note("it is first given here", _keyword(context, given[argument.keyword][1])),)
-            context.report("AMX4073", f"{argument.keyword} is given twice", _keyword(context, argument), notes=note)
+        name = argument.keyword if parameter is None else parameter.name
+        if name in given:
+            note = (Note("it is first given here", _keyword(context, given[name][1])),)
+            context.report("AMX4073", f"{name} is given twice", _keyword(context, argument), notes=note)
         elif parameter is not None:
-            given[argument.keyword] = (parameter, argument)
+            given[name] = (parameter, argument)
+            if name != argument.keyword:
+                message = f"{argument.keyword} is a misprint of the manual: the parameter is {name}"
+                context.report("AMX4186", message, _keyword(context, argument), f"write {name}")
     return given
 
 

@@ -20,7 +20,7 @@ from automax_ros.language.checks.structures import find_structures
 from automax_ros.language.checks.task_layout import TaskLayout, find_layout
 from automax_ros.language.checks.unconfirmed import find_unconfirmed
 from automax_ros.language.checks.waiting import check_waiting, find_files
-from automax_ros.language.program import CommonSpec, Program
+from automax_ros.language.program import BoundCall, CommonSpec, Program
 from automax_ros.language.syntax.parser import parse
 from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
 from automax_ros.language.syntax.task_kind import TaskKind, kind_of_source
@@ -104,6 +104,7 @@ def _check_module(context: Context, module: Module) -> TaskLayout:
     check_flow(context, layout)
     check_sharing(context, layout)
     _check_expected_blocks(context, layout)
+    _check_dynamic_blocks(context, layout)
     return layout
 
 
@@ -128,6 +129,20 @@ def _check_expected_blocks(context: Context, layout: TaskLayout) -> None:
             context.report("AMX4097", f"the task has no {block.name} block", loop.span, block.expected_since)
 
 
+def _check_dynamic_blocks(context: Context, layout: TaskLayout) -> None:
+    """Report blocks whose coefficients need a constant scan period in a task that follows an AC line."""
+    begins = context.catalogue.get(context.scan_block)
+    if begins is None or begins.line_scan is None:
+        return
+    for statement, line, _ in layout.numbered():
+        block = context.catalogue.get(statement.block) if isinstance(statement, Call) else None
+        if block is not None and block.coefficients is not None:
+            context.line = line
+            place = context.place_of(block.name, statement.span)
+            hint = "its coefficients need a constant scan period: call it in another task"
+            context.report("AMX4187", f"a task with {begins.name} has no {block.name}", place, hint)
+
+
 def _program(context: Context, layout: TaskLayout, name: str, source: SourceText) -> Program:
     data, data_lines = data_pool(context)
     return Program(
@@ -147,7 +162,14 @@ def _program(context: Context, layout: TaskLayout, name: str, source: SourceText
         source_hash=hashlib.sha256(source.text.encode("utf-8", "surrogatepass")).hexdigest(),
         kind=context.kind,
         files=tuple(context.files.values()),
+        cml=_line_call(context, layout),
     )
+
+
+def _line_call(context: Context, layout: TaskLayout) -> BoundCall | None:
+    """Return the CALL that begins the scans in step with an AC line, None where SCAN_LOOP or nothing begins them."""
+    bound = None if layout.scan_loop is None else context.calls.get(layout.scan_loop.span)
+    return bound if bound is not None and bound.block.line_scan is not None else None
 
 
 def _executed(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:

@@ -23,7 +23,8 @@ class Context:
     """One check of one task.
 
     ``lines`` are the physical lines of its text; ``line`` is the BASIC line number in force, None before the first.
-    ``files`` are what the numbers after # of a BASIC task are. ``structures`` are the data structures by name, with the
+    ``files`` are what the numbers after # of a BASIC task are. ``scan_block`` is the block that begins its scans, "" as
+    long as none is found. ``structures`` are the data structures by name, with the
     span of the name where its SHIFT block makes it.
     """
 
@@ -44,6 +45,7 @@ class Context:
     files: dict[int, OpenedFile] = field(default_factory=dict)
     line: int | None = None
     ticks: int | None = None
+    scan_block: str = ""
 
     def report(
         self, code: str, message: str, span: Span, hint: str | None = None, notes: tuple[Note, ...] = ()

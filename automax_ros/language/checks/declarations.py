@@ -48,8 +48,8 @@ def check_declarations(context: Context, layout: TaskLayout) -> None:
 
 def _check_place(context: Context, statement: Declaration, after: bool, top: bool) -> None:
     if after:
-        hint = "all variables are declared before the SCAN_LOOP block"
-        context.report("AMX4003", f"{statement.scope.value} stands after SCAN_LOOP", statement.span, hint)
+        hint = f"all variables are declared before the {context.scan_block} block"
+        context.report("AMX4003", f"{statement.scope.value} stands after {context.scan_block}", statement.span, hint)
     elif not top:
         hint = "a declaration holds for the whole task and cannot depend on a condition"
         context.report("AMX4004", f"{statement.scope.value} stands inside an IF or FOR block", statement.span, hint)
@@ -173,7 +173,7 @@ def _shape(dimensions: tuple[int, ...]) -> str:
 
 def _declare_event(context: Context, event: Event, after: bool) -> None:
     if after:
-        context.report("AMX4064", f"the event {event.name} is declared after SCAN_LOOP", event.span)
+        context.report("AMX4064", f"the event {event.name} is declared after {context.scan_block}", event.span)
     earlier = context.events.get(event.name) or context.symbols.get(event.name)
     if earlier is not None:
         note = Note(f"{event.name} is first declared here", earlier.span)

@@ -127,14 +127,14 @@ def _check_jump(context: Context, jump: Jump, places: dict[int, Place]) -> None:
     if isinstance(place.statement, Declaration):
         context.report("AMX4051", f"line {jump.line} declares variables: nothing is executed there", span, notes=note)
     elif place.region is Region.LOOP or (place.region is Region.STARTUP and _ends_at_scan_loop(jump)):
-        where = "is SCAN_LOOP" if place.region is Region.LOOP else "lies before SCAN_LOOP"
-        hint = "END goes back to SCAN_LOOP by itself; what lies before it runs once"
+        where = f"{'is' if place.region is Region.LOOP else 'lies before'} {context.scan_block}"
+        hint = f"END goes back to {context.scan_block} by itself; what lies before it runs once"
         if jump.place.region is Region.STARTUP:
-            hint = "what lies before SCAN_LOOP runs down to it; FOR repeats, IF ... END_IF leaves out"
+            hint = f"what lies before {context.scan_block} runs down to it; FOR repeats, IF ... END_IF leaves out"
         context.report("AMX4048", f"{jump.verb} {jump.line} cannot be: the line {where}", span, hint, note)
     elif place.region is not jump.place.region:
-        message = f"{jump.verb} {jump.line} would jump over SCAN_LOOP"
-        context.report("AMX4049", message, span, "what lies before SCAN_LOOP runs down to it", note)
+        message = f"{jump.verb} {jump.line} would jump over {context.scan_block}"
+        context.report("AMX4049", message, span, f"what lies before {context.scan_block} runs down to it", note)
     elif jump.place.blocks[: len(place.blocks)] != place.blocks and not context.broken.blocks:
         context.report("AMX4050", f"{jump.verb} {jump.line} would jump into an IF or FOR block", span, notes=note)
 

@@ -10,7 +10,7 @@ from automax_ros.language.checks.context import Context
 from automax_ros.language.checks.expressions import check_expression, check_variable
 from automax_ros.language.checks.statements import check_written
 from automax_ros.language.checks.structures import checked_structure
-from automax_ros.language.checks.tables import checked_table
+from automax_ros.language.checks.tables import checked_array, checked_table
 from automax_ros.language.syntax.tree import (
     Argument,
     BooleanLiteral,
@@ -34,7 +34,8 @@ def checked_value(context: Context, block: Block, parameter: Input | Output, arg
     """
     before = context.errors
     if isinstance(parameter, Output):
-        value: Expression | None = _checked_output(context, parameter, argument)
+        checked = checked_array if parameter.dimensions else _checked_output
+        value: Expression | None = checked(context, parameter, argument)
     elif context.target not in parameter.runs_on:
         message = f"{parameter.name} of {block.name} cannot be used in {context.task_words}"
         context.report("AMX4027", message, argument.span)

@@ -72,25 +72,31 @@ def _check_scan_loops(context: Context, module: Module, loops: list[tuple[Call, 
             )
         return
     first, _ = loops[0]
+    context.scan_block = first.block
     top = {id(statement) for statement in module.statements}
     for call, line in loops:
         context.line = line
-        if call is not first:
-            note = Note("the first SCAN_LOOP is here", first.span)
-            context.report("AMX4041", "a task has only one SCAN_LOOP", call.span, notes=(note,))
+        if call.block != first.block:
+            note = Note(f"{first.block} is here", first.span)
+            message = f"a task with {first.block} has no {call.block}"
+            context.report("AMX4180", message, call.span, "make them two tasks", (note,))
+        elif call is not first:
+            note = Note(f"the first {call.block} is here", first.span)
+            context.report("AMX4041", f"a task has only one {call.block}", call.span, notes=(note,))
         elif id(call) not in top and not context.broken.blocks:
-            context.report("AMX4043", "SCAN_LOOP stands inside an IF or FOR block", call.span)
+            context.report("AMX4043", f"{call.block} stands inside an IF or FOR block", call.span)
 
 
 def _check_blocks_before(context: Context, layout: TaskLayout) -> None:
     if layout.scan_loop is None:
         return
+    name = context.scan_block
     for statement, line in statements_in_order(layout.startup):
         if isinstance(statement, Call):
             context.line = line
-            note = Note("SCAN_LOOP is here", layout.scan_loop.span)
-            message = f"{statement.block} is called before SCAN_LOOP, which must be the first block"
-            context.report("AMX4042", message, statement.span, "move the block after SCAN_LOOP", (note,))
+            note = Note(f"{name} is here", layout.scan_loop.span)
+            message = f"{statement.block} is called before {name}, which must be the first block"
+            context.report("AMX4042", message, statement.span, f"move the block after {name}", (note,))
 
 
 def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
@@ -99,7 +105,7 @@ def _check_ends(context: Context, module: Module, layout: TaskLayout) -> None:
             context.line = line
             context.report(
                 "AMX4046",
-                "END stands before SCAN_LOOP",
+                f"END stands before {context.scan_block}",
                 statement.span,
                 "END marks the end of the scan; STOP ends a task",
             )

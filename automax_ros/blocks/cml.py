@@ -1,0 +1,162 @@
+"""DC_DRIVE_CML: the current minor loop of a DC drive (section 52).
+
+The loop itself is ``drive/cml``: here stands what a CALL may say, in the order of the manual's CALL.
+"""
+
+from __future__ import annotations
+
+from automax_ros.blocks.cml_limits import LIMITS, SCANS_PER_CYCLE
+from automax_ros.blocks.cml_rules import Advised, OvercurrentLevel, WithinAtLine
+from automax_ros.blocks.declaration import Block, Form, Input, LineScan, Output, Platform, Times
+from automax_ros.blocks.rules import Needs
+from automax_ros.core.ticks import DEFAULT_TICK_NS
+from automax_ros.core.types import DataType, Value
+
+LINE_HZ = 60
+"""AC_LINE_FREQ by default, Hz."""
+
+
+def _input(
+    name: str,
+    kind: DataType,
+    text: str,
+    default: Value | None = None,
+    *,
+    required: bool = False,
+    form: Form = Form.ANY,
+    sample: Value | None = None,
+) -> Input:
+    """Return an input with the limits that it has."""
+    low, high = LIMITS.get(name, (None, None))
+    return Input(name, kind, name, text, required, default, form, low, high, sample=sample)
+
+
+def _integer(name: str, text: str, default: int | None = None, *, required: bool = False) -> Input:
+    return _input(name, DataType.INTEGER, text, default, required=required)
+
+
+def _literal(name: str, text: str, default: int | None = None) -> Input:
+    return _input(name, DataType.INTEGER, text, default, required=default is None, form=Form.LITERAL)
+
+
+def _real(name: str, text: str, default: float | None = None) -> Input:
+    return _input(name, DataType.REAL, text, default, required=default is None)
+
+
+def _boolean(name: str, text: str, *, default: bool = False) -> Input:
+    return _input(name, DataType.BOOLEAN, text, default)
+
+
+def _symbol(name: str, kind: DataType, text: str, default: Value | None = None, *, required: bool = False) -> Input:
+    return _input(name, kind, text, default, required=required, form=Form.VARIABLE)
+
+
+def _shown(name: str, text: str, alias: str = "") -> Output:
+    """Return a boolean output."""
+    return Output(name, DataType.BOOLEAN, name, text, required=False, holds=True, alias=alias)
+
+
+def _number(name: str, text: str) -> Output:
+    """Return an INTEGER output."""
+    return Output(name, DataType.INTEGER, name, text, required=False, holds=True)
+
+
+INPUTS = (
+    _literal("IO_CNTL_SLOT", "slot of the drive I/O controller 57C406"),
+    _literal("DIG_IO_SLOT", "slot of the drive digital I/O module"),
+    _literal("AC_LINE_FREQ", "frequency of the AC line in Hz, the lowest expected one if it varies", LINE_HZ),
+    _symbol(
+        "REFERENCE",
+        DataType.INTEGER,
+        "current reference, 4095 counts = LIM_BAR; plus: bridge 1, minus: bridge 2; read each scan; the block does not"
+        " limit it",
+        required=True,
+    ),
+    _real("REF_RATE", "seconds from 0 to LIM_BAR that the reference takes at least, 0.0: no limit; read in run", 0.0),
+    _real("REF_LAG", "break frequency of the reference's lag in rad/s; fixed", 200.0),
+    _real("KP", "proportional gain; read in run"),
+    _real("PI_W_LEAD", "lead break frequency of the P+I in rad/s; fixed"),
+    _integer("AG_FACTOR", "largest integral gain over that of continuous conduction, 1: not adaptive; fixed", 1),
+    _integer("CC_THRESH", "threshold of continuous conduction of the adaptive gain", 0),
+    _symbol("CML_RUN", DataType.BOOLEAN, "TRUE runs the loop, FALSE stops it; read each tick", required=True),
+    _symbol("CML_COAST_STOP", DataType.BOOLEAN, "TRUE: coast stop; read in run", default=False),
+    _boolean("MCR_SELECT", "FALSE: FMCR, TRUE: RMCR; read as CML_RUN rises"),
+    _real("MAX_M_DROPOUT", "longest time in s from the stop to the opening of the M-contactor; fixed", 0.1),
+    _boolean("CML_TEST", "TRUE: test mode, open loop at TEST_ALPHA; read in standby"),
+    _boolean("TEST_BRPOL", "bridge in test mode, FALSE: 1, TRUE: 2; read in standby"),
+    _integer("TEST_ALPHA", "firing angle in test mode in degrees; read in run", 180),
+    _integer("IOC_THRESH", "instantaneous overcurrent in % of the rated current; fixed", required=True),
+    _integer("LIM_BAR", "largest current in % of the rated current; fixed", required=True),
+    _boolean("DIGITAL_TACH", "TRUE: the drive has a digital tachometer; fixed", default=True),
+    _symbol("SPEED_FDBK", DataType.INTEGER, "speed for the tach loss fault, 4095 = 100 %; cannot be forced"),
+    _boolean("TACH_LOSS_STOP", "TRUE: tach loss stops the drive, FALSE: it is shown alone; fixed", default=True),
+    _symbol("OSV_FDBK", DataType.INTEGER, "speed or voltage for the overspeed fault; cannot be forced"),
+    _integer("OSV_THRESH", "OSV_FDBK above it is overspeed or overvoltage; fixed", 0),
+    _boolean("NONSTAND_PHROT", "phase rotation, FALSE: standard, C, B, A; TRUE: A, B, C"),
+    _boolean("AUTO_PHROT", "TRUE: take whatever phase rotation there is; fixed"),
+    _symbol("FAULT_RESET", DataType.BOOLEAN, "TRUE resets drive faults; read in standby", required=True),
+)
+OUTPUTS = (
+    _shown("DC_CML_STATE", "TRUE: run, FALSE: standby"),
+    _shown("SYNC_LOCKED", "TRUE while the loop keeps step with the line"),
+    _number("LINE_PERIOD", "period of the line in us, 16129 to 20833"),
+    _shown("INSWITCH_POSA", "TRUE while the test switch of the 57C406 is in position A"),
+    _shown("INSWITCH_POSB", "TRUE while it is in position B"),
+    _shown("INFAULT_RESET", "TRUE while the fault reset switch of the 57C406 is closed", "INFALT_RESET"),
+    _number("DC_TIME", "time without current since the last scan in us, 0 to 3472"),
+    _shown("BRIDGE_POL", "TRUE: bridge 2 is on, FALSE: bridge 1"),
+    _number("REF_RATE_OUT", "reference after the rate limit"),
+    _number("REF_LAG_OUT", "reference after the lag"),
+    _number("FDBK_GAIN", "gain of the feedback x 1024, 512 to 1280"),
+    _number("I_FDBK", "current feedback, 4095 counts = LIM_BAR"),
+    _number("INTEGRAL_GAIN", "integral gain x 1024"),
+    _number("DELTA", "180 degrees less the firing angle, in us, 0 to 10417"),
+    _shown("IOC_OUT", "fault: instantaneous overcurrent"),
+    _shown("SYNC_LOSS_OUT", "fault: the loop has lost the line"),
+    _shown("TACH_LOSS_OUT", "fault: voltage without speed"),
+    _shown("OSV_OUT", "fault: overspeed or overvoltage"),
+    _shown("EXT_IET_OUT", "fault: external instantaneous electronic trip"),
+    _shown("PHROT_FLT_OUT", "fault: wrong phase rotation"),
+    _shown("BAD_SCR_OUT", "fault: shorted SCR; programming it enables the test before each start"),
+    _number("BAD_SCR_NUM", "pair of the shorted SCR, 1 to 6"),
+    Output(
+        "DIAG_DATA",
+        DataType.INTEGER,
+        "DIAG_DATA",
+        "array (37,1) of the records of the scans, its name alone",
+        required=False,
+        holds=True,
+        dimensions=(38, 2),
+    ),
+)
+
+DC_DRIVE_CML = Block(
+    name="DC_DRIVE_CML",
+    section="52",
+    title="DC drive current minor loop",
+    function="Regulates the armature current of an S6R drive, sequences its contactor and watches for its faults",
+    inputs=INPUTS,
+    outputs=OUTPUTS,
+    times=Times(None, None, None, None),
+    rules=(
+        WithinAtLine("REF_RATE", "AC_LINE_FREQ", LINE_HZ),
+        WithinAtLine("REF_LAG", "AC_LINE_FREQ", LINE_HZ),
+        OvercurrentLevel("IOC_THRESH", "LIM_BAR"),
+        Advised("SPEED_FDBK", "no protection against the loss of the tachometer", "AMX4182"),
+        Advised("OSV_FDBK", "no protection against overspeed", "AMX4183"),
+        Needs("BAD_SCR_NUM", "BAD_SCR_OUT", "AMX4184"),
+    ),
+    runs_on=frozenset({Platform.AUTOMAX}),
+    notes=(
+        "The first block of its task, in place of SCAN_LOOP, called once; no GOTO may reach it or a line before it.",
+        "Its scans begin at the interrupts of the 57C406, six in a cycle of the line.",
+        "Statements before it run once, when the task is put into RUN.",
+        "It latches the task's simple common variables as SCAN_LOOP does (decision).",
+        "The task may have no block with coefficients. Its Processor must have the tick of 5.5 ms.",
+        "Without BAD_SCR_OUT the shorted SCR test is not made.",
+        "A bad value of a variable is logged and the last good one stays; with a bad fixed one the drive never runs.",
+    ),
+    step=None,
+    begins_scan=True,
+    line_scan=LineScan("AC_LINE_FREQ", SCANS_PER_CYCLE, DEFAULT_TICK_NS),
+)
