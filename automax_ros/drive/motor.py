@@ -180,6 +180,7 @@ class Motor(Stateful):
         load_callback: LoadCallback | None = None,
         field: FieldWinding | None = None,
         speed_rad_s: float = 0.0,
+        held: bool = False,
     ) -> None:
         """Begin at a speed.
 
@@ -189,6 +190,7 @@ class Motor(Stateful):
             load_callback: a load torque that is asked for, in addition.
             field: the field; constant and rated without it.
             speed_rad_s: the speed at the start.
+            held: whether something keeps the shaft at that speed whatever the torque; ``load_j`` is what it takes.
         """
         self.data = data
         self.resistance_ohm = data.resistance_ohm
@@ -198,6 +200,7 @@ class Motor(Stateful):
         self.load = load
         self.load_callback = load_callback
         self.speed_rad_s = speed_rad_s
+        self.held = held
         self.angle_rad = 0.0
         self.acceleration = 0.0
         self.time_s = 0.0
@@ -234,14 +237,18 @@ class Motor(Stateful):
         """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
         before = self.speed_rad_s
         self.torque_n_m = torque = self.k_v_s * charge_c / duration_s
-        load = self.load
-        if callable(load) or self.load_callback is not None:
-            load = self.load_torque(before + 0.5 * self.acceleration * duration_s)
-        self._turn(duration_s, torque, load)
-        after = self.speed_rad_s
-        self.acceleration = (after - before) / duration_s
-        # The mean speed: of both ends, less what a torque that rose in between came too late for.
-        mean = 0.5 * (before + after) - self.k_v_s * change_a * duration_s / (12.0 * self.inertia_kg_m2)
+        if self.held:
+            self._hold(duration_s, torque)
+            mean = before
+        else:
+            load = self.load
+            if callable(load) or self.load_callback is not None:
+                load = self.load_torque(before + 0.5 * self.acceleration * duration_s)
+            self._turn(duration_s, torque, load)
+            after = self.speed_rad_s
+            self.acceleration = (after - before) / duration_s
+            # The mean speed: of both ends, less what a torque that rose in between came too late for.
+            mean = 0.5 * (before + after) - self.k_v_s * change_a * duration_s / (12.0 * self.inertia_kg_m2)
         self._owed_v_s += (self.k_v_s * mean - self._emf) * duration_s
         self._smooth += (self.acceleration - self._smooth) * (duration_s / (duration_s + SMOOTH_S))
         slope = abs(self.k_v_s * self._smooth)
@@ -295,6 +302,13 @@ class Motor(Stateful):
             return
         self._move(time_s, 0.5 * (speed + after), torque, load, rubbing)
         self.speed_rad_s = after
+
+    def _hold(self, time_s: float, torque: float) -> None:
+        """Let a torque (N m) act for a time on a shaft whose speed something keeps: that takes what is left of it."""
+        speed = self.speed_rad_s
+        rubbing = self.data.coulomb_n_m * ((speed > 0.0) - (speed < 0.0))
+        left = torque + self.coupling_n_m - rubbing - self.data.viscous_n_m_s * speed
+        self._move(time_s, speed, torque, left, rubbing)
 
     def _move(self, time_s: float, mean_speed: float, torque: float, load: float, rubbing: float) -> None:
         way = mean_speed * time_s

@@ -5,11 +5,14 @@ A controller commands gates and the contactor; everybody else looks, loads the s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import pi
 
-from automax_ros.drive.ac_line import AcLine
+from automax_ros.drive.ac_line import AcLine, Rotation
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
+from automax_ros.drive.errors import LARGEST, require
 from automax_ros.drive.meter import Sample
 from automax_ros.drive.motor import Motor
 from automax_ros.drive.nameplate import DriveParameters
@@ -19,6 +22,38 @@ PICK_UP_NS, DROP_OUT_NS = 60_000_000, 20_000_000
 """From the relay to closed and to open contacts of the M-contactor, ns (decision)."""
 SCR_DROP_V = 1.5
 """Voltage over a conducting SCR, V (decision: 1.2 to 1.6 V are usual)."""
+RAD_S_PER_RPM = pi / 30
+
+
+@dataclass(frozen=True)
+class LoadData:
+    """What the motor turns.
+
+    Attributes:
+        torque_nm: a torque that keeps its direction at any speed, N m; positive brakes positive speed. What is set from
+            outside replaces it.
+        torque_per_rpm: pairs of rpm and N m, rpm ascending: straight lines between them, level beyond them. A table
+            that begins at 0 or above counts for both directions: it brakes (decision).
+        friction_nm: Coulomb friction, N m, which also holds the shaft at rest.
+        held_rpm: the speed at which the shaft is held, 0 for a locked rotor; None for one that turns.
+    """
+
+    torque_nm: float = 0.0
+    torque_per_rpm: tuple[tuple[float, float], ...] = ()
+    friction_nm: float = 0.0
+    held_rpm: float | None = None
+
+    def torque_at(self, rpm: float) -> float:
+        """Return the table's torque at a speed, N m."""
+        table = self.torque_per_rpm
+        if rpm < 0.0 <= table[0][0]:
+            return -self.torque_at(-rpm)
+        if rpm <= table[0][0]:
+            return table[0][1]
+        for (low, below), (high, above) in pairwise(table):
+            if rpm <= high:
+                return below + (above - below) * (rpm - low) / (high - low)
+        return table[-1][1]
 
 
 @dataclass(frozen=True)
@@ -26,14 +61,19 @@ class PlantData:
     """What a plant is made of; SI units.
 
     Attributes:
-        parameters: the motor, and the line it usually has.
+        parameters: the motor, and its line's voltage, frequency and inductance.
         resistance_ohm: source resistance of a phase.
         inertia: inertia of motor and load over the motor's own.
+        standard_rotation: whether the line's phases pass in the order C, B, A. Such a line is connected so that the
+            drive's terminals T1, T2, T3 carry C, B, A; one of the other rotation is connected alike (decision).
+        load: what the motor turns.
     """
 
     parameters: DriveParameters
     resistance_ohm: float = 0.005
     inertia: float = 1.0
+    standard_rotation: bool = True
+    load: LoadData = field(default_factory=LoadData)
 
 
 class DrivePlant(Stateful):
@@ -44,7 +84,7 @@ class DrivePlant(Stateful):
         rated_amps: rated armature current, A.
     """
 
-    _kept = ("_contacts", "_relay")
+    _kept = ("_contacts", "_relay", "_load_nm")
 
     def __init__(self, data: PlantData, *, energy: bool = False) -> None:
         """Begin at rest, without current, the contactor open."""
@@ -56,14 +96,40 @@ class DrivePlant(Stateful):
             parameters.line_hz,
             inductance_h=parameters.source_h,
             resistance_ohm=data.resistance_ohm,
+            rotation=Rotation.ABC if data.standard_rotation else Rotation.CBA,
         )
-        self.motor = Motor(parameters.motor)
-        self.motor.inertia_kg_m2 *= data.inertia
+        self._load_nm = data.load.torque_nm
+        self.motor = self._motor()
         self.bridge = Bridge(drop_v=SCR_DROP_V)
         self.circuit = Circuit(self.line, self.bridge, self.motor, energy=energy)
         self.circuit.open_contactor()
         self._relay = False
         self._contacts: list[tuple[int, bool]] = []
+
+    def _motor(self) -> Motor:
+        data, load = self.data.parameters.motor, self.data.load
+        motor = Motor(
+            replace(data, coulomb_n_m=data.coulomb_n_m + load.friction_nm),
+            load=self._torque if load.torque_per_rpm else self._load_nm,
+            speed_rad_s=(load.held_rpm or 0.0) * RAD_S_PER_RPM,
+            held=load.held_rpm is not None,
+        )
+        motor.inertia_kg_m2 *= self.data.inertia
+        return motor
+
+    def _torque(self, speed_rad_s: float) -> float:
+        return self._load_nm + self.data.load.torque_at(speed_rad_s / RAD_S_PER_RPM)
+
+    @property
+    def load_torque_nm(self) -> float:
+        """The load torque that keeps its direction, N m: what the configuration says, until somebody sets another."""
+        return self._load_nm
+
+    @load_torque_nm.setter
+    def load_torque_nm(self, torque_nm: float) -> None:
+        self._load_nm = require("load torque in N m", torque_nm, -LARGEST, LARGEST)
+        if not self.data.load.torque_per_rpm:
+            self.motor.load = self._load_nm
 
     @property
     def now_ns(self) -> int:

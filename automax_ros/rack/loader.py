@@ -16,7 +16,7 @@ from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import is_rack_name
-from automax_ros.rack.plants import Plants, read_plants
+from automax_ros.rack.plants.reading import Plants, read_plants
 from automax_ros.rack.ros_names import namespace
 from automax_ros.rack.scalars import boolean_value, text_value
 from automax_ros.rack.sections import Section, entries_of
@@ -101,7 +101,8 @@ class _RackReader:
         loss = self._module_loss(section.get("on_module_loss"))
         execution = self._execution(section.get("execution"))
         executive = self._executive(section.get("executive"))
-        modules = self._modules(section, executive, read_plants(section.get("plants"), self._findings))
+        plants = read_plants(section.get("plants"), self._findings)
+        modules = self._modules(section, executive, plants)
         common = section.get("common")
         variables = CommonReader(modules, self._findings).read(common) if common is not None else ()
         if common is not None:
@@ -120,6 +121,7 @@ class _RackReader:
             executive=executive,
             auto_run=auto_run,
             on_module_loss=loss,
+            plants=tuple(plants.known.values()),
         )
 
     def _name(self, node: Node | None) -> str | None:

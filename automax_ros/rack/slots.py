@@ -11,7 +11,7 @@ from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
 from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_number
-from automax_ros.rack.plants import Plants
+from automax_ros.rack.plants.reading import Plants
 from automax_ros.rack.scalars import text_value, wrong_kind
 from automax_ros.rack.sections import Entry, Section, entries_of
 from automax_ros.rack.tasks import TaskReader

@@ -77,6 +77,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6474", "plant of a drive"),
     Problem("AMX6475", "Motor Overload Ratio of a drive"),
     Problem("AMX6476", "name of a plant"),
+    Problem("AMX6477", "line, load or inertia of a plant"),
     Problem("AMX6480", "UDC task with a common outside of its dual port"),
     Problem("AMX6481", "UDC task too large"),
     Problem("AMX6482", "UDC tasks with unequal TICKS", hardware="95"),

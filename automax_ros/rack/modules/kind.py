@@ -11,8 +11,9 @@ from typing import Any, Protocol, runtime_checkable
 
 from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Span
+from automax_ros.drive.plant import DrivePlant
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.plants import Plants
+from automax_ros.rack.plants.reading import Plants
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.sections import Section
 from automax_ros.rack.task_config import TaskConfig
@@ -237,6 +238,7 @@ class Parts:
     ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells
     observers of writes that no scan has made. ``writer`` returns the id under which a module with interrupts writes.
     A 57C406 attaches itself to ``drives``.
+    ``plants`` are those with a motor, by name; the rack keeps their states.
     """
 
     memory: CommonMemory
@@ -251,6 +253,7 @@ class Parts:
     execution: Callable[[str], Execution]
     tell_writes: Callable[[], None]
     writer: Callable[[str], int]
+    plants: Mapping[str, DrivePlant]
 
 
 class Module(Protocol):

@@ -14,7 +14,7 @@ from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.modules.udc import UdcModule
 from automax_ros.rack.modules.udc_registers import UDC_REGISTERS
-from automax_ros.rack.plants import PlantConfig
+from automax_ros.rack.plants.config import PlantConfig
 from automax_ros.rack.scalars import text_value
 from automax_ros.rack.sections import Section, entries_of
 from automax_ros.rack.task_config import TaskConfig

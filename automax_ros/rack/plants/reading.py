@@ -1,8 +1,6 @@
-"""The ``plants`` section: the motors and loads that drives turn, by name. A plant belongs to one drive of one module.
+"""Reads the ``plants`` section: the motors and loads that drives turn. A plant belongs to one drive of one module.
 
-The emulator reads what the checks of tasks need, the motor and the drive's Motor Overload Ratio; it does not simulate a
-plant yet. Keys that only a simulated plant would heed are refused for the time being (decision), so that nobody takes
-them for heeded.
+A plant without ``motor`` is not simulated: its drive's parameters are all there is (decision).
 """
 
 from __future__ import annotations
@@ -13,32 +11,26 @@ from dataclasses import dataclass, field
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
+from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.nameplate import NamePlate
 from automax_ros.rack.findings import Findings
+from automax_ros.rack.plants.building import plant_data
+from automax_ros.rack.plants.config import MOTORS, LoadConfig, PlantConfig, SupplyConfig
+from automax_ros.rack.plants.keys import read_inertia, read_load, read_supply
 from automax_ros.rack.scalars import integer_value, number_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 
-MOTORS = ("dc_10hp_240v", "dc_150hp_500v", "dc_800hp_700v")
-"""Motors that a plant may have by name."""
 MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
 """Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
-_KEYS = ("motor", "motor_overload_ratio")
-_NOT_YET = ("line", "load", "inertia", "couple", "feeds")
+_SIMULATED = ("line", "load", "inertia")
+_NOT_YET = ("couple", "feeds")
+KEYS = ("motor", "motor_overload_ratio", *_SIMULATED, *_NOT_YET)
+"""What may be said of a plant."""
 _PLATE = ("hp", "volts", "rpm", "amps", "resistance_ohm", "inductance_h", "inertia_kg_m2")
 _PLATE_REQUIRED = ("hp", "volts", "rpm")
 _MOST = 1e9
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}\Z")
 _LIMIT = 100
-
-
-@dataclass(frozen=True)
-class PlantConfig:
-    """A plant: its motor by name or by its plate, and the ``motor_overload_ratio`` of its drive in %."""
-
-    name: str
-    motor: str | NamePlate | None = None
-    motor_overload_ratio: int | None = None
-    line: int = 0
 
 
 @dataclass
@@ -93,18 +85,36 @@ def read_plants(node: Node | None, findings: Findings) -> Plants:
 
 def _plant(name: str, key: Scalar, node: Node, findings: Findings) -> PlantConfig:
     what = f"plant {name}"
-    section = Section(entries_of(node, what, findings) or (), what, (*_KEYS, *_NOT_YET), findings)
+    section = Section(entries_of(node, what, findings) or (), what, KEYS, findings)
     for option in _NOT_YET:
         if option in section:
             message = f"{option} of {what} is not supported yet: the emulator does not simulate plants"
             findings.add("AMX6472", message, section.key_span(option), "leave it out")
-    ratio = section.get("motor_overload_ratio")
-    return PlantConfig(
+    ratio, motor = section.get("motor_overload_ratio"), section.get("motor")
+    line, load, inertia = (section.get(option) for option in _SIMULATED)
+    needless = next((option for option in _SIMULATED if option in section), "")
+    if motor is None and needless:
+        findings.add("AMX6009", f"{what} has {needless} and no motor: it is not simulated", section.key_span(needless))
+    config = PlantConfig(
         name,
-        _motor(section.get("motor"), f"motor of {what}", findings),
+        _motor(motor, f"motor of {what}", findings) if motor else None,
         None if ratio is None else _ratio(ratio, what, findings),
         key.span.line,
+        read_supply(line, what, findings) if line else SupplyConfig(),
+        read_load(load, what, findings) if load else LoadConfig(),
+        read_inertia(inertia, what, findings) if inertia else 1.0,
     )
+    if not findings.errors:
+        _check_data(config, key.span, findings)
+    return config
+
+
+def _check_data(config: PlantConfig, span: Span, findings: Findings) -> None:
+    """Report a motor that contradicts itself or cannot be simulated."""
+    try:
+        plant_data(config)
+    except ParameterError as error:
+        findings.add("AMX6473", f"plant {config.name}: {error}", span)
 
 
 def _ratio(node: Node, what: str, findings: Findings) -> int | None:
@@ -112,9 +122,7 @@ def _ratio(node: Node, what: str, findings: Findings) -> int | None:
     return integer_value(node, f"motor_overload_ratio of {what}", findings, low=low, high=high, code="AMX6475")
 
 
-def _motor(node: Node | None, what: str, findings: Findings) -> str | NamePlate | None:
-    if node is None:
-        return None
+def _motor(node: Node, what: str, findings: Findings) -> str | NamePlate | None:
     if isinstance(node, Mapping):
         return _plate(node, what, findings)
     name = text_value(node, what, findings, limit=_LIMIT)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.drive.nameplate import NamePlate
-from automax_ros.rack.plants import PlantConfig
+from automax_ros.rack.plants.config import PlantConfig
 
-from .helpers import good, loaded
+from ..helpers import good, loaded
 
 HEAD = """\
 rack: LINE1
@@ -51,7 +51,8 @@ def test_each_drive_has_its_plant(tmp_path):
         ({"winder": "{motor_overload_ratio: 401}"}, "AMX6475", 7),
         ({"winder": "{motor_overload_ratio: 150.5}"}, "AMX6008", 7),
         ({"winder": "{couple: {to: REEL}}"}, "AMX6472", 7),
-        ({"winder": "{inertia: 2.0}"}, "AMX6472", 7),
+        ({"winder": "{motor: dc_10hp_240v, inertia: 0.5}"}, "AMX6477", 7),
+        ({"winder": "{inertia: 2.0}"}, "AMX6009", 7),
         ({"winder": "{moter: dc_10hp_240v}"}, "AMX6007", 7),
         ({"winder": "WINDER"}, "AMX6008", 7),
     ],

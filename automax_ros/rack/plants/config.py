@@ -1,0 +1,82 @@
+"""What the ``plants`` section of a rack file means; engineering units as in the file.
+
+``line`` is the line of the file where a plant is defined, ``supply`` its AC line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from automax_ros.drive.nameplate import EXAMPLES, NamePlate
+
+MOTORS = {"dc_10hp_240v": "10hp", "dc_150hp_500v": "150hp", "dc_800hp_700v": "800hp"}
+"""Motors that a plant may have by name, each with its name in ``drive/nameplate``."""
+
+
+@dataclass(frozen=True)
+class SupplyConfig:
+    """The AC line of a plant; None is the usual value for its motor.
+
+    Attributes:
+        v_ll: line-to-line voltage, V rms.
+        hz: frequency, Hz.
+        ls_mh: source inductance of a phase, mH.
+        rs_mohm: source resistance of a phase, milliohm.
+        standard: whether the phases pass in the standard order C, B, A (52.1.5).
+    """
+
+    v_ll: float | None = None
+    hz: float | None = None
+    ls_mh: float | None = None
+    rs_mohm: float | None = None
+    standard: bool = True
+
+
+@dataclass(frozen=True)
+class LoadConfig:
+    """What a plant's motor turns.
+
+    Attributes:
+        torque_nm: a torque that keeps its direction at any speed, N m; positive brakes positive speed.
+        torque_per_rpm: pairs of rpm and N m, rpm ascending; () for none.
+        friction_nm: Coulomb friction, N m.
+        speed_rpm: the speed at which the shaft is held, 0 for a locked rotor; None for a shaft that turns.
+        from_ros: whether ROS 2 may set ``torque_nm``.
+    """
+
+    torque_nm: float = 0.0
+    torque_per_rpm: tuple[tuple[float, float], ...] = ()
+    friction_nm: float = 0.0
+    speed_rpm: float | None = None
+    from_ros: bool = False
+
+
+@dataclass(frozen=True)
+class PlantConfig:
+    """A plant.
+
+    Attributes:
+        name: its name.
+        motor: a name of ``MOTORS`` or a plate; None for a plant of which only the drive's parameters are known, which
+            is not simulated.
+        motor_overload_ratio: that of its drive, %.
+        line: the line of the file.
+        supply: the AC line.
+        load: what the motor turns.
+        inertia: inertia of motor and load over the motor's own.
+    """
+
+    name: str
+    motor: str | NamePlate | None = None
+    motor_overload_ratio: int | None = None
+    line: int = 0
+    supply: SupplyConfig = field(default_factory=SupplyConfig)
+    load: LoadConfig = field(default_factory=LoadConfig)
+    inertia: float = 1.0
+
+    @property
+    def plate(self) -> NamePlate | None:
+        """The motor's plate with the line of this plant, None without a motor."""
+        if self.motor is None:
+            return None
+        return self.motor if isinstance(self.motor, NamePlate) else EXAMPLES[MOTORS[self.motor]]
