@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from automax_ros.rack.modules.kind import Module, ModuleConfig, ModuleKind
     from automax_ros.rack.observers import Operation, RackObserver
     from automax_ros.rack.operations import OperationRefused
-    from automax_ros.rack.rack import Rack, RackState
+    from automax_ros.rack.rack import Rack
+    from automax_ros.rack.rack_state import RackState
     from automax_ros.rack.report import report_of
     from automax_ros.rack.stepping.stepper import Halt, Stepper, Why
     from automax_ros.rack.stimuli.player import Stimulation
@@ -72,6 +73,7 @@ __getattr__ = face(
     "observers",
     "operations",
     "rack",
+    "rack_state",
     "report",
     "stepping.stepper",
     "stimuli.player",

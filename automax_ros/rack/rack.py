@@ -10,28 +10,25 @@ rack.operations.stop("SPEED")
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
-from automax_ros.drive.state import SavedState
 from automax_ros.rack.adjusting import Adjustments
 from automax_ros.rack.background_task import WaitTrigger
 from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.forcing import Force, Forcing
 from automax_ros.rack.installation import Finding, Installation
-from automax_ros.rack.modules.kind import Module, ModuleState, Parts
+from automax_ros.rack.modules.kind import Module, Parts
 from automax_ros.rack.observers import Observers, RackObserver
 from automax_ros.rack.operations import Operations
-from automax_ros.rack.plants.building import build_plants
+from automax_ros.rack.plants.running import RackPlants
+from automax_ros.rack.rack_state import RackState
 from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
 from automax_ros.rack.settings import common_named
-from automax_ros.rack.standing import OperationsState
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.triggers import MakeTrigger, Trigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
@@ -52,26 +49,6 @@ from automax_ros.running.views import Memory
 
 _FAULTED = Status.FAULTED
 """A name of its own, since it is asked for after each scan and an enumeration's member is slow to get."""
-
-
-@dataclass(frozen=True)
-class RackState:
-    """All that the future of a rack depends on, apart from its configuration and sources.
-
-    ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``events`` those that are kept
-    for the next who waits, ``clock_since_ns`` since when the common clock runs, ``modules`` by slot, ``plants`` by
-    name: a module's state has nothing of its plant.
-    """
-
-    now_ns: int
-    image: tuple[tuple[int, int, Value], ...]
-    forced: frozenset[tuple[int, int]]
-    events: tuple[str, ...]
-    channels: tuple[Any, ...]
-    operations: OperationsState
-    clock_since_ns: int | None
-    modules: Mapping[int, ModuleState]
-    plants: Mapping[str, SavedState] = field(default_factory=dict)
 
 
 class Rack:
@@ -105,7 +82,7 @@ class Rack:
         self._interrupts = Interrupts(self.memory, self.events)
         self._inputs = ProcessInputs(self.memory, self.scheduler)
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
-        self.plants = build_plants(config.plants)
+        self.plants = RackPlants(config.plants)
         parts = Parts(
             memory=self.memory,
             scheduler=self.scheduler,
@@ -316,7 +293,7 @@ class Rack:
             operations=self.operations.state(),
             clock_since_ns=self._clock.since_ns,
             modules={module.config.slot: module.state() for module in self.modules},
-            plants={name: plant.state() for name, plant in self.plants.items()},
+            plants=self.plants.state(),
         )
 
     def load(self, state: RackState) -> None:
@@ -327,8 +304,6 @@ class Rack:
         """
         if set(state.modules) != {module.config.slot for module in self.modules}:
             raise ValueError("the state is that of a rack with other modules")
-        if set(state.plants) != set(self.plants):
-            raise ValueError("the state is that of a rack with other plants")
         if self.scheduler.next_ns is not None:
             raise ValueError("this rack runs already: load the state into one that was not started")
         self.scheduler.run_until(state.now_ns)
@@ -337,8 +312,7 @@ class Rack:
         self.operations.load(state.operations)
         self._clock.resume(state.clock_since_ns)
         self.channels.load(state.channels)
-        for name, plant in self.plants.items():
-            plant.restore(state.plants[name])
+        self.plants.load(state.plants)
         for module in self.modules:
             module.load(state.modules[module.config.slot])
         self._forcing.load()

@@ -1,0 +1,46 @@
+"""The plants of a running rack: what becomes of them at power-up, in snapshots and when somebody works on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from automax_ros.drive.errors import DriveError
+from automax_ros.drive.plant import DrivePlant
+from automax_ros.drive.state import SavedState
+from automax_ros.rack.plants.building import build_plants
+from automax_ros.rack.plants.config import PlantConfig
+
+
+class RackPlants(Mapping[str, DrivePlant]):
+    """The plants with a motor, by name. They go on whatever becomes of the rack's power."""
+
+    def __init__(self, configs: Iterable[PlantConfig]) -> None:
+        """Make all plants, at rest."""
+        self._plants = build_plants(configs)
+
+    def __getitem__(self, name: str) -> DrivePlant:
+        return self._plants[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._plants)
+
+    def __len__(self) -> int:
+        return len(self._plants)
+
+    def state(self) -> dict[str, SavedState]:
+        """Return all that their future depends on, by name."""
+        return {name: plant.state() for name, plant in self._plants.items()}
+
+    def load(self, state: Mapping[str, SavedState]) -> None:
+        """Take a state over.
+
+        Raises:
+            ValueError: it is not that of these plants.
+        """
+        if set(state) != set(self._plants):
+            raise ValueError("the state is that of a rack with other plants")
+        try:
+            for name, plant in self._plants.items():
+                plant.restore(state[name])
+        except DriveError as error:
+            raise ValueError(f"the state of a plant does not fit: {error}") from error
