@@ -123,11 +123,15 @@ class Circuit(Conduction):
 
     def sample(self) -> Sample:
         """Return the integrals since the last call (or the start), and begin again."""
-        volt_s = self._volt_s + self._z.r * self._charge + self._z.l * (self.current_a - self._current_before)
-        duration_s = (self.now_ns - self._sample_ns) * 1e-9
-        sample = Sample(duration_s, self._charge, volt_s, self._zero_s, self._overlap_s, self._square, self._pieces)
+        sample = self.present_sample()
         self._begin_sample()
         return sample
+
+    def present_sample(self) -> Sample:
+        """Return the integrals since the last sample, which goes on; its list of intervals is the circuit's own."""
+        volt_s = self._volt_s + self._z.r * self._charge + self._z.l * (self.current_a - self._current_before)
+        duration_s = (self.now_ns - self._sample_ns) * 1e-9
+        return Sample(duration_s, self._charge, volt_s, self._zero_s, self._overlap_s, self._square, self._pieces)
 
     def pieces(self) -> list[Piece]:
         """Return the armature current since the last sample, interval by interval, without those where none flowed."""

@@ -74,10 +74,12 @@ class Sample:
     @property
     def rms_current_a(self) -> float:
         """Root of the mean square of the armature current, A; computed when asked for."""
-        if not self.duration_s:
-            return 0.0
-        square = self._square + sum(Piece(*piece).square() for piece in self._pieces)
-        return sqrt(max(square, 0.0) / self.duration_s)
+        return sqrt(max(self.square_a2s, 0.0) / self.duration_s) if self.duration_s else 0.0
+
+    @property
+    def square_a2s(self) -> float:
+        """Integral of the square of the armature current, A2 s; computed when asked for."""
+        return self._square + sum(Piece(*piece).square() for piece in self._pieces)
 
 
 @dataclass

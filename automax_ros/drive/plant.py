@@ -13,9 +13,10 @@ from automax_ros.drive.ac_line import AcLine, Rotation
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
 from automax_ros.drive.errors import LARGEST, require
-from automax_ros.drive.meter import Sample
+from automax_ros.drive.meter import EnergyMeter, Sample
 from automax_ros.drive.motor import Motor
 from automax_ros.drive.nameplate import DriveParameters
+from automax_ros.drive.plant_signals import PlantMeter
 from automax_ros.drive.state import SavedState, Stateful, check_names
 
 PICK_UP_NS, DROP_OUT_NS = 60_000_000, 20_000_000
@@ -82,6 +83,7 @@ class DrivePlant(Stateful):
     Attributes:
         circuit: line, bridge and motor.
         rated_amps: rated armature current, A.
+        meter: what an observer measures by, None while nobody does.
     """
 
     _kept = ("_contacts", "_relay", "_load_nm")
@@ -103,6 +105,7 @@ class DrivePlant(Stateful):
         self.bridge = Bridge(drop_v=SCR_DROP_V)
         self.circuit = Circuit(self.line, self.bridge, self.motor, energy=energy)
         self.circuit.open_contactor()
+        self.meter: PlantMeter | None = None
         self._relay = False
         self._contacts: list[tuple[int, bool]] = []
 
@@ -157,7 +160,14 @@ class DrivePlant(Stateful):
 
     def sample(self) -> Sample:
         """Return the integrals since the last call."""
-        return self.circuit.sample()
+        sample = self.circuit.sample()
+        if self.meter is not None:
+            self.meter.add(sample)
+        return sample
+
+    def begin_metering(self) -> None:
+        """Let an observer have means and energies from now on; what the plant does stays the same, bit for bit."""
+        self.meter = PlantMeter(self)
 
     def state(self) -> SavedState:
         """Return all that its future depends on."""
@@ -171,4 +181,8 @@ class DrivePlant(Stateful):
         """
         check_names("plant", state, (*self._kept, "circuit"))
         super().restore({name: state[name] for name in self._kept})
+        # Whether energies are metered is the observer's choice, and nothing else depends on it.
+        self.circuit.energy = None if state["circuit"].get("energy") is None else EnergyMeter()
         self.circuit.restore(state["circuit"])
+        if self.meter is not None:
+            self.begin_metering()
