@@ -16,7 +16,7 @@ from automax_ros.drive.errors import LARGEST, require
 from automax_ros.drive.meter import EnergyMeter, Sample
 from automax_ros.drive.motor import Motor
 from automax_ros.drive.nameplate import DriveParameters
-from automax_ros.drive.plant_signals import PlantMeter
+from automax_ros.drive.plant_meter import PlantMeter
 from automax_ros.drive.state import SavedState, Stateful, check_names
 
 PICK_UP_NS, DROP_OUT_NS = 60_000_000, 20_000_000
@@ -167,7 +167,7 @@ class DrivePlant(Stateful):
 
     def begin_metering(self) -> None:
         """Let an observer have means and energies from now on; what the plant does stays the same, bit for bit."""
-        self.meter = PlantMeter(self)
+        self.meter = PlantMeter(self.circuit)
 
     def state(self) -> SavedState:
         """Return all that its future depends on."""

@@ -1,33 +1,12 @@
-"""What can be seen of a plant: at an instant, and as means over a time of the observer's own; it changes nothing."""
+"""What can be seen of a plant at an instant."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, sqrt
-from typing import TYPE_CHECKING
+from math import pi
 
-from automax_ros.drive.meter import EnergyMeter, Sample
+from automax_ros.drive.plant import DrivePlant
 from automax_ros.drive.scr import REVERSE
-
-if TYPE_CHECKING:
-    from automax_ros.drive.plant import DrivePlant
-
-
-@dataclass(frozen=True)
-class Means:
-    """Means of a time that has passed.
-
-    Attributes:
-        duration_s: how long it was, s; all is 0 where it is 0.
-        current_a: mean armature current, A; positive from bridge 1.
-        current_rms_a: rms of the armature current, A.
-        voltage_v: mean voltage over the armature's terminals, V; the EMF counts while no current flows.
-    """
-
-    duration_s: float = 0.0
-    current_a: float = 0.0
-    current_rms_a: float = 0.0
-    voltage_v: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -102,40 +81,3 @@ def _energies(plant: DrivePlant) -> Energies | None:
     if meter is None:
         return None
     return Energies(meter.source_j, meter.loss_j, meter.stored_j, plant.motor.shaft_j)
-
-
-class PlantMeter:
-    """Means over the times between one look and the next, whoever takes samples of the circuit meanwhile; energies."""
-
-    def __init__(self, plant: DrivePlant) -> None:
-        """Begin at the plant's present, with metering its energies too, unless it does already."""
-        circuit = plant.circuit
-        self._circuit = circuit
-        if circuit.energy is None:
-            circuit.energy = EnergyMeter()
-        self._sums = (0.0, 0.0, 0.0, 0.0)
-        self._told = _sums(circuit.present_sample())
-
-    def add(self, sample: Sample) -> None:
-        """Count a sample that somebody has taken."""
-        one, two, three, four = _sums(sample)
-        sums = self._sums
-        self._sums = sums[0] + one, sums[1] + two, sums[2] + three, sums[3] + four
-
-    def look(self) -> Means:
-        """Return the means since the look before."""
-        present = _sums(self._circuit.present_sample())
-        duration, charge, square, volt_s = (
-            sums + now - told for sums, now, told in zip(self._sums, present, self._told, strict=True)
-        )
-        self._sums, self._told = (0.0, 0.0, 0.0, 0.0), present
-        if duration <= 0.0:
-            return Means()
-        return Means(duration, charge / duration, sqrt(max(square, 0.0) / duration), volt_s / duration)
-
-
-_Sums = tuple[float, float, float, float]
-
-
-def _sums(sample: Sample) -> _Sums:
-    return sample.duration_s, sample.charge_c, sample.square_a2s, sample.volt_s

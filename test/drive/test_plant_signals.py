@@ -8,7 +8,8 @@ import pytest
 from automax_ros.drive.firing import ConstantAlpha
 from automax_ros.drive.nameplate import EXAMPLES, derive
 from automax_ros.drive.plant import PICK_UP_NS, DrivePlant, PlantData
-from automax_ros.drive.plant_signals import Means, signals_of
+from automax_ros.drive.plant_meter import Means
+from automax_ros.drive.plant_signals import signals_of
 
 MS = 1_000_000
 
