@@ -90,3 +90,11 @@ class DriveController:
             off_ns = on_ns + length_ns
             if off_ns > now_ns:
                 plant.circuit.fire(on_ns if on_ns > now_ns else now_ns, off_ns, *gate_numbers(gates))
+
+    def off(self, now_ns: int) -> None:
+        """Suppress all gates at an instant, ns, and turn the contactor's relay off: nobody commands any more."""
+        plant = self.plant
+        if plant is not None:
+            plant.advance(now_ns)
+            plant.bridge.cancel(plant.now_ns)
+            plant.relay(on=False)

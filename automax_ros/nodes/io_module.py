@@ -1,4 +1,4 @@
-"""The node of an I/O module: ``digital_io_SLOT``, ``analog_io_SLOT``, ``resolver_SLOT``, ``pulsetach_SLOT``.
+"""The node of an I/O module: ``digital_io_SLOT``, ``analog_io_SLOT``, ``pulsetach_SLOT``, ``drive_SLOT`` and others.
 
 Publishes: ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second with its registers. Its points are common
 variables, which have topics of their own (``common_memory``).
@@ -26,7 +26,7 @@ class IoModuleNode(ModuleNode):
         """Return the registers as hexadecimal words; the module itself is always well."""
         values = {}
         if self._bank is not None:
-            for register in range(self._bank.registers):
+            for register in set(range(self._bank.registers)).difference(self._module.registers.reserved):
                 word = self.site.rack.memory.read_now(self._bank.view, register)
                 values[f"register_{register}"] = f"{int(word) & 0xFFFF:04X}H"
         return [self.status(self._module.model, DiagnosticStatus.OK, "running", self._module.slot, values)]

@@ -16,6 +16,8 @@ from automax_ros.nodes.udc import UdcNode
 from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
+from automax_ros.rack.modules.drive_analog import DRIVE_ANALOG
+from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
 from automax_ros.rack.modules.kind import Module, ModuleKind
 from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
@@ -32,6 +34,8 @@ NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     ANALOG_IO: IoModuleNode,
     RESOLVER: IoModuleNode,
     PULSETACH: IoModuleNode,
+    DRIVE_CONTROLLER: IoModuleNode,
+    DRIVE_ANALOG: IoModuleNode,
     UDC: UdcNode,
 }
 """The node of each kind of module; None where the rack's common memory node is enough."""

@@ -14,9 +14,6 @@ from automax_ros.rack.observers import Operation
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 
-MODULE_CONTROLS = {"test_switch": ("A", "B", "centre"), "fault_reset_switch": ("true",)}
-"""The controls of modules with their positions."""
-
 
 class Controls:
     """The controls of one rack.
@@ -38,9 +35,9 @@ class Controls:
         if not isinstance(module, Operable) or control not in module.controls:
             has = near_or_listed(control, module.controls) if isinstance(module, Operable) else "it has no controls"
             self._refuse("module", told, f"the {module.config.model} in slot {slot} has no {quoted(control)}: {has}")
-        positions = MODULE_CONTROLS.get(control, ())
+        positions = module.controls[control]
         position = next((item for item in positions if item.lower() == value.lower()), value)
-        if positions and position not in positions:
+        if position not in positions:
             self._refuse("module", told, f"{control} cannot be {quoted(value)}: it takes {', '.join(positions)}")
         try:
             module.operate(control, position)

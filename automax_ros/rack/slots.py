@@ -46,10 +46,11 @@ class SlotReader:
             self._complete = self._complete and module is not None
             if module is not None:
                 modules.append(module)
-        rack = Arrangement(list(self._standing.values()), self._complete, span, self._findings)
+        in_order = tuple(sorted(modules, key=lambda item: item.slot))
+        rack = Arrangement(list(self._standing.values()), self._complete, span, self._findings, in_order)
         for kind in KINDS:
             kind.check_places(rack)
-        return tuple(sorted(modules, key=lambda item: item.slot))
+        return in_order
 
     def _slot(self, key: Scalar) -> int | None:
         if not _SLOT.match(key.text) or not 0 <= int(key.text) <= MAX_SLOT:

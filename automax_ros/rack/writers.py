@@ -30,7 +30,7 @@ _FIRST_TASK = 3
 def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
     """Return all writers of a rack, in the order of their ids: outside sources, tasks by slot and name, modules.
 
-    A module that interrupts writes registers by itself; no other does.
+    A module with interrupts writes registers, and one that says so; no other does.
     """
     home = config.home_slot
     outside = [
@@ -43,7 +43,7 @@ def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
         for module in config.modules
         for task in sorted(module.tasks, key=lambda task: task.name)
     ]
-    modules = [(module.slot, module.name) for module in config.modules if module.registers.interrupts]
+    modules = [(module.slot, module.name) for module in config.modules if module.registers.writes]
     first = _FIRST_TASK + len(tasks)
     return (
         *outside,

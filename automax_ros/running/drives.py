@@ -5,6 +5,7 @@ The module fulfils ``DrivePort`` and attaches itself; a replay fulfils it with w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from automax_ros.drive.cml.signals import Command, Measured
@@ -61,12 +62,17 @@ class DriveAccess(Protocol):
         ...
 
 
+VoltageFeedback = Callable[[float, float], None]
+"""Shows the armature voltage, V, of a drive on a line of a nominal voltage, V: the 57C405 that is wired to it."""
+
+
 class Drives:
-    """The 57C406 modules of a rack by slot."""
+    """The 57C406 modules of a rack by slot, and the 57C405 modules that are wired to their armatures."""
 
     def __init__(self) -> None:
         """Begin with none."""
         self._ports: dict[int, DrivePort] = {}
+        self._voltages: dict[int, VoltageFeedback] = {}
 
     def attach(self, slot: int, port: DrivePort) -> None:
         """Take the module of a slot."""
@@ -75,6 +81,14 @@ class Drives:
     def port(self, slot: int) -> DrivePort:
         """Return the 57C406 of a slot; without one, what measures no line."""
         return self._ports.get(slot, _NO_MODULE)
+
+    def wire_voltage(self, slot: int, feedback: VoltageFeedback) -> None:
+        """Wire the armature of the drive in a slot to what shows its voltage."""
+        self._voltages[slot] = feedback
+
+    def voltage(self, slot: int) -> VoltageFeedback | None:
+        """Return what shows the armature voltage of the drive in a slot, None where nothing is wired."""
+        return self._voltages.get(slot)
 
 
 class _NoModule:

@@ -26,7 +26,7 @@ SPEED = "100 CALL SCAN_LOOP(TICKS=1)\n120 END\n"
 class Panel(QuietModule):
     """A module with two switches, one of them stuck."""
 
-    controls = ("test_switch", "fault_reset_switch")
+    controls = {"test_switch": ("A", "B", "centre"), "fault_reset_switch": ("true",)}  # noqa: RUF012
 
     def operate(self, verb: str, value: str) -> None:
         if verb == "fault_reset_switch":

@@ -42,8 +42,6 @@ def test_all_processors_are_known(tmp_path, model):
     [
         ("57C430", "AMX6204"),
         ("57C552", "AMX6202"),
-        ("57C406", "AMX6203"),
-        ("B/M 57C406", "AMX6203"),
         ("57C404", "AMX6203"),
         ("57C416B", "AMX6203"),
         ("57E435", "AMX6202"),

@@ -95,6 +95,8 @@ class Command(NamedTuple):
     level: int = 400
     block: bool = False
     """All earlier gate windows end at once (a coast stop, a bridge change)."""
+    ok: bool = False
+    """The drive OK output of the drive digital I/O module: no drive fault is active (decision)."""
 
 
 def gate_bits(*numbers: int) -> int:

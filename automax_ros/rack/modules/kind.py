@@ -59,7 +59,8 @@ class Registers:
     The rest are inputs, but for the ``reserved``: they are the module's own, and no point may stand there. ``reals``
     are those on which REAL variables may stand. ``copies`` are pairs of a register and the input that shows the same;
     ``clock_status`` pairs of an input and the bits that are set while there is a common
-    clock; ``counters`` are the first of two registers that count 24 bits.
+    clock; ``counters`` are the first of two registers that count 24 bits. ``by_itself``: the module writes registers
+    without an interrupt too.
     """
 
     count: int = 0
@@ -71,6 +72,12 @@ class Registers:
     copies: tuple[tuple[int, int], ...] = ()
     clock_status: tuple[tuple[int, int], ...] = ()
     counters: tuple[int, ...] = ()
+    by_itself: bool = False
+
+    @property
+    def writes(self) -> bool:
+        """Whether the module writes registers, and so is a writer of its own."""
+        return self.by_itself or bool(self.interrupts)
 
     @property
     def writable(self) -> Collection[int]:
@@ -173,12 +180,16 @@ class Standing:
 
 @dataclass(frozen=True)
 class Arrangement:
-    """All modules of a rack file. Unless ``complete``, one could not be read and may be the one that a rule misses."""
+    """All modules of a rack file. Unless ``complete``, one could not be read and may be the one that a rule misses.
+
+    ``modules`` are the configurations of those that could be read, in the order of slots.
+    """
 
     standing: Sequence[Standing]
     complete: bool
     span: Span
     findings: Findings
+    modules: Sequence[ModuleConfig] = ()
 
     def of(self, kind: ModuleKind) -> list[Standing]:
         """Return the modules of one kind, in the order of slots."""
@@ -236,7 +247,7 @@ class Parts:
     """What a rack gives to its modules.
 
     ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells
-    observers of writes that no scan has made. ``writer`` returns the id under which a module with interrupts writes.
+    observers of writes that no scan has made. ``writer`` returns the id under which a module writes registers.
     A 57C406 attaches itself to ``drives``.
     ``plants`` are those with a motor, by name; the rack keeps their states.
     """
@@ -297,13 +308,16 @@ class Module(Protocol):
 
 @runtime_checkable
 class Operable(Protocol):
-    """A module with controls that a person moves: ``controls`` are their names, such as ``test_switch``."""
+    """A module with controls that a person moves.
+
+    ``controls`` are their names, such as ``test_switch``, with their positions, such as ``A``, ``B`` and ``centre``.
+    """
 
     @property
-    def controls(self) -> tuple[str, ...]: ...  # noqa: D102
+    def controls(self) -> Mapping[str, tuple[str, ...]]: ...  # noqa: D102
 
     def operate(self, verb: str, value: str) -> None:
-        """Move a control of ``controls`` to a position, as stimuli files write it: ``A``, ``B``, ``centre``, ``true``.
+        """Move a control of ``controls`` to one of its positions.
 
         Raises:
             OperationRefused: it cannot be moved now (rack/operations.py).

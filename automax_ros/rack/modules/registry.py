@@ -11,6 +11,8 @@ import re
 from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
+from automax_ros.rack.modules.drive_analog import DRIVE_ANALOG
+from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
 from automax_ros.rack.modules.kind import ModuleKind
 from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
@@ -26,6 +28,8 @@ KINDS: tuple[ModuleKind, ...] = (
     ANALOG_IO,
     RESOLVER,
     PULSETACH,
+    DRIVE_CONTROLLER,
+    DRIVE_ANALOG,
     UDC,
 )
 """All kinds of modules: whoever wants a module finds it here."""
@@ -34,8 +38,6 @@ SUPPORTED: dict[str, ModuleKind] = {model: kind for kind in KINDS for model in k
 
 NOT_YET = {
     "57C404": "DCS-NET network module",
-    "57C405": "drive analog I/O module",
-    "57C406": "DC drive controller",
     "57C414": "Modbus interface module",
     "57C416": "remote I/O module",
     "57C417": "R-Net module",

@@ -8,7 +8,7 @@ from functools import partial
 
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rack.controls import MODULE_CONTROLS, Controls
+from automax_ros.rack.controls import Controls
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Operable
 from automax_ros.rack.rack import Rack
@@ -45,17 +45,15 @@ def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Actio
     found: list[Action] = []
     for key, item in named(node, what, findings):
         slot = integer_value(key, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
-        if slot is not None and slot not in by_slot:
+        if slot is None:
+            continue
+        module = by_slot.get(slot)
+        if module is None:
             findings.add("AMX6742", f"the rack has no module in slot {slot}", key.span)
-        for control in _controls(item, f"{what} {key.text}", MODULE_CONTROLS, findings):
-            module = by_slot.get(slot) if slot is not None else None
-            if module is None:
-                continue
-            if isinstance(module, Operable) and control.verb in module.controls:
-                found.append(Control(str(slot), control.verb, control.value, controls.module))
-            else:
-                message = f"the {module.config.model} in slot {slot} has no {control.verb}"
-                findings.add("AMX6742", message, control.key.span)
+            continue
+        known = module.controls if isinstance(module, Operable) else {}
+        moved = _controls(item, f"the {module.config.model} in slot {slot}", known, findings)
+        found += [Control(str(slot), control.verb, control.value, controls.module) for control in moved]
     return found
 
 

@@ -1,0 +1,116 @@
+"""The drive analog I/O module 57C405: the armature voltage that fast bridge change needs (52.6.1).
+
+``drive`` is the slot of the 57C406 whose armature voltage a transformer of 52.6.1 brings to connector P4. Its nominal
+voltage is the one nearest to that of the plant's line (decision). Register 0 shows the signal, 4095 counts at 10 V,
+clamped there: at each interrupt of the 57C406, every 5.5 ms while there is none. The other registers are inputs from
+outside. No source gives these registers (decision). Without ``drive`` there is no signal: register 0 is an input like
+the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from automax_ros.compile.cost import Model
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.numbers import round_count
+from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
+from automax_ros.rack.modules.io_module import IoModule
+from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
+from automax_ros.rack.scalars import integer_value
+from automax_ros.rack.task_config import TaskConfig
+
+GAINS = {230: 0.02, 380: 0.0121, 460: 0.01, 550: 0.00835, 660: 0.00696}
+"""Volts at the 57C405 a volt of the armature, by the nominal line voltage of the transformer, V rms (52.6.1)."""
+FULL_SCALE_V, FULL_SCALE_COUNTS = 10.0, 4095
+"""What the input shows at its full scale (decision: as a 57C409)."""
+_REGISTERS = Registers(4, by_itself=True)
+
+
+def voltage_gain(line_v: float) -> float:
+    """Return the gain of the transformer for a line of a nominal voltage (V rms, line to line)."""
+    return GAINS[min(GAINS, key=lambda nominal: abs(nominal - line_v))]
+
+
+def voltage_counts(volts: float, line_v: float) -> int:
+    """Return what register 0 shows for an armature voltage, V."""
+    counts = round_count(volts * voltage_gain(line_v) / FULL_SCALE_V * FULL_SCALE_COUNTS)
+    return max(-FULL_SCALE_COUNTS, min(FULL_SCALE_COUNTS, counts))
+
+
+@dataclass(frozen=True)
+class DriveAnalogConfig:
+    """A 57C405; ``drive`` is the slot of the 57C406 to whose armature it is wired."""
+
+    slot: int
+    model: str
+    drive: int | None = None
+    line: int = 0
+    drive_span: Span | None = field(default=None, compare=False)
+
+    tick_ns = 0
+    times = Model.NONE
+    has_battery = False
+    keeps_locals = True
+    common_registers = 0
+    registers: Registers = _REGISTERS
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"drive_analog_{self.slot}"
+
+    @property
+    def tasks(self) -> tuple[TaskConfig, ...]:
+        """No tasks."""
+        return ()
+
+    def build(self, parts: Parts) -> Module:
+        """Return the module of a running rack."""
+        module = DriveAnalogModule(self, parts)
+        if self.drive is not None:
+            parts.drives.wire_voltage(self.drive, module.feel)
+        return module
+
+
+class DriveAnalogModule(IoModule):
+    """A 57C405."""
+
+    def feel(self, volts: float, line_v: float) -> None:
+        """Show an armature voltage, V, through the transformer for a line of a nominal voltage, V."""
+        self._show(0, voltage_counts(volts, line_v))
+
+
+class DriveAnalogKind:
+    """What a rack file may say of a 57C405."""
+
+    word = "drive analog I/O"
+    models = {"57C405": "drive analog I/O module"}  # noqa: RUF012
+    options = ("drive",)
+
+    def read(self, found: FoundModule) -> DriveAnalogConfig:
+        """Read which drive it is wired to."""
+        node = found.section.get("drive")
+        what = f"drive of {found.where}"
+        drive = None if node is None else integer_value(node, what, found.findings, low=0, high=15, code="AMX6520")
+        return DriveAnalogConfig(found.slot, found.model, drive, found.span.line, node.span if node else None)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report a drive that is not there, and one that has two of these modules."""
+        controllers = {item.slot for item in rack.of(DRIVE_CONTROLLER)}
+        wired: dict[int, Span] = {}
+        for module in rack.modules:
+            if not isinstance(module, DriveAnalogConfig) or module.drive is None or module.drive_span is None:
+                continue
+            drive, span = module.drive, module.drive_span
+            if drive in wired:
+                message = f"the armature voltage of the drive in slot {drive} goes to another 57C405 already"
+                rack.findings.add("AMX6521", message, span, notes=(Note("that one is wired here", wired[drive]),))
+            elif drive in controllers or not rack.complete:
+                wired[drive] = span
+            else:
+                hint = "name the slot of the 57C406 whose armature is wired to connector P4"
+                rack.findings.add("AMX6520", f"slot {drive} holds no 57C406", span, hint)
+
+
+DRIVE_ANALOG = DriveAnalogKind()

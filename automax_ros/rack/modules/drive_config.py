@@ -1,0 +1,77 @@
+"""The 57C406 as a rack file configures it: its slot, and the plant that it drives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from automax_ros.compile.cost import Model
+from automax_ros.rack.modules.drive_controller import DEFAULTS, DriveControllerModule
+from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
+from automax_ros.rack.task_config import TaskConfig
+
+if TYPE_CHECKING:
+    from automax_ros.rack.plants.config import PlantConfig
+
+_COUNT = max(DEFAULTS) + 1
+_REGISTERS = Registers(
+    _COUNT,
+    outputs=frozenset(DEFAULTS),
+    reserved=frozenset(range(_COUNT)) - frozenset(DEFAULTS),
+    by_itself=True,
+)
+
+
+@dataclass(frozen=True)
+class DriveConfig:
+    """A 57C406; without a ``plant`` it has registers and switches only, and its loop sees no line."""
+
+    slot: int
+    model: str
+    plant: PlantConfig | None = None
+    line: int = 0
+
+    tick_ns = 0
+    times = Model.NONE
+    has_battery = False
+    keeps_locals = True
+    common_registers = 0
+    registers: Registers = _REGISTERS
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"drive_{self.slot}"
+
+    @property
+    def tasks(self) -> tuple[TaskConfig, ...]:
+        """No tasks: its loop is a task of a Processor."""
+        return ()
+
+    def build(self, parts: Parts) -> Module:
+        """Return the module of a running rack."""
+        plant = None if self.plant is None else parts.plants.get(self.plant.name)
+        return DriveControllerModule(self, parts, plant)
+
+
+class DriveControllerKind:
+    """What a rack file may say of a 57C406."""
+
+    word = "drive I/O controller"
+    models = {"57C406": "drive I/O controller module"}  # noqa: RUF012
+    options = ("plant",)
+
+    def read(self, found: FoundModule) -> DriveConfig:
+        """Read the plant."""
+        node = found.section.get("plant")
+        what = f"plant of {found.where}"
+        plant = None if node is None else found.plants.claim(node, what)
+        if node is not None and plant is not None and plant.motor is None and not found.findings.errors:
+            found.findings.add("AMX6522", f"{what}: the plant {plant.name} has no motor", node.span)
+        return DriveConfig(found.slot, found.model, plant, found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Find nothing wrong: no source tells of a slot where a 57C406 may not stand."""
+
+
+DRIVE_CONTROLLER = DriveControllerKind()

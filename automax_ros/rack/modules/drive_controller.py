@@ -1,0 +1,183 @@
+"""The drive I/O controller 57C406 of a running rack: it interrupts, measures the drive, fires its gates (52.0, 52.7).
+
+It is the ``DrivePort`` of the current minor loop (CML) task that names its slot. While that task runs it interrupts six
+times a line cycle, measures its plant at that instant and makes a scan of the task due; what the scan commands it
+carries out: gates, the contactor's relay, the outputs of the drive digital I/O module. Without such a task gates and
+relays are off. The plant goes on in any case, whether the rack runs, is stopped or has no power (decision).
+
+Its registers are outputs: the task's initialisation gives them their defaults, STOP ALL and a loss of power 0 (2.4.5).
+The contactor follows what the task commands; a force on the point of a relay only changes what the point shows
+(decision).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.drive.cml.signals import VOLTAGE, VOLTS, Command, Measured
+from automax_ros.drive.controller import DriveController
+from automax_ros.drive.plant import DrivePlant
+from automax_ros.rack.modules.drive_digital import DriveDigital
+from automax_ros.rack.modules.drive_interrupts import DriveInterrupts, InterruptTiming
+from automax_ros.rack.modules.drive_switches import CONTROLS, FrontSwitches
+from automax_ros.rack.modules.kind import ModuleConfig, ModuleState, Parts
+from automax_ros.rack.scheduled_task import ScheduledTask
+from automax_ros.running.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent
+
+TACH_THRESHOLD, PHASE_STEP, PERIOD_STEP, OPTIONS = 4136, 4137, 4138, 4146
+"""The registers that an application may write (52.7)."""
+DEFAULTS = {TACH_THRESHOLD: 109, PHASE_STEP: 4, PERIOD_STEP: 2, OPTIONS: 0}
+"""What initialisation of the CML task writes to them (52.4.1, 52.5.1, 52.6.2, 52.7)."""
+REST_NS = 5_500_000
+"""How often a plant whose drive rests is looked at, ns: the system clock tick (decision)."""
+
+
+class DriveControllerModule:
+    """A 57C406 with the plant that it drives, if it has one."""
+
+    kept: frozenset[tuple[int, int]] = frozenset()
+    tasks: Sequence[ScheduledTask] = ()
+
+    def __init__(self, config: ModuleConfig, parts: Parts, plant: DrivePlant | None) -> None:
+        """Attach itself to the rack's drives; nothing happens before a task arms it."""
+        bank = parts.backplane.bank(config.slot)
+        assert bank is not None
+        self.config, self._parts, self._view, self._plant = config, parts, bank.view, plant
+        self._writer = parts.writer(config.name)
+        self._controller = DriveController(plant)
+        self._interrupts = DriveInterrupts(parts.scheduler, config.slot, self._measure)
+        self._switches = FrontSwitches(parts.scheduler, config.slot)
+        self._digital = DriveDigital(parts.memory, parts.backplane, parts.scheduler, self._writer)
+        self._measured = Measured(0)
+        self._rest_key = EventKey(EventClass.IO, config.slot, "rest")
+        self._rest: ScheduledEvent | None = None
+        parts.drives.attach(config.slot, self)
+
+    @property
+    def timing(self) -> InterruptTiming:
+        """How the interrupts kept their time."""
+        return self._interrupts.timing
+
+    # As a module
+
+    def power_on(self) -> None:
+        """Let the plant's time pass; gates stay off until a task arms the module."""
+        if not self._interrupts.armed:
+            self._rest_from(self._parts.scheduler.now_ns + REST_NS)
+
+    def power_off(self) -> None:
+        """Nothing more: the task that has armed it was stopped, or has not begun."""
+        self.disarm()
+
+    def stopped_all(self) -> None:
+        """Nothing more: the task that has armed it was stopped."""
+        self.disarm()
+
+    def state(self) -> ModuleState:
+        """Return what was measured last, how the switches stand, and when it interrupts; the plant keeps its own."""
+        rest_ns = None if self._rest is None else self._parts.scheduler.due_ns(self._rest)
+        return {
+            "interrupts": self._interrupts.state(),
+            "switches": self._switches.state(),
+            "measured": list(self._measured),
+            "level": self._controller.level,
+            "digital": self._digital.slot,
+            "rest_ns": rest_ns,
+        }
+
+    def load(self, state: ModuleState) -> None:
+        """Take over a state; the task that has armed it arms it again."""
+        self._interrupts.load(state["interrupts"])
+        self._switches.load(state["switches"])
+        self._measured = Measured(*state["measured"])
+        self._controller.level = state["level"]
+        self._digital.slot = state["digital"]
+        self._end_rest()
+        if state["rest_ns"] is not None:
+            self._rest_from(state["rest_ns"])
+
+    # As something that a person operates
+
+    @property
+    def controls(self) -> Mapping[str, tuple[str, ...]]:
+        """The switches on its front, with their positions."""
+        return CONTROLS
+
+    def operate(self, verb: str, value: str) -> None:
+        """Move a switch."""
+        self._switches.move(verb, value)
+
+    # As the port of a CML task
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next interrupt comes, None while it is not armed."""
+        return self._interrupts.next_ns
+
+    def initialise(self) -> None:
+        """Give the registers their defaults."""
+        memory = self._parts.memory
+        memory.now_ns = self._parts.scheduler.now_ns
+        for register, value in DEFAULTS.items():
+            memory.write_now(self._view, value, self._writer, register, WriteKind.OUTSIDE)
+
+    def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
+        """Interrupt at ``first_ns`` and from then on."""
+        self._end_rest()
+        self._interrupts.arm(first_ns, key, due)
+
+    def disarm(self) -> None:
+        """Interrupt no more: gates, relays and drive OK are off at once."""
+        if not self._interrupts.armed:
+            return
+        self._interrupts.disarm()
+        self._controller.off(self._parts.scheduler.now_ns)
+        self._digital.show(0, ok=False)
+        self._rest_from(self._parts.scheduler.now_ns + REST_NS)
+
+    def measure(self, dig_slot: int) -> Measured:
+        """Return what was measured at the last interrupt, with registers, inputs and switches as they are now."""
+        self._digital.slot = dig_slot
+        read, view, last = self._parts.memory.read_now, self._view, self._measured
+        return last._replace(
+            status=last.status | self._digital.status | self._switches.status,
+            tach_threshold=int(read(view, TACH_THRESHOLD)),
+            phase_step=int(read(view, PHASE_STEP)),
+            period_step=int(read(view, PERIOD_STEP)),
+            options=int(read(view, OPTIONS)),
+        )
+
+    def command(self, command: Command) -> None:
+        """Carry out what shall happen up to the next interrupt; its times count from the last one."""
+        self._controller.command(command, self._interrupts.at_ns, self._parts.scheduler.now_ns)
+        self._digital.show(command.relays, ok=command.ok)
+        self._interrupts.follow(command.next_ns)
+
+    def _measure(self, now_ns: int) -> None:
+        """Measure at an interrupt; a 57C405 that is wired to the armature shows its voltage."""
+        feedback = self._parts.drives.voltage(self.config.slot)
+        self._measured = self._controller.measure(now_ns, VOLTAGE if feedback is not None else 0)
+        if feedback is not None and self._plant is not None:
+            line_v = self._plant.data.parameters.line_v
+            feedback(self._measured.voltage * line_v / VOLTS, line_v)
+
+    def _rest_from(self, first_ns: int) -> None:
+        if self._plant is not None:
+            self._end_rest()
+            self._rest = self._parts.scheduler.every(REST_NS, first_ns, self._rest_key, self._look)
+
+    def _end_rest(self) -> None:
+        if self._rest is not None:
+            self._rest.cancel()
+            self._rest = None
+
+    def _look(self, now_ns: int, _: int) -> None:
+        """Let the plant's time pass while nobody drives it."""
+        plant = self._plant
+        if plant is not None:
+            plant.advance(now_ns)
+            feedback = self._parts.drives.voltage(self.config.slot)
+            if feedback is not None:
+                feedback(plant.circuit.armature_v, plant.data.parameters.line_v)
+                self._parts.tell_writes()
