@@ -1,26 +1,43 @@
 """When each input of DC_DRIVE_CML is read, and what is in force when one is bad (52.1).
 
-``fixed`` ones count from task initialisation on; the others are looked at each scan, each system clock tick, or in
-standby or run alone. A bad dynamic value is logged, and the last good one stays.
+Three clocks: REFERENCE at each scan; most of the others at each system clock tick, in run or in standby alone as
+table 1's text says; the fixed ones once, at task initialisation. A bad dynamic value is logged once, as it goes bad,
+and the last good one stays. A bad fixed one is logged, what ``Latched`` begins with stays, and the drive never runs.
+
+Decisions: what is read in run is read as the run begins, too, so that no scan runs with values of the last run;
+CC_THRESH, for which no clock is told, is read each tick.
 """
 
 from __future__ import annotations
 
+from automax_ros.blocks.cml_limits import ioc_is_possible, is_good
 from automax_ros.drive.cml.inputs import Inputs
 from automax_ros.drive.state import Stateful
 
 TICK_NS = 5_500_000
 """The system clock tick, ns."""
+FAST_CHANGE, DIERIKON = 1, 2
+"""Bits of register 4146: fast bridge change (52.6.2), the SCR test of both bridges (52.7)."""
+
+BAD_DYNAMIC, BAD_FIXED, BAD_LEVEL = 7105, 7106, 7107
+"""Problems: a dynamic input out of range, a fixed one, IOC_THRESH of 1.8 LIM_BAR or more."""
+
+_LIMITED = ("ac_line_freq", "ref_lag", "pi_w_lead", "ag_factor", "max_m_dropout", "ioc_thresh", "lim_bar", "osv_thresh")
+_SWITCHES = ("digital_tach", "tach_loss_stop", "auto_phrot")
+_DYNAMIC = ("cc_thresh", "ref_rate", "kp", "test_alpha")
 
 
 class Latched(Stateful):
-    """The inputs in force, by the names of ``Inputs``; ``usable`` is FALSE where a fixed one is bad."""
+    """The inputs in force, by the names of ``Inputs``; ``usable`` is FALSE where a fixed one is bad.
+
+    ``fast_change`` and ``both_bridges`` are the bits of register 4146.
+    """
 
     _kept = (
         "usable", "ac_line_freq", "reference", "ref_rate", "ref_lag", "kp", "pi_w_lead", "ag_factor", "cc_thresh",
-        "cml_run", "cml_coast_stop", "mcr_select", "max_m_dropout", "cml_test", "test_brpol", "test_alpha",
+        "cml_run", "cml_coast_stop", "max_m_dropout", "cml_test", "test_brpol", "test_alpha",
         "ioc_thresh", "lim_bar", "digital_tach", "tach_loss_stop", "osv_thresh", "auto_phrot", "fault_reset",
-        "fast_change",
+        "fast_change", "both_bridges", "_bad",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -34,36 +51,71 @@ class Latched(Stateful):
         self.pi_w_lead = 10.0
         self.ag_factor = 1
         self.cc_thresh = 0
-        self.cml_run = self.cml_coast_stop = self.mcr_select = self.cml_test = self.test_brpol = False
+        self.cml_run = self.cml_coast_stop = self.cml_test = self.test_brpol = False
         self.test_alpha = 180
         self.max_m_dropout = 0.1
-        self.ioc_thresh = self.lim_bar = 100
+        self.ioc_thresh = 400
+        self.lim_bar = 100
         self.digital_tach = self.tach_loss_stop = True
-        self.osv_thresh = 0
-        self.auto_phrot = self.fault_reset = self.fast_change = False
+        self.osv_thresh = 32767
+        self.auto_phrot = self.fault_reset = self.fast_change = self.both_bridges = False
+        self._bad = 0
 
     def start(self, inputs: Inputs) -> list[int]:
-        """Read the fixed inputs at task initialisation; return the problems to log."""
+        """Read the fixed inputs at task initialisation; return the problems to log, one for each bad input."""
         self.__init__()  # type: ignore[misc]
-        for name in ("ac_line_freq", "ref_lag", "pi_w_lead", "ag_factor", "max_m_dropout", "ioc_thresh", "lim_bar",
-                     "digital_tach", "tach_loss_stop", "osv_thresh", "auto_phrot"):  # fmt: skip
+        problems = []
+        line_hz = inputs.ac_line_freq
+        for name in _LIMITED:
+            value = getattr(inputs, name)
+            if is_good(name.upper(), value, line_hz):
+                setattr(self, name, value)
+            else:
+                problems.append(BAD_FIXED)
+        for name in _SWITCHES:
             setattr(self, name, getattr(inputs, name))
-        return []
+        if not problems and not ioc_is_possible(self.ioc_thresh, self.lim_bar):
+            problems.append(BAD_LEVEL)
+        self.usable = not problems
+        return problems
 
-    def scan(self, inputs: Inputs) -> list[int]:
-        """Read what is read each scan; return the problems to log."""
-        self.reference = inputs.reference
-        return []
+    def standby(self, inputs: Inputs, options: int) -> None:
+        """Read at a tick what is read in standby: test mode, FAULT_RESET, register 4146."""
+        self.cml_test, self.test_brpol, self.fault_reset = inputs.cml_test, inputs.test_brpol, inputs.fault_reset
+        self.fast_change, self.both_bridges = bool(options & FAST_CHANGE), bool(options & DIERIKON)
 
-    def tick(self, inputs: Inputs, *, running: bool, testing: bool, options: int) -> list[int]:
-        """Read what is read each tick: in run and in standby each its own; return the problems to log."""
-        self.cml_run = inputs.cml_run
-        self.cc_thresh = inputs.cc_thresh
-        if running:
-            self.cml_coast_stop, self.ref_rate, self.kp = inputs.cml_coast_stop, inputs.ref_rate, inputs.kp
-            if testing:
-                self.test_alpha = inputs.test_alpha
+    def run(self, inputs: Inputs, period_ns: int) -> list[int]:
+        """Read at a tick what is read in run; return the problems to log.
+
+        Args:
+            inputs: what the task has latched.
+            period_ns: the measured period of the line, ns: the limits of REF_RATE follow it.
+        """
+        self.cml_coast_stop = inputs.cml_coast_stop
+        problems = self._read("kp", inputs.kp, 0.0) if inputs.kp != self.kp or self._bad else []
+        if inputs.ref_rate or self._bad:
+            problems += self._read("ref_rate", inputs.ref_rate, 1e9 / period_ns)
         else:
-            self.cml_test, self.test_brpol, self.fault_reset = inputs.cml_test, inputs.test_brpol, inputs.fault_reset
-            self.fast_change = bool(options & 1)
-        return []
+            self.ref_rate = 0.0
+        if self.cml_test and (inputs.test_alpha != self.test_alpha or self._bad):
+            problems += self._read("test_alpha", inputs.test_alpha, 0.0)
+        return problems
+
+    def always(self, inputs: Inputs) -> list[int]:
+        """Read at a tick what is read in run and in standby; return the problems to log."""
+        self.cml_run = inputs.cml_run
+        if inputs.cc_thresh == self.cc_thresh and not self._bad:
+            return []
+        return self._read("cc_thresh", inputs.cc_thresh, 0.0)
+
+    def _read(self, name: str, value: float, line_hz: float) -> list[int]:
+        """Read a dynamic value; return the problem to log as it goes bad."""
+        bit = 1 << _DYNAMIC.index(name)
+        if is_good(name.upper(), value, line_hz):
+            setattr(self, name, value)
+            self._bad &= ~bit
+            return []
+        if self._bad & bit:
+            return []
+        self._bad |= bit
+        return [BAD_DYNAMIC]

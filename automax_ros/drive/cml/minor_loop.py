@@ -10,13 +10,31 @@ from collections.abc import Sequence as Numbers
 from dataclasses import dataclass
 
 from automax_ros.drive.cml.current_control import CurrentControl
+from automax_ros.drive.cml.faults import Faults
 from automax_ros.drive.cml.inputs import Inputs
 from automax_ros.drive.cml.latching import TICK_NS, Latched
 from automax_ros.drive.cml.outputs import Outputs
 from automax_ros.drive.cml.pll import Pll
+from automax_ros.drive.cml.scr_test import GO_ON, PASSED, ScrTest
 from automax_ros.drive.cml.sequence import Phase, Sequence
-from automax_ros.drive.cml.signals import FMCR, PERMISSIVE, RMCR, Command, Measured, Pulse
+from automax_ros.drive.cml.signals import (
+    FMCR,
+    PERMISSIVE,
+    RESET_SWITCH,
+    RMCR,
+    ROTATION_ABC,
+    SWITCH_A,
+    SWITCH_B,
+    Command,
+    Measured,
+    Pulse,
+)
 from automax_ros.drive.state import Stateful
+
+_REGISTERS = {
+    name: Measured._field_defaults[name] for name in ("tach_threshold", "phase_step", "period_step", "options")
+}
+"""The registers of the 57C406 at task initialisation (52.7): what they were before does not count."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +67,7 @@ class CurrentMinorLoop(Stateful):
         self.restart()
 
     def restart(self) -> None:
-        """The task is put into RUN: the next scan is its first."""
+        """The task is put into RUN: the next scan is its first; no fault is remembered (decision)."""
         self._started = False
         self._tick = -1
         self.outputs = Outputs()
@@ -57,7 +75,11 @@ class CurrentMinorLoop(Stateful):
         self.pll = Pll()
         self.control = CurrentControl()
         self.sequence = Sequence()
-        self._parts = (self.outputs, self.latched, self.pll, self.sequence, *self.control.parts)
+        self.faults = Faults()
+        self.scr_test = ScrTest()
+        self._parts = (
+            self.outputs, self.latched, self.pll, self.sequence, self.faults, self.scr_test, *self.control.parts
+        )  # fmt: skip
 
     def scan(self, now_ns: int, measured: Measured, inputs: Inputs) -> Outcome:
         """Execute one scan at an interrupt.
@@ -67,56 +89,132 @@ class CurrentMinorLoop(Stateful):
             measured: what the 57C406 tells.
             inputs: what the task has latched.
         """
-        problems: list[int] = []
         first = not self._started
+        problems = self._start(inputs) if first else []
         if first:
-            self._started = True
-            problems += self.latched.start(inputs)
-            self.pll.start(self.latched.ac_line_freq)
-        self.pll.follow(measured)
-        ticked = now_ns // TICK_NS != self._tick
-        self._tick = now_ns // TICK_NS
-        problems += self.latched.scan(inputs)
+            measured = measured._replace(**_REGISTERS)
+        pll, sequence = self.pll, self.sequence
+        pll.follow(measured)
+        tick = now_ns // TICK_NS
+        ticked = tick != self._tick
+        self._tick = tick
+        self.latched.reference = inputs.reference
         if ticked:
-            problems += self._look(now_ns, measured, inputs)
-        self.control.feed_back(measured, self.latched.lim_bar, self.pll.period_ns)
-        self.sequence.scan(now_ns, dropout_s=self.latched.max_m_dropout, discontinuous=measured.zero_us > 0)
-        pulses = self._drive(measured)
-        running = self.sequence.running
-        self.outputs.dc_cml_state = running
-        self.outputs.sync_locked = self.pll.locked
-        self.outputs.line_period = self.pll.period_us
-        command = Command(
-            self.pll.next_ns, self.sequence.relays, pulses, self.latched.ioc_thresh, not running or self.control.block
-        )
-        return Outcome(
-            command,
-            self.outputs.row() if ticked else None,
-            None,
-            tuple(problems),
-            first,
-        )
+            problems += self._read(measured, inputs)
+        self.control.feed_back(measured, self.latched.lim_bar, pll.period_ns)
+        verdict = self._judge(measured)
+        causes = self.faults.causes(measured, inputs, self.latched, pll, running=sequence.running)
+        problems += self._protect(measured, causes, verdict)
+        if ticked:
+            self._follow_run(now_ns, measured, inputs, causes)
+        problems += self._go_on(now_ns, inputs, verdict)
+        pulses = self._fire(measured)
+        command = Command(pll.next_ns, sequence.relays, pulses, self.latched.ioc_thresh, not sequence.running)
+        row = self._row(measured) if ticked else None
+        return Outcome(command, row, self._record(pulses), tuple(problems), first)
 
-    def _look(self, now_ns: int, measured: Measured, inputs: Inputs) -> list[int]:
-        """Read the inputs of a tick and follow CML_RUN."""
-        latched, sequence = self.latched, self.sequence
-        problems = latched.tick(inputs, running=sequence.running, testing=latched.cml_test, options=measured.options)
-        may_start = latched.usable and self.pll.locked and bool(measured.status & PERMISSIVE)
-        relay = RMCR if inputs.mcr_select else FMCR
-        before = sequence.phase
-        sequence.tick(now_ns, run=latched.cml_run, may_start=may_start, relay=relay)
-        if before is Phase.STANDBY and sequence.phase is Phase.CLOSING:
-            self.control.begin()
+    def _start(self, inputs: Inputs) -> list[int]:
+        """Initialise the task; return the problems to log."""
+        self._started = True
+        problems = self.latched.start(inputs)
+        self.pll.start(self.latched.ac_line_freq)
         return problems
 
-    def _drive(self, measured: Measured) -> tuple[Pulse, ...]:
-        """Regulate and plan the pulses up to the next interrupt."""
-        if not self.sequence.running:
-            return self.control.off(self.pll)
-        reference = self.latched.reference if self.sequence.phase is Phase.RUN else 0
-        pulses = self.control.scan(measured, reference, self.latched, self.pll, reverse=False)
+    def _read(self, measured: Measured, inputs: Inputs) -> list[int]:
+        """Read the inputs of a tick; return the problems to log."""
+        problems = self.latched.always(inputs)
+        if self.sequence.running:
+            return problems + self.latched.run(inputs, self.pll.period_ns)
+        self.latched.standby(inputs, measured.options)
+        return problems
+
+    def _judge(self, measured: Measured) -> int:
+        """Return what the shorted SCR test says, if one is under way."""
+        if self.sequence.phase is not Phase.SCR_TEST:
+            return GO_ON
+        return self.scr_test.judge(measured, reverse=_reverse(measured))
+
+    def _protect(self, measured: Measured, causes: int, verdict: int) -> list[int]:
+        """Latch faults; with one, without the permissive, or by CML_COAST_STOP the drive coasts; return problems."""
+        faults, sequence = self.faults, self.sequence
+        problems = faults.blame(verdict) if verdict > PASSED else []
+        problems += faults.latch(causes)
+        if sequence.phase is not Phase.STANDBY:
+            called = sequence.running and self.latched.cml_coast_stop
+            if called or faults.stops(self.latched) or not measured.status & PERMISSIVE:
+                sequence.coast()
+        return problems
+
+    def _follow_run(self, now_ns: int, measured: Measured, inputs: Inputs, causes: int) -> None:
+        """Follow CML_RUN and FAULT_RESET at a tick: a start that comes with the reset is refused (decision)."""
+        latched, faults, sequence = self.latched, self.faults, self.sequence
+        permitted = bool(measured.status & PERMISSIVE)
+        may_start = latched.usable and self.pll.locked and permitted and not faults.active
+        relay = RMCR if inputs.mcr_select else FMCR
+        sequence.tick(now_ns, run=latched.cml_run, may_start=may_start, relay=relay)
+        if faults.active and latched.fault_reset and not sequence.running:
+            faults.reset(causes)
+
+    def _go_on(self, now_ns: int, inputs: Inputs, verdict: int) -> list[int]:
+        """Take the next step of a start or stop where it is time; return the problems to log."""
+        latched, sequence = self.latched, self.sequence
+        if sequence.closed(now_ns) and self._tests_scrs:
+            sequence.test(now_ns)
+            self.scr_test.begin(both=latched.both_bridges)
+        elif sequence.closed(now_ns) or (sequence.phase is Phase.SCR_TEST and verdict == PASSED):
+            return self._begin_run(now_ns, inputs)
+        elif sequence.stopped(now_ns, dropout_s=latched.max_m_dropout, discontinuous=self.control.discontinuous):
+            sequence.coast()
+        return []
+
+    def _begin_run(self, now_ns: int, inputs: Inputs) -> list[int]:
+        self.sequence.run(now_ns)
+        self.control.begin()
+        self.faults.begin_run()
+        problems = self.latched.run(inputs, self.pll.period_ns)
+        if self.latched.cml_coast_stop:
+            self.sequence.coast()
+        return problems
+
+    def _fire(self, measured: Measured) -> tuple[Pulse, ...]:
+        """Plan the gates up to the next interrupt, as the regulator or the test in use has them."""
+        pll, latched, phase = self.pll, self.latched, self.sequence.phase
+        reverse = _reverse(measured)
+        if phase < Phase.RUN:
+            none = self.control.off(pll)
+            if phase is Phase.SCR_TEST:
+                return self.scr_test.fire(pll.position, pll.period_ns, reverse=reverse)
+            return none
+        stopping = phase is Phase.STOPPING
+        if latched.cml_test:
+            delta_us = 0.0 if stopping else (180 - latched.test_alpha) * pll.period_ns / 360_000
+            pulses = self.control.open_loop(delta_us, 2 if latched.test_brpol else 1, pll, reverse=reverse)
+        else:
+            pulses = self.control.scan(measured, 0 if stopping else latched.reference, latched, pll, reverse=reverse)
         self.control.show(self.outputs)
+        self.faults.note_delta(self.outputs.delta)
         return pulses
+
+    def _row(self, measured: Measured) -> tuple[int, ...]:
+        """Return the outputs of a tick."""
+        outputs, status = self.outputs, measured.status
+        outputs.dc_cml_state = self.sequence.running
+        outputs.sync_locked = self.pll.locked
+        outputs.line_period = self.pll.period_us
+        outputs.inswitch_posa = bool(status & SWITCH_A)
+        outputs.inswitch_posb = bool(status & SWITCH_B)
+        outputs.infault_reset = bool(status & RESET_SWITCH)
+        self.faults.show(outputs)
+        return outputs.row()
+
+    def _record(self, pulses: tuple[Pulse, ...]) -> tuple[int, int, int] | None:
+        """Return the record of a scan for DIAG_DATA: only while the loop regulates (52.3.2)."""
+        if not self.sequence.running or self.latched.cml_test:
+            return None
+        gates = 0
+        for pulse in pulses:
+            gates |= pulse.gates
+        return self.outputs.i_fdbk, self.outputs.ref_lag_out, gates
 
     # What is kept
 
@@ -145,6 +243,11 @@ class CurrentMinorLoop(Stateful):
                     setattr(part, name, [type(item)(next(rest)) for item in old])
                 else:
                     setattr(part, name, _like(old, next(rest)))
+
+
+def _reverse(measured: Measured) -> bool:
+    """Return whether the SCRs are fired in the order of the rotation that is not standard: the line's own."""
+    return bool(measured.status & ROTATION_ABC)
 
 
 def _like(old: object, number: float) -> object:

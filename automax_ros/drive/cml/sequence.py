@@ -1,4 +1,8 @@
-"""Start, stop and coast stop of the drive (52.1.3, 52.3.1). Times of the contactor are decisions."""
+"""Start, stop and coast stop of the drive (52.1.3, 52.3.1). The steps and the contactor's time are decisions.
+
+A start is the rising edge of CML_RUN, seen at a system clock tick in standby while nothing forbids it; an edge that
+comes at another time is forgotten, and not logged (decision). The first tick after task initialisation shows no edge.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,8 @@ import enum
 
 from automax_ros.drive.state import Stateful
 
-CLOSE_NS = 100_000_000
-"""From the relay to a closed contactor, ns, as the sequence allows for it (decision)."""
+CLOSE_NS = 80_000_000
+"""From the relay to the next step, ns: the contactor closes meanwhile (decision; no feedback of it is known)."""
 
 
 class Phase(enum.IntEnum):
@@ -17,6 +21,7 @@ class Phase(enum.IntEnum):
     CLOSING = 1
     """The contactor's relay is on; the contactor closes."""
     SCR_TEST = 2
+    """Gates are fired one by one: the shorted SCR test."""
     RUN = 3
     STOPPING = 4
     """The current is brought to zero, then the contactor opens."""
@@ -41,8 +46,8 @@ class Sequence(Stateful):
 
     @property
     def running(self) -> bool:
-        """DC_CML_STATE."""
-        return self.phase in (Phase.RUN, Phase.STOPPING)
+        """DC_CML_STATE: TRUE until a stop has opened the contactor (decision)."""
+        return self.phase >= Phase.RUN
 
     def tick(self, now_ns: int, *, run: bool, may_start: bool, relay: int) -> None:
         """Follow CML_RUN at a tick; ``may_start``: locked, permitted, no fault."""
@@ -57,13 +62,23 @@ class Sequence(Stateful):
         elif not run and self.phase is not Phase.STOPPING:
             self.coast()
 
-    def scan(self, now_ns: int, *, dropout_s: float, discontinuous: bool) -> None:
-        """Move on at a scan."""
-        passed = now_ns - self._since_ns
-        if self.phase is Phase.CLOSING and passed >= CLOSE_NS:
-            self._enter(Phase.RUN, now_ns)
-        elif self.phase is Phase.STOPPING and (discontinuous or passed >= dropout_s * 1e9):
-            self.coast()
+    def closed(self, now_ns: int) -> bool:
+        """Return whether the contactor has had the time to close."""
+        return self.phase is Phase.CLOSING and now_ns - self._since_ns >= CLOSE_NS
+
+    def test(self, now_ns: int) -> None:
+        """Begin the shorted SCR test."""
+        self._enter(Phase.SCR_TEST, now_ns)
+
+    def run(self, now_ns: int) -> None:
+        """Begin to run."""
+        self._enter(Phase.RUN, now_ns)
+
+    def stopped(self, now_ns: int, *, dropout_s: float, discontinuous: bool) -> bool:
+        """Return whether a stop may open the contactor: the current is discontinuous, or MAX_M_DROPOUT is over."""
+        if self.phase is not Phase.STOPPING:
+            return False
+        return discontinuous or now_ns - self._since_ns >= dropout_s * 1e9
 
     def coast(self) -> None:
         """Open the contactor at once and go to standby."""

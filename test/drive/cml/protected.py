@@ -1,0 +1,95 @@
+"""A drive on the bench whose plant, line and inputs a test breaks; outputs are told by name, as the block has them."""
+
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.drive.cml import OUTPUTS, CurrentMinorLoop, Inputs
+from automax_ros.drive.cml.signals import PERMISSIVE
+from automax_ros.drive.controller import DriveController
+from automax_ros.drive.nameplate import EXAMPLES, derive
+from automax_ros.drive.plant import DrivePlant, PlantData
+
+INPUTS = Inputs(
+    io_cntl_slot=7, dig_io_slot=8, ac_line_freq=60, reference=0, ref_rate=0.0, ref_lag=400.0, kp=0.2, pi_w_lead=50.0,
+    ag_factor=20, cc_thresh=680, cml_run=False, cml_coast_stop=False, mcr_select=False, max_m_dropout=0.1,
+    cml_test=False, test_brpol=False, test_alpha=180, ioc_thresh=250, lim_bar=150, digital_tach=True, speed_fdbk=None,
+    tach_loss_stop=True, osv_fdbk=None, osv_thresh=0, nonstand_phrot=False, auto_phrot=False, fault_reset=False,
+)  # fmt: skip
+LOCKED_S = 0.5
+"""Long enough for the line sync to lock."""
+CLOSED_S = 0.1
+"""Long enough from the edge of CML_RUN to the run, without a test of the SCRs."""
+
+
+def inputs(**changes):
+    """The inputs of a 150 hp drive, with changes."""
+    return INPUTS._replace(**changes)
+
+
+class Drive:
+    """Plant, 57C406 and loop; ``log`` has the codes of what was logged, with their instants."""
+
+    def __init__(self, size="150hp", *, inertia=1000.0, tests_scrs=False, plant=None, **changes):
+        self.plant = plant or DrivePlant(PlantData(derive(EXAMPLES[size]), inertia=inertia))
+        self.hardware = DriveController(self.plant)
+        self.loop = CurrentMinorLoop(tests_scrs=tests_scrs)
+        self.inputs = inputs(**changes)
+        self.status = PERMISSIVE
+        self.registers = (109, 4, 2, 0)
+        self.now_ns = 0
+        self.rows = []
+        self.records = []
+        self.log = []
+        self.scans = 0
+
+    def scan(self):
+        """Execute a scan, let time pass to the next interrupt, return the outcome."""
+        measured = self.hardware.measure(self.now_ns, self.status, self.registers)
+        outcome = self.loop.scan(self.now_ns, measured, self.inputs)
+        self.hardware.command(outcome.command, self.now_ns)
+        if outcome.outputs is not None:
+            self.rows.append((self.now_ns, dict(zip(OUTPUTS, outcome.outputs, strict=True))))
+        if outcome.record is not None:
+            self.records.append((self.now_ns, outcome.record))
+        for number in outcome.problems:
+            assert f"AMX{number}" in PROBLEMS
+            self.log.append((self.now_ns, f"AMX{number}"))
+        self.now_ns += outcome.command.next_ns
+        self.scans += 1
+        return outcome
+
+    def run(self, seconds, **changes):
+        """Change inputs, then execute the scans of a time; return the outcomes."""
+        self.inputs = self.inputs._replace(**changes)
+        end_ns = self.now_ns + round(seconds * 1e9)
+        outcomes = []
+        while self.now_ns < end_ns:
+            outcomes.append(self.scan())
+        return outcomes
+
+    def start(self, **changes):
+        """Lock, then run with these inputs."""
+        self.run(LOCKED_S, cml_run=False)
+        self.run(CLOSED_S, cml_run=True, **changes)
+        assert self["DC_CML_STATE"]
+        return self
+
+    def __getitem__(self, output):
+        """An output as the last tick wrote it."""
+        return self.rows[-1][1][output]
+
+    @property
+    def codes(self):
+        """The codes that were logged."""
+        return [code for _, code in self.log]
+
+    @property
+    def faults(self):
+        """The fault outputs that are TRUE."""
+        return {name for name, value in self.rows[-1][1].items() if name in FAULTS and value}
+
+    @property
+    def relay(self):
+        """Whether the contactor's relay is on."""
+        return self.loop.sequence.relays != 0
+
+
+FAULTS = {"IOC_OUT", "SYNC_LOSS_OUT", "TACH_LOSS_OUT", "OSV_OUT", "EXT_IET_OUT", "PHROT_FLT_OUT", "BAD_SCR_OUT"}
