@@ -30,16 +30,18 @@ from automax_ros.rack.rack_state import RackState
 from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
 from automax_ros.rack.settings import common_named
 from automax_ros.rack.task_config import TaskConfig
-from automax_ros.rack.triggers import MakeTrigger, Trigger, usual_trigger
+from automax_ros.rack.triggers import DriveTrigger, MakeTrigger, Trigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
-from automax_ros.running.basic_task import BasicTask, make_task
+from automax_ros.running.basic_task import BasicTask
 from automax_ros.running.channels import Channels
+from automax_ros.running.cml_task import CmlTask
 from automax_ros.running.common_clock import CommonClock
 from automax_ros.running.drives import Drives
 from automax_ros.running.events import Events
 from automax_ros.running.execution import IDEAL, Execution
 from automax_ros.running.interrupts import Interrupts
+from automax_ros.running.make_task import make_task
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.processor_time import ProcessorTime
@@ -294,6 +296,7 @@ class Rack:
             clock_since_ns=self._clock.since_ns,
             modules={module.config.slot: module.state() for module in self.modules},
             plants=self.plants.state(),
+            under_forces=tuple(self.memory.under_forces),
         )
 
     def load(self, state: RackState) -> None:
@@ -308,7 +311,7 @@ class Rack:
             raise ValueError("this rack runs already: load the state into one that was not started")
         self.scheduler.run_until(state.now_ns)
         self.memory.load_image(state.image)
-        self.memory.hold(state.forced)
+        self.memory.hold(state.forced, state.under_forces)
         self.operations.load(state.operations)
         self._clock.resume(state.clock_since_ns)
         self.channels.load(state.channels)
@@ -339,6 +342,7 @@ class Rack:
             backplane=self.backplane,
             events=self.events,
             channels=self.channels,
+            drives=self.drives,
         )
         return ScheduledTask(
             installed,
@@ -353,6 +357,8 @@ class Rack:
     def _usual_trigger(self, task: Task) -> Trigger:
         """Return the trigger of a task as it is installed; the interrupts that it waits for are connected."""
         self._interrupts.bind(task)
+        if isinstance(task, CmlTask):
+            return DriveTrigger(task)
         if isinstance(task, BasicTask):
             return WaitTrigger(task, self.events, self.channels, self.scheduler, lambda: self._no_event(task))
         return usual_trigger(task, self.events, self.scheduler, self._no_event)

@@ -18,7 +18,7 @@ class RackState:
 
     ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``events`` those that are kept
     for the next who waits, ``clock_since_ns`` since when the common clock runs, ``modules`` by slot, ``plants`` by
-    name: a module's state has nothing of its plant.
+    name: a module's state has nothing of its plant. ``under_forces`` is what ``forced`` would hold without the forces.
     """
 
     now_ns: int
@@ -30,3 +30,4 @@ class RackState:
     clock_since_ns: int | None
     modules: Mapping[int, ModuleState]
     plants: Mapping[str, SavedState] = field(default_factory=dict)
+    under_forces: tuple[tuple[int, int, Value], ...] = ()

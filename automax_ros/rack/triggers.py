@@ -1,10 +1,11 @@
-"""What makes a task scan: its Processor's clock, an event, or the module it stands in."""
+"""What makes a task scan: its Processor's clock, an event, a drive's 57C406, or the module it stands in."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Protocol
 
+from automax_ros.running.cml_task import CmlTask
 from automax_ros.running.events import Event, Events
 from automax_ros.running.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
 from automax_ros.running.task import Task
@@ -148,6 +149,28 @@ class EventTrigger:
             due, skipped = self._due, self._event.skipped
             self._set = self._scheduler.at(now_ns, self._key, lambda now: due(now, skipped))
             self._wait_since(now_ns)
+
+
+class DriveTrigger:
+    """A scan is due at each interrupt of the task's 57C406, six in a cycle of its line (52.0)."""
+
+    def __init__(self, task: CmlTask) -> None:
+        """Take the task; its 57C406 does not interrupt yet."""
+        self._task = task
+        self._key = EventKey(EventClass.SCAN, task.priority, task.name)
+
+    def arm(self, first_ns: int, due: Due) -> None:
+        """Let the 57C406 interrupt from ``first_ns`` on."""
+        self._task.port.arm(first_ns, self._key, due)
+
+    def disarm(self) -> None:
+        """Let it interrupt no more: the drive's gates and contactor are off at once."""
+        self._task.port.disarm()
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next interrupt comes."""
+        return self._task.port.next_ns
 
 
 class ModuleTrigger:

@@ -18,8 +18,9 @@ from automax_ros.replay.report import Kind, TaskReport
 from automax_ros.replay.state import fitting_state, held_in, log_is_empty, state_differences, whole_state
 from automax_ros.replay.stored_rack import ReplaySource
 from automax_ros.replay.tunables import Tunables
-from automax_ros.running.basic_task import make_task
-from automax_ros.running.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status, snapshot_layout
+from automax_ros.running.make_task import make_task
+from automax_ros.running.snapshot import snapshot_layout
+from automax_ros.running.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status
 from automax_ros.wire.messages import CommonWrite, Operation, Scan, TaskState
 
 _MOST_NOTES = 20

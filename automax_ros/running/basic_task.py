@@ -280,31 +280,5 @@ def awaits(task: Task, event: str) -> bool:
     return kind == Suspension.EVENT and task.compiled.program.events[number].name == event
 
 
-def make_task(
-    compiled: CompiledTask,
-    memory: Memory,
-    *,
-    writer: int = 0,
-    slot: int = 0,
-    priority: int = 11,
-    backplane: Backplane = NO_MODULES,
-    events: Events | None = None,
-    channels: ChannelAccess | None = None,
-) -> Task:
-    """Install a task of the kind that its program is of."""
-    if compiled.program.is_basic:
-        return BasicTask(
-            compiled,
-            memory,
-            writer=writer,
-            slot=slot,
-            priority=priority,
-            backplane=backplane,
-            events=events,
-            channels=channels,
-        )
-    return Task(compiled, memory, writer=writer, slot=slot, priority=priority, backplane=backplane, events=events)
-
-
 def _nothing() -> None:
     """Nobody wants to know."""

@@ -27,7 +27,7 @@ class DrivePort(Protocol):
         ...
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
-        """Interrupt at ``first_ns`` and from then on; gates are off until a command comes.
+        """Interrupt at ``first_ns`` and from then on.
 
         At each interrupt ``due`` is called with its instant, in its place ``key`` among the scans of that instant.
         """

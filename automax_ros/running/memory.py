@@ -32,6 +32,7 @@ class CommonMemory(Image):
         super().__init__(views)
         self.sequence = 0
         self._forced: set[tuple[int, int]] = set()
+        self._under: dict[tuple[int, int], Value] = {}
         self._locals_forced = False
         self._force_watchers: list[Callable[[], None]] = []
         self._log: list[Write] | None = None
@@ -74,6 +75,7 @@ class CommonMemory(Image):
             MemoryValueError: the value does not fit the variable's type.
         """
         fit = self.accepted(view, value, element)
+        self._under.setdefault((view, element), self.read_now(view, element))
         self._forced.discard((view, element))
         self._store(view, element, fit, writer, WriteKind.FORCE)
         self._forced.add((view, element))
@@ -83,12 +85,18 @@ class CommonMemory(Image):
         """End a force; the value stays until the next write (semantics, Scan, memory, tasks)."""
         if (view, element) in self._forced:
             self._forced.remove((view, element))
+            self._under.pop((view, element), None)
             self._store(view, element, self.read_now(view, element), writer, WriteKind.RELEASE)
             self._forces_changed(writer)
 
-    def hold(self, forced: Iterable[tuple[int, int]]) -> None:
-        """Take over which values are forced, as ``load_image`` takes over the values: nothing is logged."""
+    def hold(self, forced: Iterable[tuple[int, int]], under: Iterable[tuple[int, int, Value]] = ()) -> None:
+        """Take over which values are forced, as ``load_image`` takes over the values: nothing is logged.
+
+        ``under`` is what ``under_forces`` gave.
+        """
         self._forced = set(forced)
+        known = {(view, element): value for view, element, value in under}
+        self._under = {key: known.get(key, self.read_now(*key)) for key in self._forced}
         for changed in self._force_watchers:
             changed()
 
@@ -106,6 +114,18 @@ class CommonMemory(Image):
     def is_forced(self, view: int) -> bool:
         """Return whether a force holds a simple view."""
         return (view, 0) in self._forced
+
+    def under_force(self, view: int) -> Value:
+        """Return what a simple view would hold if no force held it: the last write that reached memory, though dropped.
+
+        What a block would write is dropped in its scan already, so it does not count (decision).
+        """
+        return self._under.get((view, 0), self._cells[view])
+
+    @property
+    def under_forces(self) -> list[tuple[int, int, Value]]:
+        """What forced values would be without the forces: view, element, value."""
+        return [(*key, value) for key, value in sorted(self._under.items())]
 
     def watch_forces(self, changed: Callable[[], None]) -> None:
         """Call ``changed`` whenever a force begins or ends."""
@@ -151,6 +171,7 @@ class CommonMemory(Image):
     def _store(self, view: int, element: int, value: Value, writer: int, kind: WriteKind) -> None:
         if self._forced:
             if (view, element) in self._forced:
+                self._under[view, element] = value
                 return
             if view in self._shared:
                 value = self.registers.keeping(view, element, value, self._forced, self.read_now)

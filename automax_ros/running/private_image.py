@@ -45,6 +45,10 @@ class PrivateImage(Image):
         """Return whether a force holds a simple view."""
         return self._common.is_forced(view)
 
+    def under_force(self, view: int) -> Value:
+        """Return what a simple view holds: no task that asks works on an image (decision)."""
+        return self.read_now(view)
+
     def watch_forces(self, changed: Callable[[], None]) -> None:
         """Call ``changed`` whenever a force begins or ends."""
         self._common.watch_forces(changed)

@@ -8,19 +8,20 @@ from collections.abc import Generator, Mapping, Sequence
 from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
-from automax_ros.compile.layout import Layout, Role, StateField
+from automax_ros.compile.layout import Layout
 from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
 from automax_ros.running.backplane import NO_MODULES, Backplane
-from automax_ros.running.error_log import LOG_FIELD, LOG_NUMBERS, ErrorLog, LogEntry
+from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.events import Events
 from automax_ros.running.modeled_scan import HeardMemory, Progress, ScanUnderWay, add_error, cleared_errors
 from automax_ros.running.scan_record import ScanRecord, Status, Steps
+from automax_ros.running.snapshot import snapshot_layout
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory
 
-__all__ = ["EVENT_TIMEOUT", "OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task", "snapshot_layout"]
+__all__ = ["EVENT_TIMEOUT", "OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task"]
 
 SCAN_TOO_LONG = 7040
 OVERLAP = 7070
@@ -387,9 +388,3 @@ class Task:
         io = self._io if self._under_way is None else self._heard_io
         io.log(error.line, SCAN_TOO_LONG)
         self.status = Status.FAULTED
-
-
-def snapshot_layout(compiled: CompiledTask) -> Layout:
-    """Return the layout of a task's snapshots: the state, then the error log."""
-    log = StateField(LOG_FIELD, DataType.DOUBLE, Role.LOG, 0, LOG_NUMBERS, is_array=True)
-    return Layout((*compiled.layout.fields, log))

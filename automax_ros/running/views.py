@@ -98,6 +98,10 @@ class Memory(Protocol):
         """Return whether a force holds a simple view."""
         ...
 
+    def under_force(self, view: int) -> Value:
+        """Return what a simple view would hold if no force held it."""
+        ...
+
     def watch_forces(self, changed: Callable[[], None]) -> None:
         """Call ``changed`` whenever a force begins or ends, between two scans."""
         ...

@@ -1,0 +1,228 @@
+"""The task of a DC drive: its scans begin at the interrupts of a 57C406, and its first block is the current minor loop.
+
+The loop (``drive/cml``) is a part of the task's state: it gets what the 57C406 has measured and what the task has
+latched, and returns a command for the 57C406. Both are noted in the record of a scan (``drive_record``), so the scan
+can be executed again without the drive. The loop's time is that of the latch (decision: in modeled execution a scan
+latches later than its interrupt).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, cast
+
+from automax_ros.compile.compiler import CompiledTask, ScanSteps
+from automax_ros.core.types import Latched, Value
+from automax_ros.drive.cml.diagnostics import PAGE_NUMBER, Record, next_entry_index, page_of, writes
+from automax_ros.drive.cml.inputs import INPUTS, Inputs
+from automax_ros.drive.cml.minor_loop import NUMBERS, CurrentMinorLoop, Outcome
+from automax_ros.drive.cml.signals import Command, Measured
+from automax_ros.language.program import BoundCall
+from automax_ros.language.syntax.tree import Reference, Scope
+from automax_ros.running.backplane import NO_MODULES, Backplane
+from automax_ros.running.drive_record import noted_command, noted_measured
+from automax_ros.running.drives import DriveAccess, DrivePort, Drives
+from automax_ros.running.error_log import LOG_NUMBERS
+from automax_ros.running.events import Events
+from automax_ros.running.scan_record import ScanRecord, Status, Steps
+from automax_ros.running.task import Task
+from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
+from automax_ros.running.views import Memory
+
+_TRUE_INPUTS = ("SPEED_FDBK", "OSV_FDBK")
+"""Inputs on which a force has no effect (52.1.5): the loop gets what is under it."""
+_SCR_TEST = "BAD_SCR_OUT"
+"""The output whose programming enables the shorted SCR test (52.3.1)."""
+_RECORDS = "DIAG_DATA"
+
+
+class CmlIo(TaskIo):
+    """What a scan of a current minor loop task touches."""
+
+    def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task and the memory that its scans work on."""
+        super().__init__(task, memory, hear)
+        self._cml = task
+        self._latched_ns = 0
+        self._take_latch = self.latch
+        self.latch = self._latch_at
+
+    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:
+        """Execute a scan of the loop; ``records`` is a local DIAG_DATA.
+
+        Returns the outputs but DIAG_DATA in their order, None where none is written.
+        """
+        task = self._cml
+        measured = Measured(*self._hear(task.measure))
+        outcome = task.loop.scan(self._latched_ns, measured, Inputs(*self._true(inputs)))
+        self._note(measured, outcome.command)
+        self._hear(lambda: task.command(outcome.command))
+        for code in outcome.problems:
+            self.log(task.cml.line, code)
+        if outcome.record is not None:
+            self._keep(outcome.record, records)
+        return outcome.outputs
+
+    def _latch_at(self) -> Latched:
+        self._latched_ns = self._memory.now_ns
+        return self._take_latch()
+
+    def _true(self, inputs: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return the inputs with what is under a force where that has no effect."""
+        for place, view in self._cml.true_inputs:
+            if self._memory.is_forced(view):
+                inputs = (*inputs[:place], self._under_force(view), *inputs[place + 1 :])
+        return inputs
+
+    def _under_force(self, view: int) -> Value:
+        value: Value = self._hear(lambda: self._cml.memory.under_force(view))
+        return value
+
+    def _note(self, measured: Measured, command: Command) -> None:
+        """Note nothing: the scan is not recorded."""
+
+    def _keep(self, record: Record, records: list[Value] | None) -> None:
+        """Write a record of the diagnostic data: an array of the task's own, or a common in actual memory (52.3.2)."""
+        view = self._cml.records
+        if records is not None:
+            page = page_of(int(records[PAGE_NUMBER]))
+            for index, value in writes(page, int(records[next_entry_index(page)]), record):
+                records[index] = value
+        elif view is not None:
+            page = page_of(int(self.read_now(view, PAGE_NUMBER)))
+            for index, value in writes(page, int(self.read_now(view, next_entry_index(page))), record):
+                self.write_now(view, value, index)
+
+
+class RecordingCmlIo(CmlIo, RecordingIo):
+    """The same, noting everything, what was measured and commanded among the reads."""
+
+    def _under_force(self, view: int) -> Value:
+        value = super()._under_force(view)
+        self.record.reads.append((view, 0, value))
+        return value
+
+    def _note(self, measured: Measured, command: Command) -> None:
+        self.record.reads += noted_measured(measured)
+        self.record.reads += noted_command(command)
+
+
+class CmlTask(Task):
+    """A task that runs the current minor loop of a drive.
+
+    ``cml`` is its CALL; ``records`` the view of a common DIAG_DATA, None without one; ``true_inputs`` are place in
+    ``Inputs`` and view of the commons that a force does not change for the loop.
+    """
+
+    _io: CmlIo
+    _heard_io: CmlIo
+    cml: BoundCall
+
+    def __init__(
+        self,
+        compiled: CompiledTask,
+        memory: Memory,
+        *,
+        writer: int = 0,
+        slot: int = 0,
+        priority: int = 11,
+        backplane: Backplane = NO_MODULES,
+        events: Events | None = None,
+        drives: DriveAccess | None = None,
+    ) -> None:
+        """Install the task; without ``drives`` there is no line."""
+        self._drives: DriveAccess = Drives() if drives is None else drives
+        self._before: list[float] | None = None
+        super().__init__(
+            compiled, memory, writer=writer, slot=slot, priority=priority, backplane=backplane, events=events
+        )
+
+    def install(self, compiled: CompiledTask) -> None:
+        """Begin again, with this or another program of such a task."""
+        cml = compiled.program.cml
+        assert cml is not None
+        self.cml = cml
+        self._slots = int(cml.facts["io_cntl_slot"]), int(cml.facts["dig_io_slot"])
+        self.records = self._common(_RECORDS, compiled)
+        views = ((INPUTS.index(name), self._common(name, compiled)) for name in _TRUE_INPUTS)
+        self.true_inputs = tuple((place, view) for place, view in views if view is not None)
+        self.loop = CurrentMinorLoop(tests_scrs=_SCR_TEST in cml.arguments)
+        super().install(compiled)
+
+    @property
+    def port(self) -> DrivePort:
+        """The 57C406 that IO_CNTL_SLOT names."""
+        return self._drives.port(self._slots[0])
+
+    def measure(self) -> tuple[int, ...]:
+        """Return what the 57C406 has measured."""
+        return self.port.measure(self._slots[1])
+
+    def command(self, command: Command) -> None:
+        """Let the 57C406 carry out a command."""
+        self.port.command(command)
+
+    def run(self, now_ns: int = 0) -> ScanRecord | None:
+        """Put the task into RUN: the loop starts again, and its 57C406's registers get their defaults (52.7)."""
+        self.loop.restart()
+        record = super().run(now_ns)
+        if self.status is Status.RUNNING:
+            self.port.initialise()
+        return record
+
+    def scan(self, now_ns: int, skipped: int = 0) -> ScanRecord | None:
+        """Execute one scan at an interrupt; with the task's end the drive's comes too."""
+        record = super().scan(now_ns, skipped)
+        self._follow_end()
+        return record
+
+    def scan_modeled(self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None) -> Steps:
+        """Execute one scan in steps; one that is given up leaves the loop as it was."""
+        self._before = self.loop.numbers()
+        try:
+            record = yield from super().scan_modeled(now_ns, skipped, form)
+        except BaseException:
+            self.loop.take(self._before)
+            raise
+        finally:
+            self._before = None
+        self._follow_end()
+        return record
+
+    def snapshot(self) -> list[Value]:
+        """Return state, loop and error log as flat values, in the order of ``layout``."""
+        values = super().snapshot()
+        numbers = self.loop.numbers() if self._before is None else self._before
+        return [*values[:-LOG_NUMBERS], *numbers, *values[-LOG_NUMBERS:]]
+
+    def restore(self, values: list[Value]) -> None:
+        """Take a snapshot over.
+
+        Raises:
+            ValueError, OverflowError: it does not fit the layout.
+        """
+        state, log = values[: -LOG_NUMBERS - NUMBERS], values[-LOG_NUMBERS:]
+        numbers = values[len(state) : -LOG_NUMBERS]
+        before = self.loop.numbers()
+        try:
+            self.loop.take([float(number) for number in numbers])
+            super().restore([*state, *log])
+        except (ValueError, OverflowError):
+            self.loop.take(before)
+            raise
+
+    def _follow_end(self) -> None:
+        """Without its task a drive stops at once."""
+        if self.status is not Status.RUNNING:
+            self.port.disarm()
+
+    def _common(self, keyword: str, compiled: CompiledTask) -> int | None:
+        """Return the view of the common that a parameter names, None where it names none."""
+        given = self.cml.arguments.get(keyword)
+        if not isinstance(given, Reference):
+            return None
+        symbol = compiled.program.symbols[given.name]
+        return self.memory.view(symbol.name) if symbol.scope is Scope.COMMON and not given.subscripts else None
+
+    def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
+        return RecordingCmlIo(self, memory, hear) if self._recording else CmlIo(self, memory, hear)

@@ -1,0 +1,86 @@
+"""What a record keeps of a drive: what its 57C406 has measured at an interrupt, and what the loop has commanded.
+
+Both stand among the reads of the scan's record, under views that no rack has, one whole number an element; a number
+that is the usual one is left out (decision: a drive at rest then takes three or four numbers a scan).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from automax_ros.drive.cml.signals import Command, Measured, Pulse
+
+MEASURED_VIEW = 0xFFF0
+"""The view of what was measured; the element is the place in ``Measured``."""
+COMMAND_VIEW = 0xFFEF
+"""The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers a pulse."""
+MEASURED_NAMES = Measured._fields
+COMMAND_NAMES = tuple(name for name in Command._fields if name != "pulses")
+MOST_PULSES = 16
+"""Most gate windows of one command that are told (decision: six SCRs, each as first and as second, are twelve)."""
+MEASURED_NUMBERS = len(MEASURED_NAMES)
+COMMAND_NUMBERS = len(COMMAND_NAMES) + MOST_PULSES * len(Pulse._fields)
+
+Noted = tuple[int, int, int]
+"""View, element, number."""
+
+_PULSE = len(Pulse._fields)
+_USUAL = tuple(int(Measured._field_defaults.get(name, 0)) for name in MEASURED_NAMES)
+_USUAL_COMMAND = tuple(int(Command._field_defaults.get(name, 0)) for name in COMMAND_NAMES)
+
+
+def noted_measured(measured: Measured) -> list[Noted]:
+    """Return what is noted of a measurement: its first number always, so that there is something."""
+    return [
+        (MEASURED_VIEW, place, value)
+        for place, (value, usual) in enumerate(zip(measured, _USUAL, strict=True))
+        if value != usual or not place
+    ]
+
+
+def noted_command(command: Command) -> list[Noted]:
+    """Return what is noted of a command: its first number always."""
+    values = command_numbers(command)
+    usual = (*_USUAL_COMMAND, *([0] * (len(values) - len(_USUAL_COMMAND))))
+    return [
+        (COMMAND_VIEW, place, value)
+        for place, (value, often) in enumerate(zip(values, usual, strict=True))
+        if value != often or not place
+    ]
+
+
+def command_numbers(command: Command) -> list[int]:
+    """Return a command as whole numbers."""
+    numbers = [int(getattr(command, name)) for name in COMMAND_NAMES]
+    for pulse in command.pulses[:MOST_PULSES]:
+        numbers += pulse
+    return numbers
+
+
+def measured_of(noted: Iterable[Noted]) -> Measured | None:
+    """Return the measurement that was noted, None where there is none among what is given."""
+    numbers = dict(_of_view(MEASURED_VIEW, noted))
+    if not numbers:
+        return None
+    return Measured(*(numbers.get(place, usual) for place, usual in enumerate(_USUAL)))
+
+
+def command_of(noted: Iterable[Noted]) -> Command | None:
+    """Return the command that was noted, None where there is none among what is given."""
+    numbers = dict(_of_view(COMMAND_VIEW, noted))
+    if not numbers:
+        return None
+    fields = {
+        name: type(Command._field_defaults.get(name, 0))(numbers.get(place, _USUAL_COMMAND[place]))
+        for place, name in enumerate(COMMAND_NAMES)
+    }
+    first = len(COMMAND_NAMES)
+    count = (max(numbers) - first) // _PULSE + 1 if max(numbers) >= first else 0
+    pulses = (first + _PULSE * number for number in range(count))
+    return Command(
+        **fields, pulses=tuple(Pulse(*(numbers.get(place + item, 0) for item in range(_PULSE))) for place in pulses)
+    )
+
+
+def _of_view(view: int, noted: Iterable[Noted]) -> Iterator[tuple[int, int]]:
+    return ((element, value) for entry_view, element, value in noted if entry_view == view)
