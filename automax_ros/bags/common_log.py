@@ -13,6 +13,7 @@ from automax_ros.bags.write_log import WriteLog
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType, Value
 from automax_ros.running.channels import CHANNEL_VIEWS
+from automax_ros.running.drive_record import COMMAND_NUMBERS, COMMAND_VIEW, MEASURED_NUMBERS, MEASURED_VIEW
 from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable
 
 Key = tuple[int, int]
@@ -48,7 +49,7 @@ class CommonLog:
             for name, item in self.variables.items()
             for kind in (DataType.numbered(item.type),)
         }
-        self._read_kinds = {**_CHANNELS, **self._kinds}
+        self._read_kinds = {**_CHANNELS, **_DRIVES, **self._kinds}
 
     def check_table(self, table: VariableTable) -> None:
         """Make sure that a further table is of the same run.
@@ -80,7 +81,7 @@ class CommonLog:
         return self.entries(message.values, message.stamp)
 
     def reads(self, values: Values, stamp: int) -> list[Entry]:
-        """Return what a scan read, as ``entries`` does; what came out of channels has views of its own.
+        """Return what a scan read, as ``entries`` does; what channels or a drive gave has views of its own.
 
         Raises:
             BagError: it does not fit the table of variables.
@@ -145,6 +146,15 @@ _TYPED: dict[DataType, Callable[[float], Value]] = {
 """What makes a number in a message one of the variable's type; strings have none."""
 _CHANNELS: dict[int, _Kind] = {
     view: (_TYPED.get(kind), *kind.range, _CHANNEL_NUMBERS, "a channel") for kind, view in CHANNEL_VIEWS.items()
+}
+
+
+_DRIVES: dict[int, _Kind] = {
+    view: (int, *DataType.DOUBLE.range, numbers, what)
+    for view, numbers, what in (
+        (MEASURED_VIEW, MEASURED_NUMBERS, "a measurement"),
+        (COMMAND_VIEW, COMMAND_NUMBERS, "a command"),
+    )
 }
 
 

@@ -14,6 +14,7 @@ from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.channels import CHANNELS
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
+from automax_ros.replay.drives import DRIVES, read_name
 from automax_ros.replay.inputs import ScanMemory
 from automax_ros.replay.report import Kind, NamedValue, errors_text
 from automax_ros.replay.same import same_bits
@@ -54,6 +55,7 @@ class ScanComparison:
         if not self._source.edited and not self._memory.writes_agree and not any(item.counts for item in found):
             found += self._other_writes(record.writes)
         found += self._other_messages()
+        found += self._other_commands()
         if record.errors or scan.errors:
             found += self._other_errors(scan, record)
         return self.tally(scan.scan, scan.stamp, found)
@@ -70,6 +72,8 @@ class ScanComparison:
             return Label(element_name(variable, cast(Key, key)[1]), variable.unit, lines)
         if kind is Kind.MESSAGE:
             return Label(f"message to channel #{key}")
+        if kind is Kind.COMMAND:
+            return Label(f"{key} commanded to the 57C406")
         words = {Kind.WRITES: "order of writes", Kind.ERRORS: "run-time errors", Kind.STATUS: "running"}
         return Label(words.get(kind) or f"state {key}")
 
@@ -86,6 +90,8 @@ class ScanComparison:
     def _read_name(self, view: int, element: int) -> str:
         if view in CHANNELS:
             return f"channel #{element}"
+        if view in DRIVES:
+            return read_name(view, element)
         return element_name(self._variable((view, element)), element)
 
     def _other_writes(self, writes: Sequence[Entry]) -> list[Found]:
@@ -114,6 +120,11 @@ class ScanComparison:
             if unsent and file.number not in first:
                 found.append(Found(Kind.MESSAGE, file.number, _message_text(unsent[1:] or unsent), "no message"))
         return found
+
+    def _other_commands(self) -> list[Found]:
+        """What differs in what a loop commanded its 57C406; with a tolerance that counts for nothing (decision)."""
+        counts = not self._tolerance
+        return [Found(Kind.COMMAND, name, recorded, own, counts) for name, recorded, own in self._memory.drive.other()]
 
     def _alike(self, recorded: Sequence[Value], own: Sequence[Value]) -> bool:
         return len(recorded) == len(own) and all(map(self._same, recorded, own))

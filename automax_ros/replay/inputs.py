@@ -12,9 +12,13 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
 from automax_ros.replay.channels import CHANNELS, RecordedChannels
 from automax_ros.replay.commons import RecordedCommons
+from automax_ros.replay.drives import DRIVES, RecordedDrive
 from automax_ros.replay.same import same_bits
 from automax_ros.running.views import LatchPlan, latch_plan
 from automax_ros.wire.messages import Scan
+
+_APART = CHANNELS | DRIVES
+"""The views of what a scan got from elsewhere than memory."""
 
 
 class ScanMemory:
@@ -25,7 +29,7 @@ class ScanMemory:
     scan wrote the variable itself, an edited one, which may not have done so, reads the memory of the recording.
 
     ``apart`` are the values that the task's own writes left different from the recorded ones. ``channels`` are those of
-    a BASIC task.
+    a BASIC task, ``drive`` is that of a current minor loop task.
 
     A modeled scan stands in the log where it ended, some of its own writes before it. An edited one reads what memory
     is there, without these: others may have written it since the latch (decision).
@@ -35,6 +39,7 @@ class ScanMemory:
         """Take the memory of the recording; ``edited``: another source runs than the recorded one."""
         self.now_ns = 0
         self.channels = RecordedChannels()
+        self.drive = RecordedDrive()
         self._edited = edited
         self.apart: dict[Key, Value] = {}
         self._commons = commons
@@ -63,6 +68,10 @@ class ScanMemory:
     def is_forced(self, view: int) -> bool:
         """Return whether a force held a simple view when the recorded scan latched."""
         return (view, 0) in self._forced
+
+    def under_force(self, view: int) -> Value:
+        """Return what the recorded scan found under a force."""
+        return self.read_now(view)
 
     def watch_forces(self, changed: Callable[[], None]) -> None:
         """Call ``changed`` whenever another set of forces holds for a scan than for the one before."""
@@ -104,8 +113,9 @@ class ScanMemory:
         """
         commons = self._commons
         reads = commons.reads(scan.read, scan.stamp)
-        self._reads = [entry for entry in reads if entry[0] not in CHANNELS]
+        self._reads = [entry for entry in reads if entry[0] not in _APART]
         self.channels.begin(entry for entry in reads if entry[0] in CHANNELS)
+        self.drive.begin(entry for entry in reads if entry[0] in DRIVES)
         self._writes = commons.entries(scan.written, scan.stamp)
         self._committed = commons.entries(scan.committed, scan.stamp)
         self._rewritten = frozenset(entry[:2] for entry in self._writes) if self._edited else frozenset()

@@ -30,6 +30,7 @@ class Kind(enum.Enum):
     STATE = "state"
     STATUS = "status"
     MESSAGE = "message"
+    COMMAND = "command"
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,13 @@ class TaskReplay:
         self._comparison = ScanComparison(source, commons, self.memory, tallies, tolerance)
         self._tolerance = tolerance
         self._starts_at = starts_at
-        self._task = make_task(source.compiled, self.memory, backplane=commons.backplane, channels=self.memory.channels)
+        self._task = make_task(
+            source.compiled,
+            self.memory,
+            backplane=commons.backplane,
+            channels=self.memory.channels,
+            drives=self.memory.drive,
+        )
         self._task.record_scans()
         self._last: int | None = None
         self._last_stamp = self._last_end = 0

@@ -8,14 +8,14 @@ latches later than its interrupt).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, cast
+from collections.abc import Sequence
+from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.core.types import Latched, Value
 from automax_ros.drive.cml.diagnostics import PAGE_NUMBER, Record, next_entry_index, page_of, writes
 from automax_ros.drive.cml.inputs import INPUTS, Inputs
-from automax_ros.drive.cml.minor_loop import NUMBERS, CurrentMinorLoop, Outcome
+from automax_ros.drive.cml.minor_loop import NUMBERS, CurrentMinorLoop
 from automax_ros.drive.cml.signals import Command, Measured
 from automax_ros.language.program import BoundCall
 from automax_ros.language.syntax.tree import Reference, Scope
@@ -222,7 +222,7 @@ class CmlTask(Task):
         if not isinstance(given, Reference):
             return None
         symbol = compiled.program.symbols[given.name]
-        return self.memory.view(symbol.name) if symbol.scope is Scope.COMMON and not given.subscripts else None
+        return self.memory.view(symbol.name) if symbol.scope is Scope.COMMON else None
 
     def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
         return RecordingCmlIo(self, memory, hear) if self._recording else CmlIo(self, memory, hear)

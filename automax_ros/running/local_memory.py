@@ -74,6 +74,10 @@ class LocalMemory:
         """Return whether a force holds a simple view."""
         return self._common.is_forced(view)
 
+    def under_force(self, view: int) -> Value:
+        """Return what a simple view would hold if no force held it."""
+        return self._common.under_force(view)
+
     def watch_forces(self, changed: Callable[[], None]) -> None:
         """Call ``changed`` whenever a force begins or ends."""
         self._common.watch_forces(changed)
