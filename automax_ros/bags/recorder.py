@@ -12,7 +12,8 @@ from automax_ros.bags.writer import BagWriter, StorageOptions
 from automax_ros.rack.rack import Rack
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.wire.rack_files import files_of
-from automax_ros.wire.stream import RackStream, Take, Topic
+from automax_ros.wire.stream import RackStream
+from automax_ros.wire.topics import Take, Topic
 
 _FIRST = EventKey(EventClass.OUTSIDE, -1, "")
 """Before everything else of an instant: the rack stands as the instant before has left it."""

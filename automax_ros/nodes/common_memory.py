@@ -29,7 +29,7 @@ from automax_ros.rack.writers import ROS_WRITER
 from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED, QosProfile
 from automax_ros.wire.rack_files import RackFile, files_of, files_text
-from automax_ros.wire.stream import Take, Topic
+from automax_ros.wire.topics import Take, Topic
 
 REFUSAL_INTERVAL_S = 1.0
 """A variable's refused writes are logged at most this often."""

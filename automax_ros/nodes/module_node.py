@@ -29,7 +29,8 @@ from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import Pacer
 from automax_ros.running.scheduler import EventClass, EventKey
-from automax_ros.wire.stream import RackStream, Take, Topic
+from automax_ros.wire.stream import RackStream
+from automax_ros.wire.topics import Take, Topic
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S
 _SIM_TIME = "use_sim_time"

@@ -26,6 +26,7 @@ from automax_ros.rack.modules.kind import Module, Parts
 from automax_ros.rack.observers import Observers, RackObserver
 from automax_ros.rack.operations import Operations
 from automax_ros.rack.plants.running import RackPlants
+from automax_ros.rack.plants.sampling import PlantSampling
 from automax_ros.rack.rack_state import RackState
 from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
 from automax_ros.rack.settings import common_named
@@ -85,6 +86,7 @@ class Rack:
         self._inputs = ProcessInputs(self.memory, self.scheduler)
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
         self.plants = RackPlants(config.plants)
+        self.sampling = PlantSampling(self.plants, self.scheduler)
         parts = Parts(
             memory=self.memory,
             scheduler=self.scheduler,
@@ -196,6 +198,7 @@ class Rack:
             self._inputs.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
         self.observers.tell_writes()
         self.operations.start()
+        self.sampling.begin()
 
     def run(self, seconds: float) -> None:
         """Let simulated time pass."""
@@ -320,6 +323,7 @@ class Rack:
             module.load(state.modules[module.config.slot])
         self._forcing.load()
         self.events.load(state.events)
+        self.sampling.begin()
 
     def _execution(self, module: str) -> Execution:
         return ProcessorTime(self.scheduler, module) if self.config.execution is Timing.MODELED else IDEAL

@@ -8,15 +8,18 @@ from automax_ros.core.face import face
 
 if TYPE_CHECKING:
     from automax_ros.wire.cdr import CdrError, decode, encode
-    from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable
+    from automax_ros.wire.messages import CommonImage, CommonWrite, JointState, PlantState, Scan, TaskState, VariableTable
     from automax_ros.wire.qos import QosProfile
     from automax_ros.wire.rack_files import RackFile
-    from automax_ros.wire.stream import RackStream, Topic
+    from automax_ros.wire.stream import RackStream
+    from automax_ros.wire.topics import Topic
 
 __all__ = [
     "CdrError",
     "CommonImage",
     "CommonWrite",
+    "JointState",
+    "PlantState",
     "QosProfile",
     "RackFile",
     "RackStream",
@@ -28,4 +31,4 @@ __all__ = [
     "encode",
 ]
 
-__getattr__ = face(__name__, "qos", "cdr", "messages", "rack_files", "stream")
+__getattr__ = face(__name__, "qos", "cdr", "messages", "topics", "rack_files", "stream")

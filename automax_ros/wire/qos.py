@@ -40,3 +40,5 @@ OPERATION = QosProfile("reliable", "transient_local", "keep_last", 100)
 """What was done last waits for late joiners, oldest first (decision: 100 operations)."""
 SCAN = QosProfile("reliable", "volatile", "keep_last", 1000)
 """A stream of which every message counts."""
+PLANT = QosProfile("reliable", "volatile", "keep_last", 100)
+"""A second of a plant's samples (decision)."""

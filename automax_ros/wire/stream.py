@@ -6,8 +6,7 @@ more often than a variable's rate limit allows; the last value before a pause al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
 from functools import partial
 
 from automax_ros.core.kinds import Direction
@@ -22,33 +21,14 @@ from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import Write
 from automax_ros.wire.cdr import Message, encode, encoder
 from automax_ros.wire.messages import NAMES, CommonWrite, Scan
-from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE, QosProfile
+from automax_ros.wire.plant_stream import PlantStream
+from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE
 from automax_ros.wire.rack_messages import RackMessages, message_maker, topic_type_name
+from automax_ros.wire.topics import Sink, Take, Takes, Topic
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
 """Time between two images of memory, with full latches and the tasks' states, in the stream, ns (decision: replay may
 begin at each)."""
-
-
-@dataclass(frozen=True)
-class Topic:
-    """A topic of the stream: full name, ROS type, quality of service; ``slot`` of the module that sends on it.
-
-    Several modules send on one topic: each has a Topic of its own. ``slot`` None is the common memory.
-    """
-
-    name: str
-    type_name: str
-    qos: QosProfile
-    slot: int | None = None
-
-
-Take = Callable[[int, bytes], None]
-"""Takes a message of one topic: its stamp in ns, its CDR bytes."""
-Sink = Callable[[Topic], Take | None]
-"""Asked once for each topic: what takes its messages, None where nothing does."""
-Takes = dict[Topic, Take]
-"""What a sink takes."""
 
 
 class _ValueTopic:
@@ -97,6 +77,7 @@ class RackStream:
             slot: Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN, slot) for slot in slots
         }
         self._values = self._value_topics(space)
+        self.plants = PlantStream(rack, space, self._messages.stamp)
         self._tables: list[Take] = []
         self._images: list[Take] = []
         self._writes: list[Take] = []
@@ -110,7 +91,8 @@ class RackStream:
     def topics(self) -> list[Topic]:
         """All topics of the stream."""
         rack = [self.variables_topic, self.snapshot_topic, self.backplane_topic, self.operations_topic]
-        return [*rack, *self.module_topics, *(value.topic for value in self._values.values())]
+        values = (value.topic for value in self._values.values())
+        return [*rack, *self.module_topics, *values, *self.plants.topics]
 
     @property
     def module_topics(self) -> list[Topic]:
@@ -145,6 +127,7 @@ class RackStream:
                 route(stream.states, self.states_topics[task.slot])
                 if every_state:
                     route(stream.each_state, self.states_topics[task.slot])
+        self.plants.route(takes)
         return takes
 
     def stamp(self, now_ns: int) -> int:
@@ -167,6 +150,7 @@ class RackStream:
             if not _as_installed(task):
                 self._send_state(task, self._rack.now_ns)
         self._rack.observe(self)
+        self.plants.begin()
         self._begun = True
 
     def send_image(self) -> None:

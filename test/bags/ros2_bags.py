@@ -18,7 +18,8 @@ from automax_ros.wire.definitions import schema_text
 from automax_ros.wire.messages import String
 from automax_ros.wire.qos import LATCHED, SCAN
 from automax_ros.wire.rack_files import files_of, files_text
-from automax_ros.wire.stream import RackStream, Take, Topic
+from automax_ros.wire.stream import RackStream
+from automax_ros.wire.topics import Take, Topic
 
 EPOCH = 1_700_000_000 * NS_PER_S
 """The wall clock when the run begins."""
