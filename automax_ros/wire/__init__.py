@@ -8,7 +8,15 @@ from automax_ros.core.face import face
 
 if TYPE_CHECKING:
     from automax_ros.wire.cdr import CdrError, decode, encode
-    from automax_ros.wire.messages import CommonImage, CommonWrite, JointState, PlantState, Scan, TaskState, VariableTable
+    from automax_ros.wire.messages import (
+        CommonImage,
+        CommonWrite,
+        JointState,
+        PlantState,
+        Scan,
+        TaskState,
+        VariableTable,
+    )
     from automax_ros.wire.qos import QosProfile
     from automax_ros.wire.rack_files import RackFile
     from automax_ros.wire.stream import RackStream

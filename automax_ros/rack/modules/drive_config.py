@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -42,6 +43,11 @@ class DriveConfig:
     def name(self) -> str:
         """The module's name in the rack, as that of its node."""
         return f"drive_{self.slot}"
+
+    @property
+    def plants(self) -> Mapping[str, PlantConfig]:
+        """The plant of its one drive."""
+        return {} if self.plant is None else {"": self.plant}
 
     @property
     def tasks(self) -> tuple[TaskConfig, ...]:

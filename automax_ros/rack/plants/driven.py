@@ -35,9 +35,7 @@ class DrivenPlant:
 def driven_plants(config: RackConfig) -> tuple[DrivenPlant, ...]:
     """Return the simulated plants that drives turn, in the order of slots and drives."""
     driving = (module for module in config.modules if isinstance(module, Driving))
-    found = (DrivenPlant(plant, module.slot, drive) for module in driving for drive, plant in _of(module))
+    found = (
+        DrivenPlant(plant, module.slot, drive) for module in driving for drive, plant in sorted(module.plants.items())
+    )
     return tuple(item for item in found if item.config.motor is not None)
-
-
-def _of(module: Driving) -> list[tuple[str, PlantConfig]]:
-    return sorted(module.plants.items())
