@@ -22,6 +22,9 @@ from automax_ros.drive.limits import (
 )
 from automax_ros.drive.nameplate import DriveParameters
 
+PMI_TRIP_POINTS, PMI_MOST_TRIP = 75, 225
+"""By how much a PMI trips above the largest current, and its highest trip, % of rated current (S-3006 p. 109)."""
+
 
 class Verdict(enum.Enum):
     """How a drive stands to a rule."""
@@ -55,6 +58,7 @@ class DriveCase:
         threshold: register 4136.
         fast_change: bit 0 of register 4146; value None where it may be either.
         voltage: whether the armature voltage is wired to a 57C405.
+        registers: whether it is driven by a 57C406, with registers and a loop in a task.
     """
 
     name: str
@@ -66,6 +70,7 @@ class DriveCase:
     threshold: Given = Given(DEFAULT_THRESHOLD_DEG, "default")
     fast_change: Given = Given(0, "default")
     voltage: bool = False
+    registers: bool = True
 
     @property
     def armature_v(self) -> float:
@@ -272,6 +277,61 @@ def _ripple_percent(case: DriveCase) -> float:
     return 100 * amps / case.parameters.amps
 
 
+def pmi_overcurrent(case: DriveCase) -> Finding:
+    """The trip of a UDC's drive: 75 points above the Motor Overload Ratio, 225 % at most (S-3006 p. 109)."""
+    formula = f"trip = armature amps x (maximum current + {PMI_TRIP_POINTS} %) <= {PMI_MOST_TRIP} % (S-3006 p. 109)"
+    lim_bar = case.value("LIM_BAR")
+    if lim_bar is None:
+        result = "give the plant its motor_overload_ratio"
+        return Finding("overcurrent trip", Verdict.ATTENTION, result, formula)
+    trip = lim_bar + PMI_TRIP_POINTS
+    peak = lim_bar + _ripple_percent(case)
+    amps = case.parameters.amps
+    if trip > PMI_MOST_TRIP:
+        verdict, why = Verdict.ATTENTION, f"the parameter screen takes {PMI_MOST_TRIP} % of the power module at most"
+    elif trip <= peak:
+        verdict, why = Verdict.ATTENTION, f"at the largest current the ripple's peaks reach {peak:.4g} %: it will trip"
+    else:
+        verdict, why = Verdict.FINE, f"above the peaks at the largest current, {peak:.4g} %"
+    numbers = f"{amps:.4g} A x ({lim_bar:g} + {PMI_TRIP_POINTS}) % = {amps * trip / 100:.4g} A"
+    values = {"lim_bar": lim_bar, "trip": trip, "most": float(PMI_MOST_TRIP), "peak": peak}
+    return Finding("overcurrent trip", verdict, f"{trip:g} %: {why}", formula, numbers, values)
+
+
 Rule = Callable[[DriveCase], Finding]
 MANUAL_RULES: tuple[Rule, ...] = (line_frequency, tach_loss, inertia_time, bridge_change, overcurrent)
-"""The rules of section 52 for a drive with a 57C406, in the order in which they are told."""
+"""The rules of section 52, for a drive with a 57C406, in the order in which they are told."""
+PMI_RULES: tuple[Rule, ...] = (pmi_overcurrent,)
+"""The rules for a drive of a UDC, whose loop is in its power module's interface."""
+
+
+@dataclass(frozen=True)
+class Unjudged:
+    """A drive that nothing can be computed of: its name, its module, and why."""
+
+    name: str
+    where: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class DriveFindings:
+    """All that was found of one drive; ``case`` is None where nothing could be computed."""
+
+    name: str
+    where: str
+    case: DriveCase | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst one."""
+        return max((item.verdict for item in self.findings), key=list(Verdict).index, default=Verdict.FINE)
+
+
+def assess(case: DriveCase | Unjudged) -> DriveFindings:
+    """Return what the rules say of a drive."""
+    if isinstance(case, Unjudged):
+        return DriveFindings(case.name, case.where, None, (Finding("plant", Verdict.ATTENTION, case.reason, ""),))
+    rules = MANUAL_RULES if case.registers else PMI_RULES
+    return DriveFindings(case.name, case.where, case, tuple(rule(case) for rule in rules))

@@ -11,15 +11,15 @@ Place = tuple[int, Span]
 """The BASIC line, and where the variable stands in the text."""
 
 
-def places_that_write(program: Program) -> dict[str, list[Place]]:
-    """Return where each common that the task can write is written, in the order of the text."""
+def places_that_write(program: Program, scope: Scope = Scope.COMMON) -> dict[str, list[Place]]:
+    """Return where each common, or local, that the task can write is written, in the order of the text."""
     found: dict[str, list[Place]] = {}
 
     def note(target: Expression | None, line: int | None) -> None:
         if not isinstance(target, (Reference, Element)) or line is None:
             return
         symbol = program.symbols.get(target.name)
-        if symbol is not None and symbol.scope is Scope.COMMON:
+        if symbol is not None and symbol.scope is scope:
             found.setdefault(symbol.name, []).append((line, target.span))
 
     for statement, line in statements_in_order((*program.startup, *program.scan)):

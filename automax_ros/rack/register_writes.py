@@ -40,6 +40,16 @@ def constant_writes(config: RackConfig, programs: Iterable[Program]) -> Constant
     return found
 
 
+def numbered_writes(programs: Iterable[Program]) -> Constants:
+    """Return what IOWRITE statements alone write to registers, as far as they name them by constants."""
+    found: dict[Register, list[int | None]] = defaultdict(list)
+    for program in programs:
+        for statement, _ in statements_in_order((*program.startup, *program.scan)):
+            for register, value in _by_number(statement):
+                found[register].append(value)
+    return found
+
+
 def _by_name(statement: Statement, places: Mapping[str, Register]) -> Iterator[tuple[Register, int | None]]:
     targets: list[tuple[Expression, int | None]] = [(item.value, None) for item in arguments_of(statement)]
     if isinstance(statement, Assignment):
