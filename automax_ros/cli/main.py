@@ -23,7 +23,7 @@ SUBCOMMANDS: dict[str, str] = {
     "tune-info": "coefficients and limits of dynamic blocks in a task",
     "response": "step response and Bode diagram of a dynamic block",
     "load": "CPU load of each module by the manual's execution times",
-    "drive-check": "judge drives by the manual's formulas, with proposals for their gains",
+    "drive-check": "judge drives by the manual's formulas, propose gains",
     "new": "make a rack file from a folder of tasks",
     "import": "make a rack file from a configuration task",
     "convert": "make tasks of an old plant acceptable",

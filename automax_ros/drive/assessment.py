@@ -232,7 +232,7 @@ def bridge_change(case: DriveCase) -> Finding:
         return Finding("fast bridge change", verdict, result, formula, values=values)
     amps = case.parameters.amps
     largest = values["largest_inductance_mh"] = largest_inductance_mh(column, amps)
-    numbers = f"{TABLE_3_MH_A[column]:g} mH A / {amps:.4g} A = {largest:.4g} mH at {column:g} V"
+    numbers = f"{TABLE_3_MH_A[column]:.7g} mH A / {amps:.4g} A = {largest:.4g} mH at {column:g} V"
     verdict, result = _change_verdict(case, inductance <= largest)
     text = f"armature {inductance:.4g} mH, at most {largest:.4g}: {result}"
     return Finding("fast bridge change", verdict, text, formula, numbers, values)

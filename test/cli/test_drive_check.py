@@ -1,0 +1,187 @@
+"""`automax drive-check`: the manual's numbers of drives in racks, where they come from, and its exit codes."""
+
+import json
+
+import pytest
+
+from .drive_racks import loop_task, rack_file, write_rack
+
+
+@pytest.fixture
+def judged(automax):
+    """Judge a rack with one drive: its findings by rule, the exit code apart."""
+
+    def judge(rack=None, *options, task=None, code=0, **tasks):
+        write_rack(automax.folder, rack or rack_file(), LOOP=task or loop_task(), **tasks)
+        result = automax("drive-check", "rack.yaml", "--json", *options)
+        assert result.code == code, result
+        (drive, *_) = json.loads(result.out)
+        return {item["rule"]: item for item in drive["findings"]}
+
+    return judge
+
+
+def test_a_sound_drive_is_fine_and_every_formula_is_printed_with_its_numbers(automax):
+    write_rack(automax.folder, rack_file(), LOOP=loop_task())
+    result = automax("drive-check", "rack.yaml")
+    assert (result.code, result.err) == (0, "")
+    for text in (
+        "UNWIND: 57C406 in slot 7", "task LOOP", "500 V, 245.8 A, 1750 rpm",
+        "180 - ARCOS[(0.75 x 500) / (1.35 x 460)] = 127.1 deg",
+        "(35 lb ft2 x 1750 rpm) / (308 x 675.3 lb ft) = 0.294 s",
+        "2346.575 mH A / 245.8 A = 9.545 mH at 460 V",
+        "225 < 1.8 x 150 = 270",
+    ):  # fmt: skip
+        assert text in result.out
+    assert "attention   IOC" not in result.out
+    assert "wrong" not in result.out
+
+
+@pytest.mark.parametrize(
+    ("motor", "bound", "largest"),
+    [("dc_150hp_500v", 127.1, 9.545), ("dc_10hp_240v", 125.4, 35.0), ("dc_800hp_700v", 126.1, 3.88)],
+)
+def test_bounds_of_the_example_motors(judged, motor, bound, largest):
+    found = judged(rack_file(f"motor: {motor}"))
+    assert round(found["tach loss threshold"]["values"]["delta_bound_deg"], 1) == bound
+    assert found["fast bridge change"]["values"]["largest_inductance_mh"] == pytest.approx(largest, rel=2e-3)
+    assert found["fast bridge change"]["verdict"] == "fine"
+
+
+@pytest.mark.parametrize(("inertia", "verdict"), [(1, "attention"), (1.03, "attention"), (1.1, "fine"), (10, "fine")])
+def test_jbar_of_the_10_hp_motor_needs_some_more_inertia(judged, inertia, verdict):
+    found = judged(rack_file(f"motor: dc_10hp_240v, inertia: {inertia}"))["JBAR"]
+    assert found["values"]["jbar_s"] == pytest.approx(1.5 * inertia * 1750 / (308 * 30.0 * 1.5), rel=2e-3)
+    assert found["verdict"] == verdict
+    assert ("leave register 4136 at 109" in found["result"]) == (verdict == "attention")
+
+
+def threshold(automax, judged, statement, plant="motor: dc_150hp_500v", code=0):
+    """The finding of a rack whose BASIC task writes register 4136 by a statement."""
+    rack = rack_file(
+        plant, more="  TLD%: {slot: 7, register: 4136}\n", tasks=", B_INIT: {priority: 9, file: B_INIT.BAS}"
+    )
+    task = f"10 COMMON TLD%, REF%\n20 {statement}\n30 END\n"
+    return judged(rack, code=code, B_INIT=task)["tach loss threshold"]
+
+
+@pytest.mark.parametrize(
+    ("statement", "used", "verdict", "code"),
+    [
+        ("TLD% = 120", 120, "fine", 0), ("IOWRITE 7, 4136, 127", 127, "fine", 0), ("TLD% = 128", 128, "wrong", 1),
+        ("TLD% = REF%", None, "attention", 0), ("REF% = 0", 109, "fine", 0), ("IOWRITE 7, 4137, 80", 109, "fine", 0),
+    ],
+)  # fmt: skip
+def test_register_4136_is_what_a_basic_task_writes(automax, judged, statement, used, verdict, code):
+    found = threshold(automax, judged, statement, code=code)
+    assert (found["values"]["register_4136"], found["verdict"]) == (used, verdict)
+
+
+def test_a_raised_threshold_needs_its_jbar(automax, judged):
+    found = threshold(automax, judged, "TLD% = 110", "motor: dc_10hp_240v", code=1)
+    assert found["verdict"] == "wrong"
+    assert "only with a JBAR of 0.2 s" in found["result"]
+
+
+@pytest.mark.parametrize(
+    ("level", "lim_bar", "verdict", "code"),
+    [
+        ("225", "150", "fine", 0), ("269", "150", "fine", 0), ("163", "150", "fine", 0), ("162", "150", "attention", 0),
+        ("LEVEL%", "150", "attention", 0),
+    ],
+)  # fmt: skip
+def test_overcurrent_lies_between_the_peaks_and_1_8_lim_bar(judged, level, lim_bar, verdict, code):
+    """150 hp: the ripple's peak is (sqrt(2) 460 V / (377/s x 2.5 mH)) x (1 - sin 60) - 61.4 A = 31 A = 12.7 %."""
+    found = judged(task=loop_task(IOC_THRESH=level, LIM_BAR=lim_bar), code=code)["IOC_THRESH"]
+    assert found["verdict"] == verdict
+
+
+def test_variables_count_as_what_the_one_assignment_gives_them(judged):
+    found = judged(task=loop_task("LEVEL% = 275", IOC_THRESH="LEVEL%"), code=1)["IOC_THRESH"]
+    assert found["values"]["ioc_thresh"] == 275
+    assert found["verdict"] == "wrong"
+    assert "LEVEL% = 275 (assigned)" in found["result"]
+    twice = judged(task=loop_task("LEVEL% = 275", "LEVEL% = 200", IOC_THRESH="LEVEL%"))["IOC_THRESH"]
+    assert twice["values"].get("ioc_thresh") is None
+    assert twice["verdict"] == "attention"
+
+
+def test_set_and_presets_are_values_of_commons(judged):
+    task = loop_task(LIM_BAR="SPD%", SPEED_FDBK=None)
+    assert "SPD% (not known)" in judged(task=task)["JBAR"]["result"]
+    preset = rack_file().replace("SPD%: {}", "SPD%: {preset: 200}")
+    assert judged(preset, task=task)["IOC_THRESH"]["values"]["lim_bar"] == 200
+    assert judged(preset, "--set", "SPD%=140", task=task)["IOC_THRESH"]["values"]["lim_bar"] == 140
+
+
+@pytest.mark.parametrize(
+    ("hertz", "given", "verdict", "code"),
+    [(60, None, "fine", 0), (50, "50", "fine", 0), (50, None, "wrong", 1), (60, "58", "attention", 0)],
+)
+def test_line_frequency(judged, hertz, given, verdict, code):
+    rack = rack_file(f"motor: dc_150hp_500v, line: {{hz: {hertz}}}")
+    assert judged(rack, task=loop_task(AC_LINE_FREQ=given), code=code)["AC_LINE_FREQ"]["verdict"] == verdict
+
+
+@pytest.mark.parametrize(
+    ("statement", "wired", "millihenry", "verdict", "code"),
+    [
+        ("OPT% = 1", True, 2.22, "fine", 0), ("OPT% = 1", False, 2.22, "wrong", 1), ("OPT% = 1", True, 9.6, "wrong", 1),
+        ("OPT% = 2", False, 9.6, "fine", 0), ("OPT% = REF%", True, 9.6, "attention", 0),
+        ("FAST@ = TRUE", False, 2.22, "wrong", 1), ("REF% = 1", False, 9.6, "fine", 0),
+    ],
+)  # fmt: skip
+def test_fast_bridge_change_needs_table_3_and_the_armature_voltage(judged, statement, wired, millihenry, verdict, code):
+    plate = f"{{hp: 150, volts: 500, rpm: 1750, amps: 245.8, inductance_h: {millihenry / 1000}}}"
+    rack = rack_file(
+        f"motor: {plate}",
+        more="  OPT%: {slot: 7, register: 4146}\n  FAST@: {slot: 7, register: 4146, bit: 0}\n",
+        slots="  9: {module: 57C405, drive: 7}\n" if wired else "",
+        tasks=", B_INIT: {priority: 9, file: B_INIT.BAS}",
+    )
+    task = f"10 COMMON OPT%, FAST@, REF%\n20 {statement}\n30 END\n"
+    assert judged(rack, code=code, B_INIT=task)["fast bridge change"]["verdict"] == verdict
+
+
+def test_a_drive_of_a_udc_trips_75_points_above_its_overload_ratio(automax):
+    rack = "rack: U\nslots:\n  0: {module: 57C413}\n  1: {module: 57C435}\n  5: {module: 57552, plants: {A: W, B: V}}\n"
+    rack += "plants:\n  W: {motor: dc_10hp_240v, motor_overload_ratio: 150}\n  V: {motor: dc_10hp_240v}\n"
+    automax.write("rack.yaml", rack)
+    first, second = json.loads(automax("drive-check", ".", "--json").out)
+    (trip,) = first["findings"]
+    assert (first["drive"], first["where"], first["task"]) == ("W", "57552 in slot 5, drive A", None)
+    assert trip["values"]["trip"] == 225
+    assert trip["verdict"] == "fine"
+    assert second["verdict"] == "attention"
+
+
+def test_a_drive_without_a_plant_is_named_with_the_reason(automax):
+    write_rack(automax.folder, rack_file().replace(", plant: UNWIND", ""), LOOP=loop_task())
+    result = automax("drive-check", "rack.yaml")
+    assert result.code == 0
+    assert "LOOP: 57C406 in slot 7" in result.out
+    assert "attention   plant: without a plant" in result.out
+
+
+def test_a_rack_without_a_drive_is_refused(automax):
+    automax.write("rack.yaml", "rack: D\nslots: {0: {module: 57C435}}\n")
+    result = automax("drive-check", "rack.yaml")
+    assert (result.code, result.out) == (2, "")
+    assert "the rack has no drive" in result.err
+    assert "hint: a drive is a 57C406" in result.err
+
+
+def test_a_task_with_errors_is_printed_and_the_rest_judged(automax):
+    write_rack(automax.folder, rack_file(), LOOP=loop_task(KP=None))
+    result = automax("drive-check", "rack.yaml")
+    assert result.code == 1
+    assert "KP" in result.err
+    assert "LIM_BAR is not known" in result.out
+
+
+@pytest.mark.parametrize("options", [["none.yaml"], ["rack.yaml", "--set", "NONE%=1"], ["rack.yaml", "--set", "REF%"]])
+def test_wrong_use(automax, options):
+    write_rack(automax.folder, rack_file(), LOOP=loop_task())
+    result = automax("drive-check", *options)
+    assert result.code == 2
+    assert result.err.startswith("automax drive-check: error: ")
