@@ -10,6 +10,7 @@ from pathlib import Path
 
 from automax_ros.blocks.declaration import Block, Input, Output, Platform
 from automax_ros.blocks.describe import (
+    UNKNOWN_TIME,
     input_rows,
     limit_rows,
     output_rows,
@@ -76,7 +77,8 @@ def described(block: Block) -> Iterator[str]:
         yield ""
         yield from (f"- {text}" for text in sentences)
     yield ""
-    yield from markdown_table(["Processor", "execution time, microseconds"], [list(row) for row in time_rows(block)])
+    times = [list(row) for row in time_rows(block)]
+    yield from markdown_table(["Processor", "execution time, microseconds"], times) if times else (UNKNOWN_TIME,)
     yield from ("", "```", *template(block).splitlines(), "```")
 
 

@@ -1,6 +1,9 @@
 """DC_DRIVE_CML: the current minor loop of a DC drive (section 52).
 
 The loop itself is ``drive/cml``: here stands what a CALL may say, in the order of the manual's CALL.
+
+The CALL latches the simple commons of its task as SCAN_LOOP does, and a scan goes from it to END (decision). KP is
+microseconds of DELTA per count of error (decision). No dynamic block stands in the task (decision).
 """
 
 from __future__ import annotations
@@ -24,11 +27,10 @@ def _input(
     *,
     required: bool = False,
     form: Form = Form.ANY,
-    sample: Value | None = None,
 ) -> Input:
     """Return an input with the limits that it has."""
     low, high = LIMITS.get(name, (None, None))
-    return Input(name, kind, name, text, required, default, form, low, high, sample=sample)
+    return Input(name, kind, name, text, required, default, form, low, high)
 
 
 def _integer(name: str, text: str, default: int | None = None, *, required: bool = False) -> Input:
@@ -74,7 +76,7 @@ INPUTS = (
     ),
     _real("REF_RATE", "seconds from 0 to LIM_BAR that the reference takes at least, 0.0: no limit; read in run", 0.0),
     _real("REF_LAG", "break frequency of the reference's lag in rad/s; fixed", 200.0),
-    _real("KP", "proportional gain; read in run"),
+    _real("KP", "proportional gain, us of DELTA per count of error; read in run"),
     _real("PI_W_LEAD", "lead break frequency of the P+I in rad/s; fixed"),
     _integer("AG_FACTOR", "largest integral gain over that of continuous conduction, 1: not adaptive; fixed", 1),
     _integer("CC_THRESH", "threshold of continuous conduction of the adaptive gain", 0),
@@ -151,7 +153,7 @@ DC_DRIVE_CML = Block(
         "The first block of its task, in place of SCAN_LOOP, called once; no GOTO may reach it or a line before it.",
         "Its scans begin at the interrupts of the 57C406, six in a cycle of the line.",
         "Statements before it run once, when the task is put into RUN.",
-        "It latches the task's simple common variables as SCAN_LOOP does (decision).",
+        "It latches the task's simple common variables as SCAN_LOOP does.",
         "The task may have no block with coefficients. Its Processor must have the tick of 5.5 ms.",
         "Without BAD_SCR_OUT the shorted SCR test is not made.",
         "A bad value of a variable is logged and the last good one stays; with a bad fixed one the drive never runs.",

@@ -28,7 +28,7 @@ LIMITS: dict[str, tuple[float, float]] = {
 FULL_COUNTS = 4095
 """Counts of LIM_BAR."""
 MOST_COUNTS = 32767
-"""Largest rate limit, counts a scan."""
+"""Largest rate limit, counts per scan."""
 SCANS_PER_CYCLE = 6
 LOWEST_LAG = 1.0
 """Lowest REF_LAG, rad/s."""
@@ -51,9 +51,9 @@ def is_good(name: str, value: float, line_hz: float) -> bool:
 
 
 def ref_rate_limits(line_hz: float) -> tuple[float, float]:
-    """Return the lowest and highest REF_RATE in s at a line frequency, besides 0.0, which is no limit of the rate.
+    """Return the lowest and highest REF_RATE in s at a line frequency, besides 0.0, which turns the limit off.
 
-    They are those of a rate of 32767 and of 1 count a scan, rounded inward as table 1 prints them: 0.00035 to 11.37 s
+    They are those of a rate of 32767 and of 1 count per scan, rounded inward as table 1 prints them: 0.00035 to 11.37 s
     at 60 Hz, 0.00042 to 13.65 s at 50 Hz (decision: to five and two decimals at any frequency).
     """
     one_count_s = FULL_COUNTS / (SCANS_PER_CYCLE * line_hz)

@@ -11,6 +11,8 @@ from automax_ros.core.types import DataType, Value
 
 WIDTH = 100
 """Longest line of the texts, in characters."""
+UNKNOWN_TIME = "Execution time: the manual prints none; `automax load` counts with an estimate."
+"""What stands in place of the times of a block that the manual's tables 4 to 6 do not have."""
 _PLACE_HOLDERS = {DataType.REAL: "nnn.n", DataType.BOOLEAN: "TRUE", DataType.STRING: '"text"'}
 
 
@@ -35,7 +37,8 @@ def description(block: Block) -> str:
     parts.append(_list("Notes", list(block.notes)))
     parts.append(_list("Logs", [f"{code} {PROBLEMS[code].title}" for code in block.problems]))
     parts.append("Runs on: " + ", ".join(item.value for item in Platform if item in block.runs_on) + "\n")
-    parts.append(_section("Execution time, microseconds (section 53)", time_rows(block)))
+    times = time_rows(block)
+    parts.append(_section("Execution time, microseconds (section 53)", times) if times else f"{UNKNOWN_TIME}\n")
     parts.append("Template\n\n" + template(block))
     return "\n".join(part for part in parts if part)
 
@@ -76,6 +79,8 @@ def _type_word(item: Input | Output) -> str:
     if isinstance(item.type, Special):
         return item.type.value if item.type.element is None else item.type.element.word
     also = item.also if isinstance(item, Input) else None
+    if isinstance(item, Output) and item.dimensions:
+        return f"{item.type.word} ({','.join(str(size - 1) for size in item.dimensions)})"
     return item.type.word if also is None else f"{also.word}/DOUBLE"
 
 

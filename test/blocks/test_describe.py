@@ -131,7 +131,8 @@ def test_a_template_with_its_place_holders_filled_in_is_a_task_without_errors(bl
         channels = ", ".join(f"INPUT{n}={kind.zero}, OUTPUT{n}=OUT{n}{kind.value}".upper() for n in range(1, 9))
         task += "".join(f"{80 + n} LOCAL OUT{n}{kind.value}\n" for n in range(1, 9))
         call += f"250 CALL {shift}(STRUCTURE_NAME=STRUCTURE_NAME{kind.value}, MAX_COLUMNS=4, SHIFT=TRUE, {channels})\n"
-    if block.name == "SCAN_LOOP":
+    task = task.replace("LOCAL DIAG_DATA%", "LOCAL DIAG_DATA%(37,1)")
+    if block.begins_scan:
         task += "90 COMMON ISCR%\n100 EVENT NAME=RUNOUT, INTERRUPT_STATUS=ISCR%, TIMEOUT=6\n"
     else:
         task += "100 CALL SCAN_LOOP(TICKS=4)\n"

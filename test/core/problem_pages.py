@@ -8,6 +8,7 @@ from pathlib import Path
 
 import automax_ros.core
 from automax_ros.blocks.declaration import Platform
+from automax_ros.core.ticks import tick_ns
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.language.program import CommonSpec
 
@@ -27,6 +28,10 @@ class Fence:
     @property
     def target(self) -> Platform:
         return Platform(self._word("target") or "automax")
+
+    @property
+    def tick_ns(self) -> int:
+        return tick_ns(self._word("tick_ms") or (0.5 if self.target is Platform.UDC else 5.5))
 
     @property
     def commons(self) -> dict[str, CommonSpec] | None:

@@ -32,13 +32,12 @@ def whole(code: str, text: str) -> str:
 
 
 def checked(fence: Fence) -> CheckResult:
-    tick_ns = 500_000 if fence.target is Platform.UDC else 5_500_000
     return check(
         SourceText(f"task.{fence.language}", fence.text),
         name="TASK",
         catalogue=CATALOGUE,
         target=fence.target,
-        tick_ns=tick_ns,
+        tick_ns=fence.tick_ns,
         commons=fence.commons,
     )
 
