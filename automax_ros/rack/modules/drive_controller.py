@@ -1,7 +1,7 @@
 """The drive I/O controller 57C406 of a running rack: it interrupts, measures the drive, fires its gates (52.0, 52.7).
 
 It is the ``DrivePort`` of the current minor loop (CML) task that names its slot. While that task runs it interrupts six
-times a line cycle, measures its plant at that instant and makes a scan of the task due; what the scan commands it
+times per line cycle, measures its plant at that instant and makes a scan of the task due; what the scan commands it
 carries out: gates, the contactor's relay, the outputs of the drive digital I/O module. Without such a task gates and
 relays are off. The plant goes on in any case, whether the rack runs, is stopped or has no power (decision).
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from automax_ros.rack.loader import load
+from automax_ros.rack.modules.drive_analog import DriveAnalogConfig
+from automax_ros.rack.modules.drive_config import DriveConfig
 from automax_ros.rack.modules.io_config import IoKind
 from automax_ros.rack.modules.kind import Registers
 from automax_ros.rack.modules.registry import KINDS
@@ -15,7 +17,11 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks_check import check_tasks
 
 PAGE = (Path(__file__).parents[3] / "docs" / "modules.md").read_text(encoding="utf-8")
-MODELS = {number: model.registers for kind in KINDS if isinstance(kind, IoKind) for number, model in kind.table.items()}
+MODELS = {
+    **{number: model.registers for kind in KINDS if isinstance(kind, IoKind) for number, model in kind.table.items()},
+    "57C405": DriveAnalogConfig(0, "57C405").registers,
+    "57C406": DriveConfig(0, "57C406").registers,
+}
 
 
 def rows() -> dict[str, dict[int, str]]:
@@ -37,7 +43,9 @@ def rows() -> dict[str, dict[int, str]]:
 @pytest.mark.parametrize("model", MODELS)
 def test_the_table_has_every_register_in_its_direction(model):
     registers: Registers = MODELS[model]
-    assert rows()[model] == {number: registers.direction(number) for number in range(registers.count)}
+    assert rows()[model] == {
+        number: registers.direction(number) for number in range(registers.count) if number not in registers.reserved
+    }
 
 
 @pytest.mark.parametrize("model", [model for model, registers in MODELS.items() if registers.interrupts])
