@@ -27,18 +27,19 @@ def _input(
     *,
     required: bool = False,
     form: Form = Form.ANY,
+    module: str = "",
 ) -> Input:
     """Return an input with the limits that it has."""
     low, high = LIMITS.get(name, (None, None))
-    return Input(name, kind, name, text, required, default, form, low, high)
+    return Input(name, kind, name, text, required, default, form, low, high, module=module)
 
 
 def _integer(name: str, text: str, default: int | None = None, *, required: bool = False) -> Input:
     return _input(name, DataType.INTEGER, text, default, required=required)
 
 
-def _literal(name: str, text: str, default: int | None = None) -> Input:
-    return _input(name, DataType.INTEGER, text, default, required=default is None, form=Form.LITERAL)
+def _literal(name: str, text: str, default: int | None = None, module: str = "") -> Input:
+    return _input(name, DataType.INTEGER, text, default, required=default is None, form=Form.LITERAL, module=module)
 
 
 def _real(name: str, text: str, default: float | None = None) -> Input:
@@ -64,8 +65,8 @@ def _number(name: str, text: str) -> Output:
 
 
 INPUTS = (
-    _literal("IO_CNTL_SLOT", "slot of the drive I/O controller 57C406"),
-    _literal("DIG_IO_SLOT", "slot of the drive digital I/O module"),
+    _literal("IO_CNTL_SLOT", "slot of the drive I/O controller 57C406", module="57C406"),
+    _literal("DIG_IO_SLOT", "slot of the drive digital I/O module 57C408", module="57C408"),
     _literal("AC_LINE_FREQ", "frequency of the AC line in Hz, the lowest expected one if it varies", LINE_HZ),
     _symbol(
         "REFERENCE",

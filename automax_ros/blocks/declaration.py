@@ -109,7 +109,8 @@ class Input:
     graphic, the name itself where the manual prints none; ``text`` says what it does. ``also`` is a second type that a
     variable may have. ``runs_on`` names the processors whose tasks may program it. ``wants_common``: the manual wants a
     COMMON variable there. ``sample`` stands in a template, where that is not the default. ``drive_parameter`` is the
-    parameter of the drive, as the rack file calls it, that a constant must be equal to.
+    parameter of the drive, as the rack file calls it, that a constant must be equal to; ``module`` the number of
+    the module whose slot a literal names.
     """
 
     name: str
@@ -127,6 +128,7 @@ class Input:
     wants_common: bool = False
     sample: Value | None = None
     drive_parameter: str = ""
+    module: str = ""
 
     @property
     def variable(self) -> str:
