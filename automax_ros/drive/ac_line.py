@@ -199,6 +199,11 @@ class AcLine(Stateful):
         self.settle_voltage(turn_ns, volts, recovery_s)
         self.settle_frequency(turn_ns, hertz, recovery_s)
 
+    def cancel(self, what: str) -> None:
+        """Take back the changes of ``frequency`` or ``voltage`` that were posted and have not begun."""
+        self._pending = [change for change in self._pending if change[2] != what]
+        heapq.heapify(self._pending)
+
     def lose_phase(self, at_ns: int, phase: int) -> None:
         """Open a phase (0, 1, 2) of the line at an instant; current that flows ends as the circuit decides."""
         self._schedule(at_ns, ("lose", _phase(phase), 0.0, 0.0))

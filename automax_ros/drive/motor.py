@@ -73,6 +73,10 @@ class FixedLoad(Stateful):
         """Do nothing: the EMF is held."""
 
 
+SETTLED = 1e-9
+"""A field current (over rated) as near as this to its voltage has settled."""
+
+
 @dataclass
 class FieldWinding(Stateful):
     """The field: flux of its current, which follows its voltage with a time constant.
@@ -113,7 +117,7 @@ class FieldWinding(Stateful):
         self.current = self._current(time_s)
 
     def _current(self, ahead_s: float) -> float:
-        if not self.tau_s or self.current == self.voltage:
+        if not self.tau_s or abs(self.current - self.voltage) < SETTLED:
             return self.voltage
         return self.voltage + (self.current - self.voltage) * exp(-ahead_s / self.tau_s)
 

@@ -14,7 +14,7 @@ from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
 from automax_ros.drive.errors import LARGEST, require
 from automax_ros.drive.meter import EnergyMeter, Sample
-from automax_ros.drive.motor import Motor
+from automax_ros.drive.motor import FieldWinding, Motor
 from automax_ros.drive.nameplate import DriveParameters
 from automax_ros.drive.plant_meter import PlantMeter
 from automax_ros.drive.state import SavedState, Stateful, check_names
@@ -23,6 +23,10 @@ PICK_UP_NS, DROP_OUT_NS = 60_000_000, 20_000_000
 """From the relay to closed and to open contacts of the M-contactor, ns (decision)."""
 SCR_DROP_V = 1.5
 """Voltage over a conducting SCR, V (decision: 1.2 to 1.6 V are usual)."""
+FIELD_TAU_S, FIELD_KNEE = 0.5, 0.5
+"""Time constant of the field (s) and knee of its saturation (decision: 0.2 to 3 s by size and 0.5 are usual)."""
+FIELD_AMPS = 0.015
+"""Rated field current over rated armature current (decision: a field of 1 to 2 % of the power is usual)."""
 RAD_S_PER_RPM = pi / 30
 
 
@@ -84,9 +88,11 @@ class DrivePlant(Stateful):
         circuit: line, bridge and motor.
         rated_amps: rated armature current, A.
         meter: what an observer measures by, None while nobody does.
+        notes: what is broken, as the verbs of ``plant_faults`` that broke it.
+        sag_end_ns: until when the line's voltage sags (ns), 0 where no end is known.
     """
 
-    _kept = ("_contacts", "_relay", "_load_nm")
+    _kept = ("_contacts", "_relay", "_load_nm", "notes", "sag_end_ns")
 
     def __init__(self, data: PlantData, *, energy: bool = False) -> None:
         """Begin at rest, without current, the contactor open."""
@@ -108,6 +114,8 @@ class DrivePlant(Stateful):
         self.meter: PlantMeter | None = None
         self._relay = False
         self._contacts: list[tuple[int, bool]] = []
+        self.notes: list[str] = []
+        self.sag_end_ns = 0
 
     def _motor(self) -> Motor:
         data, load = self.data.parameters.motor, self.data.load
@@ -116,6 +124,7 @@ class DrivePlant(Stateful):
             load=self._torque if load.torque_per_rpm else self._load_nm,
             speed_rad_s=(load.held_rpm or 0.0) * RAD_S_PER_RPM,
             held=load.held_rpm is not None,
+            field=FieldWinding(tau_s=FIELD_TAU_S, knee=FIELD_KNEE),
         )
         motor.inertia_kg_m2 *= self.data.inertia
         return motor
@@ -164,6 +173,12 @@ class DrivePlant(Stateful):
         if self.meter is not None:
             self.meter.add(sample)
         return sample
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the contactor's contacts touch; an arc is none."""
+        wiring = self.bridge.wiring
+        return wiring.armature_closed and not wiring.armature_arc_v
 
     def begin_metering(self) -> None:
         """Let an observer have means and energies from now on; what the plant does stays the same, bit for bit."""

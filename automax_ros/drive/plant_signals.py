@@ -1,12 +1,38 @@
-"""What can be seen of a plant at an instant."""
+"""What can be seen of a plant at an instant: single signals, as instruments show them, and all at once."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import pi
 
-from automax_ros.drive.plant import DrivePlant
+from automax_ros.drive.plant import FIELD_AMPS, RAD_S_PER_RPM, DrivePlant
+from automax_ros.drive.plant_faults import active_faults
 from automax_ros.drive.scr import REVERSE
+
+
+def tach_rpm(plant: DrivePlant) -> float:
+    """Return what the tachometer shows, rpm: 0 once it is lost."""
+    return 0.0 if "lose_tach" in plant.notes else _rpm(plant)
+
+
+def _rpm(plant: DrivePlant) -> float:
+    return plant.motor.speed_rad_s / RAD_S_PER_RPM
+
+
+def _field(plant: DrivePlant) -> float:
+    return 1.0 if plant.motor.field is None else plant.motor.field.current
+
+
+SIGNALS: Mapping[str, Callable[[DrivePlant], float]] = {
+    "armature_a": lambda plant: plant.circuit.current_a,
+    "armature_v": lambda plant: plant.circuit.armature_v,
+    "speed_rpm": _rpm,
+    "tach_rpm": tach_rpm,
+    "torque_nm": lambda plant: plant.motor.k_v_s * plant.circuit.current_a,
+    "field_a": lambda plant: _field(plant) * FIELD_AMPS * plant.rated_amps,
+    "line_hz": lambda plant: plant.line.frequency_hz,
+}
+"""Instantaneous values at the plant's present, SI units or rpm, signed; the torque is that of the armature."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +63,7 @@ class PlantSignals:
         bridge: 1 (forward) or 2 (reverse), the bridge that conducts; 0 while none does.
         contactor: whether the contacts are closed.
         line_hz, line_v: frequency of the line, and its voltage from line to line, rms.
+        faults: what is broken, as ``plant_faults`` calls it, in the order in which it broke.
         energies: None where they are not metered.
     """
 
@@ -52,6 +79,7 @@ class PlantSignals:
     contactor: bool
     line_hz: float
     line_v: float
+    faults: tuple[str, ...]
     energies: Energies | None
 
 
@@ -65,13 +93,14 @@ def signals_of(plant: DrivePlant) -> PlantSignals:
         circuit.armature_v,
         motor.torque_n_m,
         motor.load_torque(motor.speed_rad_s),
-        motor.speed_rad_s * 30 / pi,
+        _rpm(plant),
         motor.angle_rad,
-        1.0 if motor.field is None else motor.field.current,
+        _field(plant),
         (2 if conducting[-1] in REVERSE else 1) if conducting else 0,
-        plant.bridge.wiring.armature_closed,
+        plant.is_closed,
         line.frequency_hz,
         line.v_ll_v,
+        active_faults(plant),
         _energies(plant),
     )
 

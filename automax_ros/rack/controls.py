@@ -9,10 +9,15 @@ from __future__ import annotations
 from typing import NoReturn
 
 from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.drive.errors import ParameterError
+from automax_ros.drive.plant_faults import values_of, work_on
 from automax_ros.rack.modules.kind import Operable
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+
+MOST_CHARACTERS = 100
+"""Longest text of a value that is looked at (decision: a bound on what strangers send)."""
 
 
 class Controls:
@@ -44,6 +49,34 @@ class Controls:
         except OperationRefused as refused:
             self._refuse("module", told, str(refused))
         self._tell("module", f"{slot} {control} {position}")
+
+    def plant(self, name: str, verb: str, value: str) -> None:
+        """Break, mend or load a plant, now: ``UNWIND``, ``short_scr``, ``3``; ``drive/plant_faults`` has the verbs."""
+        if len(value) > MOST_CHARACTERS:
+            self._refuse("plant", f"{name} {verb}", f"a text of {len(value)} characters: at most {MOST_CHARACTERS}")
+        told = f"{name} {verb} {value.strip()}"
+        plant = self._rack.plants.get(name)
+        if plant is None:
+            has = near_or_listed(name, self._rack.plants) or "it has none with a motor"
+            self._refuse("plant", told, f"the rack has no plant {quoted(name)}: {has}")
+        try:
+            values = values_of(verb, value)
+        except ParameterError as error:
+            self._refuse("plant", told, str(error))
+        plant.advance(self._rack.now_ns)
+        work_on(plant, verb, values)
+        self._tell("plant", told)
+
+    def load(self, name: str, torque_nm: float) -> None:
+        """Load a plant's shaft (N m) as one of many samples: nobody is told of an operation (decision)."""
+        plant = self._rack.plants.get(name)
+        if plant is None:
+            raise OperationRefused(f"the rack has no plant {quoted(name)}")
+        plant.advance(self._rack.now_ns)
+        try:
+            plant.load_torque_nm = torque_nm
+        except ParameterError as error:
+            raise OperationRefused(str(error)) from error
 
     def _tell(self, what: str, detail: str, *, reason: str = "", ok: bool = True) -> None:
         self._rack.observers.operated(Operation(self._rack.now_ns, what, "", ok, reason, detail))

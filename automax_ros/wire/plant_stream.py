@@ -98,7 +98,7 @@ def state_message(driven: DrivenPlant, plant: DrivePlant, stamp: int) -> PlantSt
         signals.contactor,
         signals.line_hz,
         signals.line_v,
-        (),
+        signals.faults,
         energies.line_j,
         energies.loss_j,
         energies.stored_j,

@@ -1,4 +1,4 @@
-"""The verbs on what stands in and around a rack: controls of modules, faults of plants."""
+"""The verb on what stands in a rack: controls of modules."""
 
 from __future__ import annotations
 
@@ -15,29 +15,14 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.scalars import integer_value, kind_of
 from automax_ros.rack.sections import Entry, entries_of
 from automax_ros.rack.stimuli.operating import Control
+from automax_ros.rack.stimuli.plant_work import read_plant_work
 from automax_ros.rack.stimuli.reading import Verb, named
 from automax_ros.rack.stimuli.stage import Action
-
-_ANY_NUMBER: tuple[str, ...] = ()
-_SCRS = tuple(str(number) for bridge in (1, 11) for number in range(bridge, bridge + 6))
-PLANT_CONTROLS = {
-    "short_scr": _SCRS,
-    "open_gate": _SCRS,
-    "blow_fuse": _SCRS,
-    "lose_phase": ("A", "B", "C"),
-    "lose_tach": ("true",),
-    "lose_field": ("true",),
-    "line_sag": _ANY_NUMBER,
-    "line_hz": _ANY_NUMBER,
-    "load_torque_nm": _ANY_NUMBER,
-    "repair": ("all",),
-}
-"""What can be done to a plant, with the values that it takes; the drive's own checks come with the drive."""
 
 
 def control_verbs(rack: Rack) -> Mapping[str, Verb]:
     """Return the verbs ``module`` and ``plant``."""
-    return {"module": Verb(partial(_module, rack)), "plant": Verb(_plant)}
+    return {"module": Verb(partial(_module, rack)), "plant": Verb(partial(read_plant_work, rack))}
 
 
 def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
@@ -55,15 +40,6 @@ def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Actio
         moved = _controls(item, f"the {module.config.model} in slot {slot}", known, findings)
         found += [Control(str(slot), control.verb, control.value, controls.module) for control in moved]
     return found
-
-
-def _plant(node: Node, what: str, findings: Findings) -> list[Action]:
-    """Check the form; a rack of this version has no plant that can be operated (decision: the drives bring them)."""
-    for key, item in named(node, what, findings):
-        list(_controls(item, f"{what} {key.text}", PLANT_CONTROLS, findings))
-        message = f"the rack has no plant {quoted(key.text)} that can be operated"
-        findings.add("AMX6742", message, key.span, "plants are not simulated yet")
-    return []
 
 
 @dataclass(frozen=True)
