@@ -109,7 +109,8 @@ class CurrentMinorLoop(Stateful):
             self._follow_run(now_ns, measured, inputs, causes)
         problems += self._go_on(now_ns, inputs, verdict)
         pulses = self._fire(measured)
-        command = Command(pll.next_ns, sequence.relays, pulses, self.latched.ioc_thresh, not sequence.running)
+        block, ok = not sequence.running or self.control.block, self.latched.usable and not self.faults.active
+        command = Command(pll.next_ns, sequence.relays, pulses, self.latched.ioc_thresh, block, ok)
         row = self._row(measured) if ticked else None
         return Outcome(command, row, self._record(pulses), tuple(problems), first)
 

@@ -96,7 +96,7 @@ class Command(NamedTuple):
     block: bool = False
     """All earlier gate windows end at once (a coast stop, a bridge change)."""
     ok: bool = False
-    """The drive OK output of the drive digital I/O module: no drive fault is active (decision)."""
+    """The drive OK output of the drive digital I/O module: good inputs and no drive fault (decision)."""
 
 
 def gate_bits(*numbers: int) -> int:
