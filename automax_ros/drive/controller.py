@@ -50,7 +50,8 @@ class DriveController:
         if line.rotation.value < 0:
             status |= ROTATION_ABC
         amps = sample.mean_current_a
-        if sample.exceeds(self.level * plant.rated_amps / 100):
+        line_a, level_a = circuit.line_a, self.level * plant.rated_amps / 100
+        if line_a > level_a or sample.exceeds(level_a):
             status |= OVERCURRENT
         idle_us = int(circuit.idle_s * 1e6)
         volts = 0.0
@@ -65,7 +66,7 @@ class DriveController:
             round((turn if turn >= 0 else turn + 2 * pi) / line.omega * 1e9) if status & LINE else 0,
             max(-LARGEST, min(LARGEST, round(volts * VOLTS / plant.data.parameters.line_v))),
             *registers,
-            min(LARGEST, round(circuit.line_a / plant.rated_amps * RATED)),
+            min(LARGEST, round(line_a / plant.rated_amps * RATED)),
         )
 
     def command(self, command: Command, interrupt_ns: int, now_ns: int = 0) -> None:

@@ -13,7 +13,8 @@ LINE = 1 << 0
 ROTATION_ABC = 1 << 1
 """The phases pass in the order A, B, C: not the standard one, which is C, B, A (52.1.5)."""
 OVERCURRENT = 1 << 2
-"""The armature current has been above the level of the last command at some instant since the last interrupt."""
+"""The armature current has been above the level of the last command at some instant since the last interrupt, or a
+current of the line is at this one (decision: what the armature does not see must trip, too)."""
 PERMISSIVE = 1 << 3
 """The run permissive input of the drive digital I/O module."""
 EXTERNAL_TRIP = 1 << 4
