@@ -1,0 +1,403 @@
+"""The drive faults (52.1.5, 52.2.2, 52.4), each provoked on a plant: cause, output, latch, reaction, reset, log."""
+
+import pytest
+
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.drive.cml.signals import EXTERNAL_TRIP, PERMISSIVE
+from automax_ros.drive.nameplate import EXAMPLES, derive
+from automax_ros.drive.plant import DrivePlant, PlantData
+
+from .protected import CLOSED_S, LOCKED_S, Drive
+
+KINDS = {
+    "IOC_OUT": "AMX7110", "SYNC_LOSS_OUT": "AMX7111", "TACH_LOSS_OUT": "AMX7112", "OSV_OUT": "AMX7113",
+    "EXT_IET_OUT": "AMX7114", "PHROT_FLT_OUT": "AMX7115", "BAD_SCR_OUT": "AMX7116",
+}  # fmt: skip
+
+
+def tripped(drive, output):
+    """Whether one fault is there alone, logged once, and the drive coasts."""
+    return (
+        drive.faults == {output}
+        and drive.codes == [KINDS[output]]
+        and not drive["DC_CML_STATE"]
+        and not drive.relay
+        and drive.loop.sequence.phase == 0
+    )
+
+
+def resets(drive):
+    """Whether FAULT_RESET takes the faults away."""
+    drive.run(0.03, fault_reset=True)
+    gone = not drive.faults
+    drive.run(0.03, fault_reset=False)
+    return gone
+
+
+def starts_again(drive):
+    """Whether the drive starts with an edge, and not before."""
+    drive.run(0.5)
+    waited = not drive.relay
+    drive.run(0.02, cml_run=False)
+    drive.run(0.2, cml_run=True)
+    return waited and drive["DC_CML_STATE"]
+
+
+def running(speed_rad_s=60.0, **changes):
+    """A drive with a current, its motor turning."""
+    drive = Drive(**{"reference": 2000} | changes)
+    drive.plant.motor.speed_rad_s = speed_rad_s
+    drive.start()
+    drive.run(0.2)
+    assert drive.faults == set()
+    return drive
+
+
+# What is caused and taken away by hand: (output, inputs, status bits, plant)
+TRIPS = {
+    "OSV_OUT": ({"osv_fdbk": 4300, "osv_thresh": 4299}, {"osv_fdbk": 4299}),
+    "EXT_IET_OUT": (EXTERNAL_TRIP, 0),
+    "PHROT_FLT_OUT": ({"nonstand_phrot": True}, {"nonstand_phrot": False}),
+}
+
+
+def put(drive, change):
+    """Bring a cause about, or take it away."""
+    if isinstance(change, int):
+        drive.status = PERMISSIVE | change
+    else:
+        drive.inputs = drive.inputs._replace(**change)
+
+
+@pytest.mark.parametrize("output", TRIPS)
+@pytest.mark.parametrize("state", ["standby", "closing", "run"])
+def test_a_trip_latches_stops_and_waits_for_its_reset(output, state):
+    cause, end = TRIPS[output]
+    drive = Drive(osv_thresh=4299, reference=1500)
+    drive.run(LOCKED_S)
+    if state != "standby":
+        drive.run(0.03 if state == "closing" else 0.4, cml_run=True)
+        assert (drive.relay, drive["DC_CML_STATE"]) == (True, state == "run")
+    put(drive, cause)
+    drive.run(0.012)
+    assert tripped(drive, output)
+    drive.run(0.02, cml_run=False)
+    drive.run(0.1, cml_run=True)
+    assert tripped(drive, output)
+    assert not resets(drive)
+    put(drive, end)
+    drive.run(0.2)
+    assert tripped(drive, output)
+    assert resets(drive)
+    assert starts_again(drive)
+    assert drive.codes == [KINDS[output]]
+
+
+def test_a_fault_is_logged_each_time_it_comes():
+    drive = Drive()
+    drive.run(LOCKED_S)
+    for times in range(1, 4):
+        drive.status |= EXTERNAL_TRIP
+        drive.run(0.1)
+        drive.status = PERMISSIVE
+        drive.run(0.1)
+        assert drive.codes == ["AMX7114"] * times
+        assert resets(drive)
+
+
+def test_a_reset_that_is_held_hides_no_fault():
+    """However short its cause is, and whatever tick it meets, a fault is shown at one tick at least."""
+    for delay in range(12):
+        drive = Drive(fault_reset=True)
+        drive.run(LOCKED_S)
+        for _ in range(delay):
+            drive.scan()
+        rows = len(drive.rows)
+        drive.status |= EXTERNAL_TRIP
+        drive.scan()
+        drive.status = PERMISSIVE
+        drive.run(0.05)
+        assert [row["EXT_IET_OUT"] for _, row in drive.rows[rows:]].count(True) >= 1
+        assert drive.faults == set()
+
+
+def test_a_reset_counts_in_standby_alone():
+    drive = Drive(reference=1500, tach_loss_stop=False, speed_fdbk=0)
+    drive.plant.motor.speed_rad_s = 130.0
+    drive.start()
+    drive.run(0.4)
+    assert (drive.faults, drive["DC_CML_STATE"]) == ({"TACH_LOSS_OUT"}, True)
+    drive.run(0.1, fault_reset=True)
+    assert drive.faults == {"TACH_LOSS_OUT"}
+    drive.run(0.1, fault_reset=False, cml_run=False)
+    assert (drive.faults, drive["DC_CML_STATE"]) == ({"TACH_LOSS_OUT"}, False)
+    assert resets(drive)
+
+
+def test_a_start_with_the_reset_is_refused():
+    drive = Drive()
+    drive.run(LOCKED_S)
+    drive.status |= EXTERNAL_TRIP
+    drive.run(0.02)
+    drive.status = PERMISSIVE
+    drive.run(0.3, fault_reset=True, cml_run=True)
+    assert (drive.faults, drive.relay) == (set(), False)
+
+
+# IOC
+
+
+@pytest.mark.parametrize("thresh", [120, 200])
+def test_ioc_trips_above_its_threshold(thresh):
+    """A shaft that stands, open loop: alpha falls until the current is too large."""
+    drive = Drive(cml_test=True, ioc_thresh=thresh, test_alpha=100).start()
+    highest = 0.0
+    for alpha in range(99, 40, -1):
+        drive.run(0.03, test_alpha=alpha)
+        if drive.faults:
+            break
+        highest = max(highest, abs(drive["I_FDBK"]) * 150 / 4095)
+    assert tripped(drive, "IOC_OUT")
+    assert 0.5 * thresh < highest < thresh
+    assert resets(drive)
+    drive.run(0.02, test_alpha=120)
+    assert starts_again(drive)
+
+
+@pytest.mark.parametrize("scr", [1, 2, 3, 4, 5, 6, 11, 12, 13, 14, 15, 16])
+def test_an_scr_that_fails_in_run_trips_ioc(scr):
+    drive = running(0.0)
+    drive.plant.circuit.short_scr(scr)
+    drive.run(0.02)
+    assert tripped(drive, "IOC_OUT")
+
+
+# Sync loss
+
+
+@pytest.mark.parametrize("state", ["standby", "run"])
+@pytest.mark.parametrize("register", [1, 2])
+@pytest.mark.parametrize("value", [0, -1])
+def test_a_pll_register_of_0_or_less_is_a_sync_loss(state, register, value):
+    drive = running() if state == "run" else Drive()
+    drive.run(LOCKED_S)
+    registers = [109, 4, 2, 0]
+    registers[register] = value
+    drive.registers = tuple(registers)
+    drive.run(0.05)
+    assert tripped(drive, "SYNC_LOSS_OUT")
+    assert not drive["SYNC_LOCKED"]
+    assert not resets(drive)
+    drive.registers = (109, 4, 2, 0)
+    drive.run(1.5)
+    assert (drive["SYNC_LOCKED"], drive.faults) == (True, {"SYNC_LOSS_OUT"})
+    assert resets(drive)
+    assert starts_again(drive)
+
+
+def test_a_pll_register_of_0_counts_before_the_first_lock():
+    drive = Drive()
+    drive.scan()
+    drive.registers = (109, 0, 0, 0)
+    drive.run(0.02)
+    assert drive.faults == {"SYNC_LOSS_OUT"}
+
+
+def test_the_registers_of_before_the_task_do_not_count():
+    drive = Drive()
+    drive.registers = (0, 0, 0, 3)
+    assert drive.scan().initialised
+    drive.registers = (109, 4, 2, 0)
+    drive.run(LOCKED_S)
+    assert (drive["SYNC_LOCKED"], drive.faults) == (True, set())
+
+
+@pytest.mark.parametrize("state", ["standby", "run"])
+def test_a_lost_sync_phase_is_a_sync_loss(state):
+    drive = running() if state == "run" else Drive()
+    drive.run(LOCKED_S)
+    drive.plant.line.lose_phase(drive.plant.now_ns, 0)
+    drive.run(0.05)
+    assert drive.faults >= {"SYNC_LOSS_OUT"}
+    assert not drive["SYNC_LOCKED"]
+    assert not resets(drive)
+    drive.plant.line.restore_phase(drive.plant.now_ns, 0)
+    drive.run(1.5)
+    assert resets(drive)
+
+
+def test_no_line_is_a_sync_loss_after_a_second():
+    drive = Drive()
+    drive.hardware.plant = None
+    drive.run(0.9)
+    assert drive.faults == set()
+    drive.run(0.2)
+    assert (drive.faults, drive.codes) == ({"SYNC_LOSS_OUT"}, ["AMX7111"])
+
+
+# Tach loss
+
+
+def mean_delta_deg(drive, scans=16):
+    """The mean of DELTA over the next scans, degrees, from what the loop fires."""
+    total = 0.0
+    for _ in range(scans):
+        drive.scan()
+        total += drive.loop.outputs.delta * 360 / drive.loop.pll.period_us
+    return total / scans
+
+
+@pytest.mark.parametrize("speed_fdbk", [0, 204, -204, 205, -205, 4095])
+def test_tach_loss_needs_a_speed_below_5_percent(speed_fdbk):
+    drive = Drive(reference=1500, speed_fdbk=speed_fdbk)
+    drive.plant.motor.speed_rad_s = 130.0
+    drive.start()
+    drive.run(0.4)
+    if abs(speed_fdbk) < 205:
+        assert tripped(drive, "TACH_LOSS_OUT")
+    else:
+        assert (drive.faults, drive["DC_CML_STATE"]) == (set(), True)
+        assert mean_delta_deg(drive) > 115
+
+
+def test_without_speed_fdbk_there_is_no_tach_loss():
+    drive = Drive(reference=1500)
+    drive.plant.motor.speed_rad_s = 130.0
+    drive.start()
+    drive.run(0.4)
+    assert (drive.faults, mean_delta_deg(drive) > 115) == (set(), True)
+
+
+@pytest.mark.parametrize(
+    ("register", "alpha", "trips"),
+    [
+        (109, 72, False), (109, 71, False), (109, 70, True), (100, 79, True), (100, 81, False), (127, 54, False),
+        (127, 52, True), (500, 54, False), (500, 52, True), (0, 179, True), (-7, 179, True), (-7, 180, False),
+    ],
+)  # fmt: skip
+def test_the_mean_delta_is_compared_with_register_4136_limited(register, alpha, trips):
+    """Test mode holds DELTA still: 180 - alpha degrees; the motor turns so that no current flows."""
+    drive = Drive(cml_test=True, test_alpha=alpha, speed_fdbk=0)
+    drive.plant.motor.speed_rad_s = 660.0 / drive.plant.data.parameters.motor.k_v_s
+    drive.scan()
+    drive.registers = (register, 4, 2, 0)
+    drive.start()
+    drive.run(0.1)
+    assert drive.faults == ({"TACH_LOSS_OUT"} if trips else set())
+
+
+def test_it_takes_the_mean_of_16_scans():
+    drive = Drive(cml_test=True, test_alpha=180, speed_fdbk=0)
+    drive.plant.motor.speed_rad_s = 660.0 / drive.plant.data.parameters.motor.k_v_s
+    drive.start()
+    drive.run(0.2)
+    drive.inputs = drive.inputs._replace(test_alpha=60)
+    deltas = []
+    while not drive.codes:
+        drive.scan()
+        deltas.append(drive.loop.outputs.delta)
+    # DELTA 120 in n of 16 scans is above 109 from n = 15 on; the scan after it sees it.
+    assert [delta > 0 for delta in deltas].count(True) == 16
+    assert drive.codes == ["AMX7112"]
+
+
+@pytest.mark.parametrize("stop", [True, False])
+def test_tach_loss_stop_chooses_between_stop_and_indication(stop):
+    drive = Drive(reference=1500, speed_fdbk=3000, tach_loss_stop=stop)
+    drive.plant.motor.speed_rad_s = 130.0
+    drive.start()
+    drive.run(0.4)
+    drive.run(0.3, speed_fdbk=0)
+    assert (drive.faults, drive.codes) == ({"TACH_LOSS_OUT"}, ["AMX7112"])
+    assert (drive["DC_CML_STATE"], drive.relay) == (not stop, not stop)
+    drive.run(0.3, speed_fdbk=3000)
+    assert drive.faults == {"TACH_LOSS_OUT"}
+    drive.run(0.2, cml_run=False)
+    drive.run(0.2, cml_run=True)
+    assert not drive.relay
+    assert resets(drive)
+    assert starts_again(drive)
+
+
+def test_a_standing_motor_with_current_is_no_tach_loss():
+    drive = Drive(reference=3000, speed_fdbk=0).start()
+    drive.run(1.0)
+    assert (drive.faults, drive["DC_CML_STATE"]) == (set(), True)
+
+
+# Overspeed, overvoltage
+
+
+@pytest.mark.parametrize(
+    ("feedback", "thresh", "trips"),
+    [
+        (4299, 4299, False), (4300, 4299, True), (-4299, 4299, False), (-4300, 4299, True), (0, 0, False), (1, 0, True),
+        (-32768, 32767, True), (32767, 32767, False), (None, 0, False),
+    ],
+)  # fmt: skip
+def test_osv_compares_magnitudes(feedback, thresh, trips):
+    drive = Drive(osv_fdbk=feedback, osv_thresh=thresh)
+    drive.run(0.1)
+    assert drive.faults == ({"OSV_OUT"} if trips else set())
+
+
+# Phase rotation
+
+
+@pytest.mark.parametrize("standard", [True, False])
+@pytest.mark.parametrize("nonstand", [True, False])
+@pytest.mark.parametrize("auto", [True, False])
+def test_the_rotation_must_be_the_programmed_one_or_be_followed(standard, nonstand, auto):
+    plant = DrivePlant(PlantData(derive(EXAMPLES["150hp"]), inertia=1000.0, standard_rotation=standard))
+    drive = Drive(plant=plant, nonstand_phrot=nonstand, auto_phrot=auto, reference=1500)
+    drive.run(LOCKED_S)
+    drive.run(0.5, cml_run=True)
+    if standard == nonstand and not auto:
+        assert tripped(drive, "PHROT_FLT_OUT")
+    else:
+        # Fired in the order of the line: the current is regulated as ever, one pair after the other.
+        assert (drive.faults, drive["DC_CML_STATE"]) == (set(), True)
+        assert drive["I_FDBK"] > 0
+        drive.plant.circuit.take_events()
+        drive.run(0.2)
+        assert drive.plant.circuit.take_events() == []
+
+
+def test_nonstand_phrot_is_read_as_the_fault_is_looked_for():
+    drive = Drive()
+    drive.run(0.2)
+    drive.inputs = drive.inputs._replace(nonstand_phrot=True)
+    assert drive.scan().problems == (7115,)
+
+
+# Several
+
+
+def test_faults_that_come_at_once_are_all_logged():
+    drive = running()
+    drive.status |= EXTERNAL_TRIP
+    drive.inputs = drive.inputs._replace(osv_fdbk=9999, nonstand_phrot=True)
+    assert drive.scan().problems == (7113, 7114, 7115)
+    drive.run(0.02)
+    assert drive.faults == {"OSV_OUT", "EXT_IET_OUT", "PHROT_FLT_OUT"}
+    drive.status = PERMISSIVE
+    drive.run(0.02, fault_reset=True)
+    assert drive.faults == {"OSV_OUT", "PHROT_FLT_OUT"}
+
+
+def test_one_fault_of_the_table_has_the_hardwares_code():
+    assert {code for code in KINDS.values() if PROBLEMS[code].hardware} == {"AMX7116"}
+
+
+def test_a_restart_of_the_task_forgets_faults_but_not_their_causes():
+    drive = Drive(osv_fdbk=1)
+    drive.run(LOCKED_S)
+    drive.loop.restart()
+    drive.run(0.02)
+    assert drive.codes == ["AMX7113"] * 2
+    drive.loop.restart()
+    drive.run(LOCKED_S, osv_fdbk=0)
+    assert drive.faults == set()
+    drive.run(0.02, cml_run=False)
+    drive.run(CLOSED_S, cml_run=True)
+    assert drive["DC_CML_STATE"]
