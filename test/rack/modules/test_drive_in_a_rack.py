@@ -13,25 +13,10 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.reader import read_for_rack
 
-COMMONS = [
-    "REF%",
-    "RUN@",
-    "RESET@",
-    "STATE@",
-    "LOCKED@",
-    "PERIOD%",
-    "I_FDBK%",
-    "DELTA%",
-    "BRIDGE@",
-    "POSA@",
-    "POSB@",
-    "RESET_SW@",
-    "IOC@",
-    "IET@",
-    "SYNC@",
-    "TACH@",
-    "SPEED%",
-]
+COMMONS = (
+    "REF%", "RUN@", "RESET@", "STATE@", "LOCKED@", "PERIOD%", "I_FDBK%", "DELTA%", "BRIDGE@", "POSA@", "POSB@",
+    "RESET_SW@", "IOC@", "IET@", "SYNC@", "TACH@", "SPEED%",
+)  # fmt: skip
 CML = f"""\
 10 COMMON {", ".join(COMMONS)}
 100 CALL DC_DRIVE_CML(IO_CNTL_SLOT=SLOT, DIG_IO_SLOT=8, REFERENCE=REF%, REF_LAG=400.0, KP=0.2, &
@@ -186,7 +171,8 @@ def test_an_external_trip_stops_the_drive_until_it_is_reset(tmp_path):
 
 def test_only_what_a_lower_priority_writes_later_takes_effect(tmp_path):
     """52.4.1: the start-up part of the CML task writes the defaults after that of a task of higher priority."""
-    work = "10 COMMON TLD%, PHASE%, STEP%\n20 TLD% = 120\n30 PHASE% = 80\n40 STEP% = 40\n100 CALL SCAN_LOOP(TICKS=1)\n110 END\n"
+    writes = "20 TLD% = 120\n30 PHASE% = 80\n40 STEP% = 40\n"
+    work = f"10 COMMON TLD%, PHASE%, STEP%\n{writes}100 CALL SCAN_LOOP(TICKS=1)\n110 END\n"
 
     def registers(rack: Rack) -> list[object]:
         return [rack.value(name) for name in ("TLD%", "PHASE%", "STEP%", "FAST@")]
