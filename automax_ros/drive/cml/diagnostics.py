@@ -1,9 +1,9 @@
 """DIAG_DATA: where the current minor loop writes the record of a scan in the array of two pages (52.3.2, table 2).
 
 The array is dimensioned (37,1): 38 rows of two columns, a column is a page. Element (row, page) has the index
-``row * 2 + page``. Row 0 of page 0 is PAGE_NUMBER, row 1 of a page its NEXT_ENTRY, and record n, 1 to 12, stands in
-the rows 3n - 1, 3n and 3n + 1: I_FDBK, REF_LAG_OUT, gate command word. (decision: the rows of table 2, which is not
-printed legibly; 2 + 12 x 3 rows are all there are)
+``row * 2 + page``. Row 0 of page 0 is PAGE_NUMBER, row 1 of a page its NEXT_ENTRY. Record n, 1 to 12, stands in the
+rows 3n - 1, 3n and 3n + 1: I_FDBK, REF_LAG_OUT, gate command word (decision: table 2 is not printed legibly; 2 + 12 x 3
+rows are all there are).
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 All are looked for at each scan, in standby too (decision), but tach loss, which needs a DELTA. A fault is latched and
 logged once; it stays until FAULT_RESET in standby finds its cause gone. While one is active no start is accepted; one
-that comes while the drive runs makes it coast, but for a tach loss that TACH_LOSS_STOP only indicates.
-(decision: FAULT_RESET is a level, looked at each system clock tick; it takes back nothing that no tick has shown yet)
+that comes while the drive runs makes it coast, but for a tach loss that TACH_LOSS_STOP only indicates. FAULT_RESET is
+a level, looked at each system clock tick, not an edge; it takes back nothing that no tick has shown yet (decision).
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ Three clocks: REFERENCE at each scan; most of the others at each system clock ti
 table 1's text says; the fixed ones once, at task initialisation. A bad dynamic value is logged once, as it goes bad,
 and the last good one stays. A bad fixed one is logged, what ``Latched`` begins with stays, and the drive never runs.
 
-Decisions: what is read in run is read as the run begins, too, so that no scan runs with values of the last run;
-CC_THRESH, for which no clock is told, is read each tick.
+What is read in run is read as the run begins, too, so that no scan runs with values of the last run (decision).
+CC_THRESH, for which no clock is told, is read each tick (decision).
 """
 
 from __future__ import annotations

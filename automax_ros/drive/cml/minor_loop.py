@@ -1,4 +1,4 @@
-"""The current minor loop: one scan at each interrupt of the 57C406, six times a line cycle (52.0).
+"""The current minor loop: one scan at each interrupt of the 57C406, six in a line cycle (52.0).
 
 It knows neither the rack nor the plant: what it sees is ``Inputs`` and ``Measured``, what it gives an ``Outcome``.
 Given the same state and the same of both it does the same, so a recorded drive runs again without its plant.

@@ -2,8 +2,8 @@
 
 An SCR that is fired alone finds no way back but through a shorted leg. Fired DELTA before alpha 180 degrees, its phase
 stands above the one that it takes over from by sqrt(2) V sin(DELTA), and stays there up to the next interrupt, where
-the current is greatest. So each gate that is fired meets three legs, and what is seen at that interrupt says which of
-them is shorted (decision):
+the current is greatest. So each gate that is fired meets three legs, and currents of line and armature at that
+interrupt say which of them is shorted (decision: nothing is published but the numbers):
 
 - current in the line, none in the armature: the leg of the SCR that it takes over from, two places before it. The
   source's inductance limits this current, whatever the motor does: it finds every short, at standstill and at speed.

@@ -1,4 +1,4 @@
-"""Start, stop and coast stop of the drive (52.1.3, 52.3.1). The steps and the contactor's time are decisions.
+"""Start, stop and coast stop of the drive (52.1.3, 52.3.1).
 
 A start is the rising edge of CML_RUN, seen at a system clock tick in standby while nothing forbids it; an edge that
 comes at another time is forgotten, and not logged (decision). The first tick after task initialisation shows no edge.
@@ -11,7 +11,7 @@ import enum
 from automax_ros.drive.state import Stateful
 
 CLOSE_NS = 80_000_000
-"""From the relay to the next step, ns: the contactor closes meanwhile (decision; no feedback of it is known)."""
+"""From the relay to the next step, ns: the contactor closes meanwhile (decision: no feedback of it is known)."""
 
 
 class Phase(enum.IntEnum):

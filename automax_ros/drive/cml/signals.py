@@ -1,7 +1,7 @@
 """What passes between the current minor loop and its 57C406: whole numbers only, so that a record keeps them exactly.
 
-The 57C406 interrupts six times a line cycle. At each interrupt it tells what it has ``Measured`` since the one before,
-and takes a ``Command`` for the time up to the next (decision: nothing is published of this interface).
+The 57C406 interrupts six times in a line cycle. At each interrupt it gives what it has ``Measured`` since the one
+before, and takes a ``Command`` for the time up to the next (decision: nothing is published of this interface).
 """
 
 from __future__ import annotations
