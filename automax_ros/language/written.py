@@ -22,6 +22,9 @@ def places_that_write(program: Program, scope: Scope = Scope.COMMON) -> dict[str
         if symbol is not None and symbol.scope is scope:
             found.setdefault(symbol.name, []).append((line, target.span))
 
+    if program.cml is not None:
+        for given in program.cml.targets:
+            note(given, program.cml.line)
     for statement, line in statements_in_order((*program.startup, *program.scan)):
         for target in targets_of(statement):
             note(target, line)

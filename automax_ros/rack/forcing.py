@@ -2,7 +2,7 @@
 
 A force holds a simple variable of any type but STRING against every write, until it is released; it survives STOP ALL
 and power. Commons are known by their names, a task's own variables with the task: ``SPEED.COUNT%``. A tunable cannot be
-forced, since nothing but the operator writes it (decision).
+forced, since nothing but the operator writes it (decision), and no output of a drive's current minor loop (52.0).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType, Value
+from automax_ros.language.syntax.tree import Scope
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.executive import most_forces, version_text
 from automax_ros.rack.local_names import LocalElement, local_named
@@ -102,7 +103,8 @@ class Forcing:
 
     def _force_local(self, meant: LocalElement, value: Value, writer: int) -> None:
         symbol, forces = meant.symbol, meant.task.forces
-        self._require(meant.label, meant.why_not_forced or self._too_many(again=symbol.name in forces))
+        reason = meant.why_not_forced or meant.task.why_not_forced(symbol.name, symbol.scope)
+        self._require(meant.label, reason or self._too_many(again=symbol.name in forces))
         fit = fitting(ViewSpec(meant.label, symbol.type), value)
         self._hold(meant.task, {**forces, symbol.name: fit}, writer)
 
@@ -132,6 +134,10 @@ class Forcing:
             return "it shows whether anything is forced"
         if spec.name in PREDEFINED:
             return "the rack itself writes it"
+        for task in self._tasks():
+            reason = task.why_not_forced(spec.name, Scope.COMMON)
+            if reason is not None:
+                return reason
         others = memory.registers.others(view)
         return f"{memory.specs[others[0]].name} is part of the same register" if others else None
 
@@ -145,6 +151,7 @@ class Forcing:
 
 def _may_be_held(task: Task, name: str) -> bool:
     try:
-        return local_named([task], f"{task.name}.{name}").why_not_forced is None
+        meant = local_named([task], f"{task.name}.{name}")
     except NameFault:
         return False
+    return meant.why_not_forced is None and task.why_not_forced(name, meant.symbol.scope) is None

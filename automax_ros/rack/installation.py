@@ -116,9 +116,9 @@ class Installation:
             self._refuse_misfit(task, source, found)
         if result.program is None or has_errors(result.diagnostics):
             raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
-        kind = self._compiled[task].program.kind
-        if result.program.kind is not kind:
-            what = "a BASIC task" if kind is TaskKind.BASIC else "a control-block task"
+        before = self._compiled[task].program
+        if _kind(result.program) != _kind(before):
+            what = _kind(before)
             raise RackError(f"task {task} is {what}: {source.name} is another kind of task, restart the rack with it")
         return result.program
 
@@ -135,3 +135,10 @@ class Installation:
 
     def _module(self, task: str) -> ModuleConfig:
         return next(module for module, item in self._config.placed_tasks if item.name == task)
+
+
+def _kind(program: Program) -> str:
+    """Return what kind of task a program makes: a running rack cannot change it."""
+    if program.cml is not None:
+        return f"a task of {program.cml.block.name}"
+    return "a BASIC task" if program.kind is TaskKind.BASIC else "a control-block task"

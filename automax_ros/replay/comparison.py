@@ -14,11 +14,11 @@ from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.channels import CHANNELS
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Found, Label, Seen, Tallies, within
-from automax_ros.replay.drives import DRIVES, read_name
 from automax_ros.replay.inputs import ScanMemory
 from automax_ros.replay.report import Kind, NamedValue, errors_text
 from automax_ros.replay.same import same_bits
 from automax_ros.replay.stored_rack import ReplaySource
+from automax_ros.running.drive_record import COMMAND_VIEW, MEASURED_NAMES, MEASURED_VIEW
 from automax_ros.running.task import ScanRecord
 from automax_ros.wire.messages import Scan
 
@@ -84,14 +84,15 @@ class ScanComparison:
             return Seen()
         names = self._source.compiled.latched
         latched = [NamedValue(name, value) for name, value in zip(names, record.latched, strict=False)]
-        reads = [NamedValue(self._read_name(view, element), value) for view, element, value in record.reads[:1000]]
+        read = (entry for entry in record.reads[:1000] if entry[0] != COMMAND_VIEW)
+        reads = [NamedValue(self._read_name(view, element), value) for view, element, value in read]
         return Seen(tuple(latched), tuple(reads))
 
     def _read_name(self, view: int, element: int) -> str:
         if view in CHANNELS:
             return f"channel #{element}"
-        if view in DRIVES:
-            return read_name(view, element)
+        if view == MEASURED_VIEW:
+            return f"57C406 {MEASURED_NAMES[element]}"
         return element_name(self._variable((view, element)), element)
 
     def _other_writes(self, writes: Sequence[Entry]) -> list[Found]:

@@ -9,9 +9,7 @@ from automax_ros.bags.common_log import Entry
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.drive.cml.signals import FMCR, RMCR, Command, Measured, Pulse, gate_numbers
 from automax_ros.running.drive_record import (
-    COMMAND_NAMES,
     COMMAND_VIEW,
-    MEASURED_NAMES,
     MEASURED_VIEW,
     command_of,
     measured_of,
@@ -76,17 +74,6 @@ class RecordedDrive:
                 yield name, text, own[name]
 
 
-def read_name(view: int, element: int) -> str:
-    """Return how a report calls a number that was measured or commanded."""
-    if view == MEASURED_VIEW:
-        return f"57C406 {MEASURED_NAMES[element]}"
-    first = len(COMMAND_NAMES)
-    if element < first:
-        return f"command {COMMAND_NAMES[element]}"
-    place = element - first
-    return f"command pulse {place // len(Pulse._fields) + 1} {Pulse._fields[place % len(Pulse._fields)]}"
-
-
 def _texts(command: Command | None) -> dict[str, str]:
     """Return a command in words, part by part."""
     texts = {
@@ -117,7 +104,7 @@ _KNOWN: dict[str, tuple[str, Callable[[Any], str]]] = {
     "relays": ("contactor", lambda relays: _RELAYS.get(relays, "FMCR and RMCR")),
     "pulses": (_PULSES, _pulses_text),
     "level": ("overcurrent level", lambda level: f"{level} %"),
-    "block": ("block of gates", str),
+    "block": ("end of open gate pulses", str),
 }
 _PARTS = {name: _KNOWN.get(name, (name, str)) for name in Command._fields}
 """What each part of a command is called, and its words."""

@@ -189,6 +189,22 @@ class CmlTask(Task):
         self._follow_end()
         return record
 
+    def why_not_forced(self, name: str, scope: Scope) -> str | None:
+        """Return why a variable cannot be forced: an output of the loop, or a local that its faults look at (52.0).
+
+        A common SPEED_FDBK or OSV_FDBK may be forced for all others: the loop looks at what is under it (decision).
+        """
+        symbol = self.compiled.program.symbols.get(name)
+        if symbol is None or symbol.scope is not scope:
+            return None
+        where = f"of {self.cml.block.name} in task {self.name} (line {self.cml.line}), which FORCE does not reach"
+        if any(isinstance(target, Reference) and target.name == name for target in self.cml.targets):
+            return f"it is an output {where}"
+        given = (self.cml.arguments.get(keyword) for keyword in _TRUE_INPUTS)
+        if scope is Scope.LOCAL and any(isinstance(item, Reference) and item.name == name for item in given):
+            return f"it is an input {where}"
+        return None
+
     def snapshot(self) -> list[Value]:
         """Return state, loop and error log as flat values, in the order of ``layout``."""
         values = super().snapshot()

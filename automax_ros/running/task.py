@@ -12,6 +12,7 @@ from automax_ros.compile.layout import Layout
 from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
+from automax_ros.language.syntax.tree import Scope
 from automax_ros.running.backplane import NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.events import Events
@@ -305,6 +306,10 @@ class Task:
         self.forces = dict(forces)
         self._forces_wait = True
         self.heed_forces()
+
+    def why_not_forced(self, name: str, scope: Scope) -> str | None:  # noqa: ARG002
+        """Return why a variable that the task declares in a scope cannot be forced, None where it can."""
+        return None
 
     @property
     def held(self) -> dict[str, Value]:

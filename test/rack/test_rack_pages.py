@@ -39,7 +39,7 @@ def part(code: str, heading: str) -> str:
 def write_tasks(code: str, heading: str, folder: Path) -> None:
     """Write the tasks of the page over those that every rack of these tests has."""
     tasks = re.findall(r"^```basic\n(.*?)^```$", section(code, heading), re.M | re.S)
-    for name, text in zip(("LINE", "DRAW"), tasks, strict=False):
+    for name, text in zip(("LINE", "DRAW", "WIND"), tasks, strict=False):
         (folder / f"{name}.BLK").write_text(text)
 
 

@@ -87,6 +87,14 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6483", "boolean outputs and inputs of a UDC in one pair of registers", Severity.WARNING),
     Problem("AMX6484", "application register written by a UDC and by a Processor"),
     Problem("AMX6485", "constant that differs from the drive's parameter"),
+    Problem("AMX6486", "IO_CNTL_SLOT that is not a 57C406"),
+    Problem("AMX6487", "DIG_IO_SLOT that is not a drive digital I/O module"),
+    Problem("AMX6488", "module that serves two drives"),
+    Problem("AMX6489", "two current minor loops on one Processor"),
+    Problem("AMX6490", "too many current minor loops"),
+    Problem("AMX6491", "no interrupt line for a current minor loop"),
+    Problem("AMX6492", "task that goes before a current minor loop", Severity.WARNING),
+    Problem("AMX6493", "register of a 57C406 in a control-block task", Severity.WARNING),
     # recordings
     # rack files: operation
     Problem("AMX6701", "version of the Programming Executive"),

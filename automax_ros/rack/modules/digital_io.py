@@ -12,6 +12,8 @@ from __future__ import annotations
 from automax_ros.rack.modules.io_config import IoKind, IoModel
 from automax_ros.rack.modules.kind import Interrupt, Registers
 
+DRIVE_MODEL = "57C408"
+"""The drive digital I/O module."""
 DRIVE_INPUTS, DRIVE_OUTPUTS = 0, 1
 """The registers of a drive's 57C408."""
 PERMISSIVE_BIT, EXTERNAL_TRIP_BIT = 0, 1
@@ -26,7 +28,7 @@ DIGITAL_IO = IoKind(
     {
         "57C402": IoModel("digital output module", _OUTPUTS),
         "57C403": IoModel("digital output module", _OUTPUTS),
-        "57C408": IoModel("drive digital I/O module", _DRIVE),
+        DRIVE_MODEL: IoModel("drive digital I/O module", _DRIVE),
         "57C419": IoModel("32-channel digital input module", _INPUTS),
     },
 )
