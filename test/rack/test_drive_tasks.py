@@ -113,7 +113,7 @@ def test_reload_of_another_kind_of_task_is_refused_and_the_drive_runs_on(tmp_pat
     rack = running(tmp_path)
     with pytest.raises(RackError, match="a task of DC_DRIVE_CML"):
         rack.operations.reload("CML", source("1000 CALL SCAN_LOOP(TICKS=2)\n1010 END\n"))
-    with pytest.raises(RackError, match="SPEED.BLK has errors"):
+    with pytest.raises(RackError, match=r"SPEED\.BLK has errors"):
         rack.operations.reload("SPEED", source(CML.replace("SLOT=7", "SLOT=6"), "SPEED.BLK"))
     rack.run(0.2)
     assert rack.value("STATE@") is True
