@@ -11,6 +11,7 @@ from automax_ros.cli.status_line import StatusLine
 from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.values import value_text
+from automax_ros.rack.modules.drive_interrupts import Timed
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import CommonElement
@@ -68,6 +69,9 @@ class StatusDisplay:
             )
             mean = statistics.total_ns / statistics.scans / 1000 if statistics.scans else 0.0
             print(f"{mean:>10.1f}{statistics.longest_ns / 1000:>12.1f}" if self._live else "")
+        for module in rack.modules if self._live else ():
+            if isinstance(module, Timed) and module.timing.interrupts:
+                print(f"  {module.config.name}: {module.timing.describe()}")
         for task in rack.tasks:
             for entry in task.errors.entries:
                 print(f"  {task.name}: {entry.describe()}")

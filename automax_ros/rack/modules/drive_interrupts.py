@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
+from automax_ros.core.text import count_of
 from automax_ros.rack.modules.kind import ModuleState
 from automax_ros.running.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
 
@@ -28,12 +30,25 @@ class InterruptTiming:
     late: int = 0
     greatest_ns: int = 0
 
+    def describe(self) -> str:
+        """Return the counts in words."""
+        late = f"{self.late} later than {LATE_NS / 1e6:g} ms"
+        return f"{count_of(self.interrupts, 'interrupt')}, {late}, the latest by {self.greatest_ns / 1e6:.3g} ms"
+
     def note(self, late_ns: int) -> None:
         """Count an interrupt that was as late as that; one that was not has 0 or less."""
         self.interrupts += 1
         self.greatest_ns = max(self.greatest_ns, late_ns)
         if late_ns > LATE_NS:
             self.late += 1
+
+
+@runtime_checkable
+class Timed(Protocol):
+    """A module that counts how its interrupts keep their time."""
+
+    @property
+    def timing(self) -> InterruptTiming: ...  # noqa: D102
 
 
 class DriveInterrupts:

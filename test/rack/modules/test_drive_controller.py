@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from automax_ros.cli.status import StatusDisplay
 from automax_ros.drive.cml import Command
 from automax_ros.drive.cml.signals import EXTERNAL_TRIP, LINE, PERMISSIVE, RESET_SWITCH, SWITCH_A, SWITCH_B, VOLTAGE
 from automax_ros.rack.controls import Controls
@@ -96,6 +97,18 @@ def test_on_the_wall_clock_late_interrupts_are_carried_out_in_order_and_counted(
     assert timing.greatest_ns == 20_000_000 - instants[2]
     late = [2_900_000 - now for now in instants[:2]] + [20_000_000 - now for now in instants[2:]]
     assert timing.late == sum(ns > 1_000_000 for ns in late) == 6
+    assert timing.describe() == "8 interrupts, 6 later than 1 ms, the latest by 14.4 ms"
+
+
+def test_the_summary_of_a_live_run_shows_it(tmp_path, capsys):
+    rack = built(tmp_path)
+    rack.start()
+    Hand(rack).arm(0)
+    rack.scheduler.run_due(1_200_000)
+    for live in (True, False):
+        StatusDisplay(rack, (), live=live).finish(None)
+        shown = "drive_7: 1 interrupt, 1 later than 1 ms, the latest by 1.2 ms" in capsys.readouterr().out
+        assert shown is live
 
 
 def test_initialisation_writes_the_defaults_and_later_writes_stay(tmp_path):
