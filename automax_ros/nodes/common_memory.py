@@ -13,28 +13,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
-from rclpy.qos import QoSPolicyKind
 from std_msgs.msg import String
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
+from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
-from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.scale import Scale
 from automax_ros.rack.writers import ROS_WRITER
 from automax_ros.running.views import MemoryValueError
-from automax_ros.wire.qos import LATCHED, QosProfile
+from automax_ros.wire.qos import LATCHED
 from automax_ros.wire.rack_files import RackFile, files_of, files_text
 from automax_ros.wire.topics import Take, Topic
-
-REFUSAL_INTERVAL_S = 1.0
-"""A variable's refused writes are logged at most this often."""
-COMMAND = QosProfile("reliable", "volatile", "keep_last", 10)
-BEST_EFFORT_COMMAND = QosProfile("best_effort", "volatile", "keep_last", 10)
 
 
 class CommonMemoryNode(ModuleNode):
@@ -57,7 +50,7 @@ class CommonMemoryNode(ModuleNode):
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
-                _Inlet(self, view, variable, topic)
+                _ValueInlet(self, view, variable, topic)
         stream.add_sink(outlets.get)
 
     def _with_files(self, publish: Take) -> Take:
@@ -77,42 +70,13 @@ class CommonMemoryNode(ModuleNode):
             self._config.publish(String(data=files_text(rack.config.name, files)))
 
 
-class _Inlet:
-    """Writes of one variable from ROS.
-
-    A reliable subscription alone would not hear best-effort publishers, a best-effort one alone would lose messages of
-    reliable ones. So a best-effort one is opened when such a publisher comes, and from its first message on it takes
-    those of all publishers: rclpy does not tell which of two copies is the same message.
-    """
+class _ValueInlet:
+    """Writes of one variable from ROS."""
 
     def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
         self._node, self._view, self._variable = node, view, variable
-        self._name, self._kind = set_topic(topic.name), message_class(topic.type_name)
-        self._hears_best_effort = self._is_best_effort = self._has_clamped = False
-        self._throttle = Throttle(REFUSAL_INTERVAL_S)
-        node.create_subscription(
-            self._kind,
-            self._name,
-            node.inside(self._name, self._take_reliable),
-            ros_qos(COMMAND),
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=node.inside(self._name, self._not_heard)),
-        )
-
-    def _not_heard(self, info: QoSRequestedIncompatibleQoSInfo) -> None:
-        if info.last_policy_kind != QoSPolicyKind.RELIABILITY:
-            self._node.misfit(f"what a writer of {self._name} sends is lost", info)
-        elif not self._hears_best_effort:
-            self._hears_best_effort = True
-            callback = self._node.inside(self._name, self._take_best_effort)
-            self._node.create_subscription(self._kind, self._name, callback, ros_qos(BEST_EFFORT_COMMAND))
-
-    def _take_best_effort(self, message: Any) -> None:
-        self._is_best_effort = True
-        self._write(message)
-
-    def _take_reliable(self, message: Any) -> None:
-        if not self._is_best_effort:
-            self._write(message)
+        self._name, self._has_clamped = set_topic(topic.name), False
+        self._inlet = Inlet(node, self._name, message_class(topic.type_name), self._write)
 
     def _write(self, message: Any) -> None:
         rack, scale = self._node.site.rack, self._variable.scale
@@ -122,10 +86,7 @@ class _Inlet:
             values = _elements(self._variable, message) if scale is None else [(0, self._counts(scale, message.data))]
             rack.write_view(self._view, values, ROS_WRITER)
         except MemoryValueError as error:
-            refusal = f"write refused: {error}"
-            self._node.site.health.note("refused write", self._variable.name, lambda: refusal)
-            if self._throttle.passes():
-                self._node.get_logger().warning(refusal)
+            self._inlet.refuse(self._variable.name, error)
 
     def _counts(self, scale: Scale, value: float) -> int:
         """Return the counts of a value in the engineer's unit; one beyond their range is clamped, and told once.
