@@ -79,6 +79,24 @@ def _reloaded(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _control(name: str, help_text: str) -> Callable[[argparse.ArgumentParser], None]:
+    def add(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("name", metavar=name, help=help_text)
+        parser.add_argument("control", metavar="WHAT", help="as stimuli files write it")
+        parser.add_argument("value", nargs="*", metavar="VALUE", help="a position, a number (default: true)")
+
+    return add
+
+
+def _moved(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    def asks(given: argparse.Namespace) -> list[Ask]:
+        value = " ".join(given.value) or "true"
+        fields = {"name": given.name, "control": given.control, "value": value}
+        return [Ask(service, "automax_msgs/OperateControl", fields, f"{given.name} {given.control} {value}")]
+
+    return asks
+
+
 def _each_task(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
     return lambda given: [Ask(service, "automax_msgs/OperateTask", {"task": name}, name) for name in given.tasks]
 
@@ -196,6 +214,10 @@ ACTIONS: Mapping[str, Action] = {
     "unforce": Action("end forces", _release, _released),
     "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=values_of, lines=_value_lines),
     "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments),
+    "module": Action("move a switch of a module", _moved("module"), _control("SLOT", "the module's slot")),
+    "plant": Action(
+        "break, mend or load the plant of a drive", _moved("plant"), _control("PLANT", "its name in the rack's file")
+    ),
     "reload": Action("replace the source of a task while the others run", _reload, _reloaded),
     "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),
     "errors": Action(

@@ -2,8 +2,9 @@
 
 Services, all in the rack's namespace: ``run``, ``stop``, ``clear_errors`` (automax_msgs/OperateTask), ``run_all``,
 ``stop_all`` (std_srvs/Trigger), ``set``, ``force``, ``tune`` (automax_msgs/SetValue), ``unforce``
-(automax_msgs/Unforce), ``reload`` (automax_msgs/Reload), ``get``, ``forces`` (automax_msgs/ReadValues), ``errors``
-(automax_msgs/ReadErrors), ``tasks`` (automax_msgs/ReadTasks), ``status`` (automax_msgs/ReadStatus).
+(automax_msgs/Unforce), ``module``, ``plant`` (automax_msgs/OperateControl), ``reload`` (automax_msgs/Reload), ``get``,
+``forces`` (automax_msgs/ReadValues), ``errors`` (automax_msgs/ReadErrors), ``tasks`` (automax_msgs/ReadTasks),
+``status`` (automax_msgs/ReadStatus).
 
 A request is carried out between two scans; the answer says whether, and if not, why. The text of a reloaded source
 comes from the caller: no path of the rack's computer is opened (decision). It is checked and compiled on a thread of
@@ -18,7 +19,17 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from automax_msgs.msg import LoggedError, TaskInfo
-from automax_msgs.srv import OperateTask, ReadErrors, ReadStatus, ReadTasks, ReadValues, Reload, SetValue, Unforce
+from automax_msgs.srv import (
+    OperateControl,
+    OperateTask,
+    ReadErrors,
+    ReadStatus,
+    ReadTasks,
+    ReadValues,
+    Reload,
+    SetValue,
+    Unforce,
+)
 from std_srvs.srv import Trigger
 
 from automax_ros.core.diagnostics import SourceText
@@ -54,6 +65,8 @@ class OperatorNode(ModuleNode):
         self._serve(SetValue, "force", lambda request, _: orders.force(request.name, request.value))
         self._serve(SetValue, "tune", lambda request, _: orders.tune(request.name, request.value))
         self._serve(Unforce, "unforce", lambda request, _: orders.unforce(list(request.names)))
+        self._serve(OperateControl, "module", lambda request, _: orders.module(*_moved(request)))
+        self._serve(OperateControl, "plant", lambda request, _: orders.plant(*_moved(request)))
         self._compiler = ThreadPoolExecutor(max_workers=1, thread_name_prefix="reload")
         self._reloading, self._closed = "", False
         allow_later(self.create_service(Reload, "reload", self._reload))
@@ -179,6 +192,10 @@ class OperatorNode(ModuleNode):
         response.tasks = len(rack.tasks)
         response.running = sum(task.status is Status.RUNNING for task in rack.tasks)
         response.forced = len(rack.forces())
+
+
+def _moved(request: Any) -> tuple[str, str, str]:
+    return request.name, request.control, request.value
 
 
 def _concluded(response: Any, *, ok: bool, reason: str) -> Any:

@@ -181,7 +181,7 @@ class LiveRecorder:
         self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
         kinds = topics.all
         # The rack answers each new reader of these: an image first, then states and full scans that follow it.
-        first = [topics.variables, topics.backplane, *topics.values, topics.operations]
+        first = [topics.variables, topics.backplane, *topics.values, *topics.plants, topics.operations]
         first += [topics.snapshot, topics.scans, topics.states]
         self._subscriptions = [RawSubscription(self._node, name, kinds[name]) for name in first]
         self._files = RawSubscription(self._node, topics.config, _FILES)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from automax_ros.nodes.common_memory import CommonMemoryNode
+from automax_ros.nodes.drive_plant import DrivePlantNode
 from automax_ros.nodes.io_module import IoModuleNode
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.operator import OperatorNode
@@ -25,6 +26,7 @@ from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.registry import SUPPORTED
 from automax_ros.rack.modules.resolver import RESOLVER
 from automax_ros.rack.modules.udc_config import UDC
+from automax_ros.rack.plants.driven import driven_plants
 
 NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     PROCESSOR: ProcessorNode,
@@ -42,7 +44,10 @@ NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
 
 
 def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
-    """Create the nodes of a rack: that of common memory, an operator's if it has one, those of its modules by slot."""
+    """Create the nodes of a rack: that of common memory, an operator's if it has one, those of its modules by slot.
+
+    After them stand those of the plants that drives turn, by slot and drive.
+    """
     made: list[ModuleNode] = [CommonMemoryNode(site)]
     if site.rack.config.operator:
         made.append(OperatorNode(site))
@@ -50,4 +55,5 @@ def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
         node = NODES[SUPPORTED[module.config.model]]
         if node is not None:
             made.append(node(site, module))
+    made += (DrivePlantNode(site, driven) for driven in driven_plants(site.rack.config))
     return tuple(made)

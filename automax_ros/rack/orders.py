@@ -16,6 +16,7 @@ from automax_ros.core.names import NameFault
 from automax_ros.core.text import printable, quoted
 from automax_ros.core.types import DataType, Value, type_of_name
 from automax_ros.core.values import source_text, value_of, wanted
+from automax_ros.rack.controls import Controls
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.installation import Prepared, RackError
 from automax_ros.rack.observers import Operation
@@ -90,6 +91,18 @@ class Orders:
         kind = type_of_name("".join(name.split()).upper())
         held = self._value("tune", name, value, kind, 0)
         self._rack.adjust.tune(name, 0 if isinstance(held, str) else held)
+
+    def module(self, slot: str, control: str, value: str) -> None:
+        """Move a control of the module in a slot: ``7``, ``test_switch``, ``A``."""
+        for text in (slot, control, value):
+            self._short("module", text, MAX_NAME)
+        Controls(self._rack).module(slot.strip(), control.strip(), value.strip())
+
+    def plant(self, name: str, verb: str, value: str) -> None:
+        """Break, mend or load a plant: ``UNWIND``, ``short_scr``, ``3``."""
+        for text in (name, verb, value):
+            self._short("plant", text, MAX_NAME)
+        self._rack.plant_work.operate(name.strip().upper(), verb.strip(), value.strip())
 
     def reload(self, task: str, source: str, *, keep_state: bool = False) -> list[str]:
         """Replace a task's source by a text; return what its check found, short of errors.

@@ -7,6 +7,7 @@ it can never make two names equal:
   ``rack_`` in front (decision: a rack's name has no underscore, so no other looks like it);
 - the topic of a variable is its name without the type character: ``common/LINE_SPEED``;
 - commons that differ only in type get the type's word: ``common/SPEED_int`` and ``common/SPEED_bool``;
+- the topic of a plant is its name: ``plants/UNWIND``;
 - a name that begins with an underscore gets ``u`` in front, since ROS tools hide such topics: ``common/u_SPARE``
   (decision). Repeated underscores, which the ROS design page advises against and ROS accepts, stay as they are.
 """
@@ -47,6 +48,20 @@ def topic_names(names: Iterable[str]) -> dict[str, str]:
 def set_topic(topic: str) -> str:
     """Return the topic on which a variable with ``ros: in`` is written."""
     return f"{topic}/set"
+
+
+JOINTS = "joint_states"
+"""The topic of the shafts of all plants, relative to the rack's namespace."""
+
+
+def plant_topic(name: str) -> str:
+    """Return the topic of a plant's state, relative to the rack's namespace."""
+    return f"plants/{name}"
+
+
+def load_topic(name: str) -> str:
+    """Return the topic on which the load torque of a plant with ``ros: in`` is set."""
+    return set_topic(f"{plant_topic(name)}/load_torque")
 
 
 def _word(name: str, shared: bool) -> str:

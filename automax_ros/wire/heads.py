@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from automax_ros.wire.cdr import decode, head_reader
-from automax_ros.wire.messages import VariableTable
+from automax_ros.wire.messages import JointState, PlantState, VariableTable
 
 
 class WriteHead(NamedTuple):
@@ -52,6 +52,17 @@ def table_of(payload: bytes) -> VariableTable:
     table = decode("automax_msgs/msg/VariableTable", payload)
     assert isinstance(table, VariableTable)
     return table
+
+
+def plant_stamp(type_name: str, payload: bytes) -> int:
+    """Return the stamp of a PlantState or of a JointState, ns.
+
+    Raises:
+        CdrError: the bytes are none.
+    """
+    message = decode(type_name, payload)
+    assert isinstance(message, PlantState | JointState)
+    return message.stamp if isinstance(message, PlantState) else message.header.stamp
 
 
 def state_head(payload: bytes) -> StateHead:

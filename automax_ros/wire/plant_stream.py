@@ -13,6 +13,7 @@ from automax_ros.drive.plant_meter import Means
 from automax_ros.drive.plant_signals import Energies, signals_of
 from automax_ros.rack.plants.driven import DrivenPlant, driven_plants
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.ros_names import JOINTS, plant_topic
 from automax_ros.wire.cdr import encoder
 from automax_ros.wire.messages import NAMES, Header, JointState, PlantState
 from automax_ros.wire.qos import PLANT
@@ -27,10 +28,11 @@ class _Plant:
     def __init__(self, driven: DrivenPlant, plant: DrivePlant, space: str) -> None:
         self.driven, self.plant = driven, plant
         name, slot = driven.name, driven.slot
-        self.state_topic = Topic(f"{space}/plants/{name}", NAMES[PlantState], PLANT, slot, name)
-        self.joint_topic = Topic(f"{space}/joint_states", NAMES[JointState], PLANT, slot, name)
+        self.state_topic = Topic(f"{space}/{plant_topic(name)}", NAMES[PlantState], PLANT, slot, name)
+        self.joint_topic = Topic(f"{space}/{JOINTS}", NAMES[JointState], PLANT, slot, name)
         self.states: list[Take] = []
         self.joints: list[Take] = []
+        self.last: PlantState | None = None
 
 
 class PlantStream:
@@ -54,6 +56,10 @@ class PlantStream:
                 if topic in takes:
                     routed.append(takes[topic])
 
+    def last(self, plant: str) -> PlantState | None:
+        """Return the state of a plant that was sent last, None before the first, or where nobody takes it."""
+        return next((item.last for item in self._plants if item.driven.name == plant), None)
+
     def begin(self) -> None:
         """Measure from now on what somebody takes."""
         for item in self._plants:
@@ -66,7 +72,8 @@ class PlantStream:
         stamp = self._stamp(now_ns)
         for item in self._plants:
             if item.states:
-                payload = self._encode_state(state_message(item.driven, item.plant, stamp))
+                item.last = state_message(item.driven, item.plant, stamp)
+                payload = self._encode_state(item.last)
                 for take in item.states:
                     take(stamp, payload)
             if item.joints:

@@ -16,13 +16,13 @@ from typing import Any
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.provenance import lacking, provenance
 from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.bags.live.tracks import Gap, TaskTrack, task_head
+from automax_ros.bags.live.tracks import Gap, TaskTrack, has_written, task_head
 from automax_ros.bags.recording import Recording
 from automax_ros.bags.write_log import WriteLog
 from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
 from automax_ros.core.kinds import WriterKind
 from automax_ros.wire.cdr import CdrError, decode
-from automax_ros.wire.heads import WriteHead, image_head, operation_head, scan_head, table_of, write_head
+from automax_ros.wire.heads import WriteHead, image_head, operation_head, plant_stamp, scan_head, table_of, write_head
 from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.rack_files import RackFile
 
@@ -90,13 +90,15 @@ class LiveRecording(Recording):
             topics.variables: self._take_table,
             topics.snapshot: self._take_image,
             topics.backplane: self._take_write,
-            **dict.fromkeys((topics.scans, topics.states, topics.operations, *topics.values), self._keep),
+            **dict.fromkeys((topics.scans, topics.states, topics.operations), self._keep),
+            **dict.fromkeys((*topics.values, *topics.plants), self._keep),
         }
         self._recorders: dict[str, Callable[[str, int, bytes], None]] = {
             topics.scans: self._record_scan,
             topics.states: self._record_state,
             topics.operations: self._record_operation,
             **dict.fromkeys(topics.values, self._record_value),
+            **dict.fromkeys(topics.plants, self._record_plant),
         }
         self._channels: dict[str, Channel] = {
             name: self._writer.channel(name, kind.type_name, kind.qos) for name, kind in topics.all.items()
@@ -238,6 +240,10 @@ class LiveRecording(Recording):
         if run_id == self._log.run_id and stamp >= (self.first_stamp or 0):  # older ones wait for late joiners too
             self._write(topic, sent_ns, stamp, payload)
 
+    def _record_plant(self, topic: str, sent_ns: int, payload: bytes) -> None:
+        stamp = plant_stamp(self._topics.plants[topic].type_name, payload)
+        self._write(topic, sent_ns, stamp, payload)
+
     def _record_value(self, topic: str, sent_ns: int, payload: bytes) -> None:
         self.values += 1
         self._values_now[topic] = payload
@@ -274,7 +280,7 @@ class LiveRecording(Recording):
             if again and not at_end and len(pending) < MAX_PENDING:
                 self._pending = pending[number:]  # a write or an image will tell whether it is the same run
                 return
-            if not again and topic == self._topics.scans and self._wrote(payload):
+            if not again and topic == self._topics.scans and has_written(payload, self._last_write):
                 if not at_end:
                     self._rest(scan_head(payload).stamp, 0)
                 return
@@ -293,14 +299,6 @@ class LiveRecording(Recording):
         head = task_head(self._topics, topic, payload)
         track = None if head is None else self._tasks.get(head.task)
         return head is not None and track is not None and track.began_anew(head.scan, head.stamp)
-
-    def _wrote(self, payload: bytes) -> bool:
-        """Whether a scan wrote common memory and the write must follow: one that was pre-empted may have before."""
-        try:
-            scan: Any = decode("automax_msgs/msg/Scan", payload)
-        except CdrError:
-            return False
-        return bool(scan.committed.variable or (scan.written.variable and self._last_write <= scan.stamp))
 
     def _drop_pending(self) -> None:
         self.dropped += sum(topic == self._topics.scans for topic, _, _ in self._pending)

@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.wire.messages import Variable, VariableTable
-from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE, QosProfile
+from automax_ros.rack.ros_names import JOINTS, plant_topic
+from automax_ros.wire.messages import NAMES, JointState, PlantState, Variable, VariableTable
+from automax_ros.wire.qos import LATCHED, OPERATION, PLANT, SCAN, VALUE, QosProfile
 from automax_ros.wire.rack_messages import SCALED_TYPE, value_type_name
 
 MAX_VALUE_TOPICS = 2000
 """Most topics of common variables that a recorder listens to (decision: ROS serves no more at the pace of scans)."""
+
+MAX_PLANT_TOPICS = 100
+"""Most topics of plants that a recorder listens to (decision: a rack has far fewer drives)."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,8 @@ class LiveTopics:
     ) -> None:
         """Name the topics; without a table those of common variables are not known.
 
-        ``offered`` are the types of topics that the ROS graph has: the table does not say which variables have a scale.
+        ``offered`` are the types of topics that the ROS graph has: the table does not say which variables have a scale,
+        and nothing of plants.
         ``left_out`` is how many topics of common variables lie beyond the limit.
         """
         self.variables = f"{space}/variables"
@@ -44,6 +49,7 @@ class LiveTopics:
         found = _values(space, table, offered or {}) if table else {}
         self.values = dict(list(found.items())[:MAX_VALUE_TOPICS])
         self.left_out = len(found) - len(self.values)
+        self.plants = _plants(space, offered or {})
 
     @property
     def all(self) -> dict[str, TopicKind]:
@@ -56,6 +62,7 @@ class LiveTopics:
             self.states: TopicKind("automax_msgs/msg/TaskState", SCAN),
             self.operations: TopicKind("automax_msgs/msg/Operation", OPERATION),
             **self.values,
+            **self.plants,
         }
 
 
@@ -68,6 +75,17 @@ def _values(space: str, table: VariableTable, offered: Mapping[str, Collection[s
             type_name = SCALED_TYPE
         if variable.direction != Direction.CLOSED and type_name and variable.topic.startswith(f"{space}/common/"):
             found[variable.topic] = TopicKind(type_name, VALUE)
+    return found
+
+
+def _plants(space: str, offered: Mapping[str, Collection[str]]) -> dict[str, TopicKind]:
+    """The topics of plants: their states, and the shafts of all."""
+    state, joint = NAMES[PlantState], NAMES[JointState]
+    begin = f"{space}/{plant_topic('')}"
+    names = sorted(name for name, types in offered.items() if name.startswith(begin) and state in types)
+    found = {name: TopicKind(state, PLANT) for name in names[:MAX_PLANT_TOPICS]}
+    if found and joint in offered.get(f"{space}/{JOINTS}", ()):
+        found[f"{space}/{JOINTS}"] = TopicKind(joint, PLANT)
     return found
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.wire.cdr import CdrError
+from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import ScanHead, StateHead, scan_head, state_head
 
 
@@ -77,3 +78,15 @@ def task_head(topics: LiveTopics, topic: str, payload: bytes) -> ScanHead | Stat
         return state_head(payload) if topic == topics.states else None
     except CdrError:
         return None
+
+
+def has_written(payload: bytes, last_write: int) -> bool:
+    """Whether a scan wrote common memory and the write must follow: one that was pre-empted may have before.
+
+    ``last_write`` is the stamp of the last write that came.
+    """
+    try:
+        scan: Any = decode("automax_msgs/msg/Scan", payload)
+    except CdrError:
+        return False
+    return bool(scan.committed.variable or (scan.written.variable and last_write <= scan.stamp))
