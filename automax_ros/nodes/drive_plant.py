@@ -20,6 +20,7 @@ from std_msgs.msg import Float64
 
 from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.rack.controls import Controls
 from automax_ros.rack.modules.drive_interrupts import InterruptTiming
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.plants.driven import DrivenPlant
@@ -47,13 +48,14 @@ class DrivePlantNode(ModuleNode):
         module = modules[driven.slot]
         self._timing = module.timing if isinstance(module, _Timed) else None
         self._late_told = 0
+        self._controls = Controls(site.rack)
         if driven.config.load.from_ros:
             self._inlet = Inlet(self, load_topic(driven.name), Float64, self._load)
         self.diagnose(self._health)
 
     def _load(self, message: Any) -> None:
         try:
-            self.site.rack.plant_work.set_load(self._driven.name, message.data)
+            self._controls.load(self._driven.name, message.data)
         except OperationRefused as refused:
             self._inlet.refuse(f"the load of {self._driven.name}", refused)
 

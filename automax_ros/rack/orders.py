@@ -102,7 +102,7 @@ class Orders:
         """Break, mend or load a plant: ``UNWIND``, ``short_scr``, ``3``."""
         for text in (name, verb, value):
             self._short("plant", text, MAX_NAME)
-        self._rack.plant_work.operate(name.strip().upper(), verb.strip(), value.strip())
+        Controls(self._rack).plant(name.strip().upper(), verb.strip(), value.strip())
 
     def reload(self, task: str, source: str, *, keep_state: bool = False) -> list[str]:
         """Replace a task's source by a text; return what its check found, short of errors.

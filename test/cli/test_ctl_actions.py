@@ -52,3 +52,13 @@ def test_a_rack_is_named_by_its_folder_as_well_as_by_its_file(tmp_path, monkeypa
     assert space_of("PM1") == "/operated"
     with pytest.raises(UsageError, match="is a task"):
         space_of("PM1/LINE.BLK")
+
+
+@pytest.mark.parametrize("action", ["module", "plant"])
+def test_controls_take_the_words_of_stimuli(action):
+    for words, value in (
+        (("UNWIND", "load_torque_nm", "-20.5"), "-20.5"),
+        (("7", "fault_reset_switch"), "true"),
+        (("UNWIND", "line_sag", "70", "0.2"), "70 0.2"),
+    ):
+        assert asked(action, *words) == [{"name": words[0], "control": words[1], "value": value}]
