@@ -1,4 +1,4 @@
-"""Two motors on one shaft, or on two shafts with a spring between them; each fed by a circuit of its own."""
+"""Two motors on one shaft, or on two shafts with a spring or a gear between them; each fed by a circuit of its own."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from automax_ros.drive.errors import ParameterError, require
 from automax_ros.drive.motor import Motor
 from automax_ros.drive.state import Stateful
 
+LEAST_RATIO, MOST_RATIO = 0.01, 100.0
 LONGEST_SLICE_NS = 1_000_000
 """The circuits exchange torque at least this often, ns."""
 
@@ -17,8 +18,8 @@ class Coupling(Stateful):
     """Lets two circuits pass time together, in slices after which their motors exchange torque.
 
     Attributes:
-        twist_rad: angle of the first motor ahead of the second's, rad; 0 on a stiff shaft.
-        torque_n_m: torque that the shaft carries from the first motor to the second, N m.
+        twist_rad: angle of the first motor ahead of the second's times the ratio, rad; 0 on a stiff shaft.
+        torque_n_m: torque that the shaft carries from the first motor to the second, N m, at the first.
 
     Its state is the shaft's alone: the two circuits have their own.
     """
@@ -26,7 +27,13 @@ class Coupling(Stateful):
     _kept = ("twist_rad", "torque_n_m")
 
     def __init__(
-        self, first: Circuit, second: Circuit, *, stiffness_n_m_rad: float | None = None, damping_n_m_s: float = 0.0
+        self,
+        first: Circuit,
+        second: Circuit,
+        *,
+        stiffness_n_m_rad: float | None = None,
+        damping_n_m_s: float = 0.0,
+        ratio: float = 1.0,
     ) -> None:
         """Couple two motors; stiff ones begin at their common speed.
 
@@ -35,28 +42,37 @@ class Coupling(Stateful):
             second: another.
             stiffness_n_m_rad: torque per twist, N m/rad; None couples them stiffly.
             damping_n_m_s: torque per difference of speeds, N m s/rad, of an elastic coupling.
+            ratio: speed of the first motor over that of the second; stiffness and damping are those at the first.
 
         Raises:
-            ParameterError: a machine is not a Motor, or a value is outside its range.
+            ParameterError: a machine is not a Motor, a held one is coupled stiffly, or a value is outside its range.
         """
         self.first, self.second = first, second
-        self._one, self._two = _motor(first), _motor(second)
+        self._one, self._two = one, two = _motor(first), _motor(second)
         self.twist_rad = self.torque_n_m = 0.0
+        self._ratio = require("ratio of the coupling", ratio, LEAST_RATIO, MOST_RATIO)
         self._stiffness = stiffness_n_m_rad
         self._damping = require("damping of the coupling in N m s/rad", damping_n_m_s, 0.0)
-        inertias = self._one.inertia_kg_m2, self._two.inertia_kg_m2
         self.slice_ns = LONGEST_SLICE_NS
         if stiffness_n_m_rad is None:
-            self._share = inertias[0] / sum(inertias)
-            speed = self._share * self._one.speed_rad_s + (1 - self._share) * self._two.speed_rad_s
-            self._one.speed_rad_s = self._two.speed_rad_s = speed
-            self._one.inertia_kg_m2 = self._two.inertia_kg_m2 = sum(inertias)
+            self._become_one(one, two)
         else:
             require("stiffness of the coupling in N m/rad", stiffness_n_m_rad, 0.0, above=True)
             # A twentieth of a radian of the shaft's own oscillation and of the damper's decay.
-            swing = sqrt(stiffness_n_m_rad * (1 / inertias[0] + 1 / inertias[1]))
-            decay = self._damping * (1 / inertias[0] + 1 / inertias[1])
-            self.slice_ns = max(1000, min(self.slice_ns, round(0.05e9 / max(swing, decay))))
+            swing = swing_rad_s(one, two, stiffness_n_m_rad, ratio)
+            decay = self._damping * _compliance(one, two, ratio)
+            self.slice_ns = max(1000, min(self.slice_ns, round(0.05e9 / max(swing, decay, 1e-9))))
+
+    def _become_one(self, one: Motor, two: Motor) -> None:
+        """Let each motor turn the inertia of both, at the speed that their momentum gives."""
+        if one.held or two.held:
+            raise ParameterError("a shaft that is held at a speed cannot be coupled stiffly: give it a stiffness")
+        ratio, inertia = self._ratio, two.inertia_kg_m2 / self._ratio**2
+        whole = one.inertia_kg_m2 + inertia
+        self._share = one.inertia_kg_m2 / whole
+        speed = self._share * one.speed_rad_s + (1 - self._share) * two.speed_rad_s * ratio
+        one.speed_rad_s, two.speed_rad_s = speed, speed / ratio
+        one.inertia_kg_m2, two.inertia_kg_m2 = whole, whole * ratio**2
 
     def advance(self, until_ns: int) -> None:
         """Let both circuits pass time to an instant, ns."""
@@ -70,32 +86,49 @@ class Coupling(Stateful):
 
     def _stiff_slice(self, until_ns: int) -> None:
         """Let each motor turn the whole inertia with its own torque and what the other's was; then add both."""
-        one, two = self._one, self._two
-        before, inertia = one.speed_rad_s, one.inertia_kg_m2
+        one, two, ratio = self._one, self._two, self._ratio
         time_s = (until_ns - self.first.now_ns) * 1e-9
-        gained = []
-        for circuit, motor in ((self.first, one), (self.second, two)):
-            helped = motor.coupling_n_m
-            circuit.advance(until_ns)
-            gained.append(inertia * (motor.speed_rad_s - before) - helped * time_s)
-        speed = before + sum(gained) / inertia
-        one.speed_rad_s = two.speed_rad_s = speed
-        one.acceleration = two.acceleration = sum(gained) / inertia / time_s
-        one.coupling_n_m, two.coupling_n_m = gained[1] / time_s, gained[0] / time_s
+        began = one.speed_rad_s
+        first = _gain(self.first, one, until_ns, time_s)
+        second = _gain(self.second, two, until_ns, time_s)
+        impulse = first + second / ratio
+        speed = began + impulse / one.inertia_kg_m2
+        one.speed_rad_s, two.speed_rad_s = speed, speed / ratio
+        one.acceleration = impulse / one.inertia_kg_m2 / time_s
+        two.acceleration = one.acceleration / ratio
+        one.coupling_n_m, two.coupling_n_m = second / ratio / time_s, first * ratio / time_s
         # What the first does not need to turn its own part goes to the second.
-        self.torque_n_m = gained[0] / time_s - self._share * sum(gained) / time_s
+        self.torque_n_m = (first - self._share * impulse) / time_s
 
     def _elastic_slice(self, until_ns: int) -> None:
         """Let the torque of the middle of the slice act on both (leapfrog)."""
-        one, two, stiffness = self._one, self._two, self._stiffness or 0.0
+        one, two, stiffness, ratio = self._one, self._two, self._stiffness or 0.0, self._ratio
         half_s = (until_ns - self.first.now_ns) * 0.5e-9
-        slip = one.speed_rad_s - two.speed_rad_s
+        slip = one.speed_rad_s - ratio * two.speed_rad_s
         torque = stiffness * (self.twist_rad + slip * half_s) + self._damping * slip
-        one.coupling_n_m, two.coupling_n_m = -torque, torque
+        one.coupling_n_m, two.coupling_n_m = -torque, ratio * torque
         self.first.advance(until_ns)
         self.second.advance(until_ns)
-        self.twist_rad += (slip + one.speed_rad_s - two.speed_rad_s) * half_s
+        self.twist_rad += (slip + one.speed_rad_s - ratio * two.speed_rad_s) * half_s
         self.torque_n_m = torque
+
+
+def swing_rad_s(one: Motor, two: Motor, stiffness_n_m_rad: float, ratio: float) -> float:
+    """Return how fast two motors swing on a spring, rad/s; 0 where both are held."""
+    return sqrt(stiffness_n_m_rad * _compliance(one, two, ratio))
+
+
+def _compliance(one: Motor, two: Motor, ratio: float) -> float:
+    """Return the acceleration of the slip that a torque at the first motor makes, 1/(kg m2)."""
+    first = 0.0 if one.held else 1.0 / one.inertia_kg_m2
+    return first if two.held else first + ratio**2 / two.inertia_kg_m2
+
+
+def _gain(circuit: Circuit, motor: Motor, until_ns: int, time_s: float) -> float:
+    """Let a circuit pass time; return the angular momentum that its motor gained by itself, N m s."""
+    before, helped = motor.speed_rad_s, motor.coupling_n_m
+    circuit.advance(until_ns)
+    return motor.inertia_kg_m2 * (motor.speed_rad_s - before) - helped * time_s
 
 
 def _motor(circuit: Circuit) -> Motor:

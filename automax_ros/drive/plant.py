@@ -5,9 +5,10 @@ A controller commands gates and the contactor; everybody else looks, loads the s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import pi
+from math import inf, pi
 
 from automax_ros.drive.ac_line import AcLine, Rotation
 from automax_ros.drive.bridge import Bridge
@@ -116,6 +117,7 @@ class DrivePlant(Stateful):
         self._contacts: list[tuple[int, bool]] = []
         self.notes: list[str] = []
         self.sag_end_ns = 0
+        self._together: Callable[[int], None] | None = None
 
     def _motor(self) -> Motor:
         data, load = self.data.parameters.motor, self.data.load
@@ -149,16 +151,31 @@ class DrivePlant(Stateful):
         return self.circuit.now_ns
 
     def advance(self, until_ns: int) -> None:
-        """Let time pass to an instant, ns; an instant that has passed is the present."""
+        """Let time pass to an instant, ns, for coupled plants too; an instant that has passed is the present."""
+        if self._together is not None:
+            self._together(until_ns)
+            return
         while self._contacts and self._contacts[0][0] <= until_ns:
-            at_ns, closed = self._contacts.pop(0)
-            self.circuit.advance(max(at_ns, self.circuit.now_ns))
-            if closed:
-                self.circuit.close_contactor()
-            else:
-                self.circuit.open_contactor()
+            self.circuit.advance(max(self._contacts[0][0], self.circuit.now_ns))
+            self.switch_contacts()
         if until_ns > self.circuit.now_ns:
             self.circuit.advance(until_ns)
+
+    def go_together(self, advance: Callable[[int], None]) -> None:
+        """Let somebody pass this plant's time with another's: ``plant_coupling``."""
+        self._together = advance
+
+    @property
+    def contacts_ns(self) -> float:
+        """When the contactor's contacts move next, ns; infinite while they rest."""
+        return self._contacts[0][0] if self._contacts else inf
+
+    def switch_contacts(self) -> None:
+        """Move the contacts, now."""
+        if self._contacts.pop(0)[1]:
+            self.circuit.close_contactor()
+        else:
+            self.circuit.open_contactor()
 
     def relay(self, *, on: bool) -> None:
         """Turn the contactor's relay on or off, now: the contacts follow."""

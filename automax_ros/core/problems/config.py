@@ -78,6 +78,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6475", "Motor Overload Ratio of a drive"),
     Problem("AMX6476", "name of a plant"),
     Problem("AMX6477", "line, load or inertia of a plant"),
+    Problem("AMX6478", "coupling of two plants"),
     Problem("AMX6520", "drive of a 57C405"),
     Problem("AMX6521", "armature voltage of a drive wired twice"),
     Problem("AMX6522", "plant of a 57C406 without a motor"),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from automax_ros.drive.nameplate import derive
 from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
+from automax_ros.drive.plant_coupling import CoupledPlants
 from automax_ros.rack.plants.config import PlantConfig
 
 
@@ -14,6 +15,21 @@ def build_plants(configs: Iterable[PlantConfig]) -> dict[str, DrivePlant]:
     """Return the plants that have a motor, by name, at rest."""
     found = ((config.name, plant_data(config)) for config in configs)
     return {name: DrivePlant(data) for name, data in found if data is not None}
+
+
+def couple_plants(plants: Mapping[str, DrivePlant], configs: Iterable[PlantConfig]) -> dict[str, CoupledPlants]:
+    """Couple plants at their start; return the couplings by the names of both, ``UNWIND+WINDER``.
+
+    Raises:
+        ParameterError: two plants cannot be coupled so.
+    """
+    return {
+        f"{config.name}+{config.couple.to}": CoupledPlants(
+            plants[config.name], plants[config.couple.to], config.couple.data
+        )
+        for config in configs
+        if config.couple is not None
+    }
 
 
 def plant_data(config: PlantConfig) -> PlantData | None:

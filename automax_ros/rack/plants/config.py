@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from automax_ros.drive.nameplate import EXAMPLES, NamePlate
+from automax_ros.drive.plant_coupling import CouplingData
 
 MOTORS = {"dc_10hp_240v": "10hp", "dc_150hp_500v": "150hp", "dc_800hp_700v": "800hp"}
 """Motors that a plant may have by name, each with its name in ``drive/nameplate``."""
@@ -52,6 +53,15 @@ class LoadConfig:
 
 
 @dataclass(frozen=True)
+class CoupleConfig:
+    """What a plant's shaft is coupled to: the plant of a name, and how; ``line`` is the line of the file."""
+
+    to: str
+    data: CouplingData
+    line: int = 0
+
+
+@dataclass(frozen=True)
 class PlantConfig:
     """A plant.
 
@@ -64,6 +74,7 @@ class PlantConfig:
         supply: the AC line.
         load: what the motor turns.
         inertia: inertia of motor and load over the motor's own.
+        couple: what its shaft is coupled to, None for nothing, or where the other plant says so.
     """
 
     name: str
@@ -73,10 +84,11 @@ class PlantConfig:
     supply: SupplyConfig = field(default_factory=SupplyConfig)
     load: LoadConfig = field(default_factory=LoadConfig)
     inertia: float = 1.0
+    couple: CoupleConfig | None = None
 
     @property
     def plate(self) -> NamePlate | None:
-        """The motor's plate with the line of this plant, None without a motor."""
+        """The motor's plate, None without a motor."""
         if self.motor is None:
             return None
         return self.motor if isinstance(self.motor, NamePlate) else EXAMPLES[MOTORS[self.motor]]

@@ -16,14 +16,15 @@ from automax_ros.drive.nameplate import NamePlate
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.plants.building import plant_data
 from automax_ros.rack.plants.config import MOTORS, LoadConfig, PlantConfig, SupplyConfig
+from automax_ros.rack.plants.couples import check_couples, read_couple
 from automax_ros.rack.plants.keys import read_inertia, read_load, read_supply
 from automax_ros.rack.scalars import integer_value, number_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 
 MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
 """Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
-_SIMULATED = ("line", "load", "inertia")
-_NOT_YET = ("couple", "feeds")
+_SIMULATED = ("line", "load", "inertia", "couple")
+_NOT_YET = ("feeds",)
 KEYS = ("motor", "motor_overload_ratio", *_SIMULATED, *_NOT_YET)
 """What may be said of a plant."""
 _PLATE = ("hp", "volts", "rpm", "amps", "resistance_ohm", "inductance_h", "inertia_kg_m2")
@@ -80,6 +81,8 @@ def read_plants(node: Node | None, findings: Findings) -> Plants:
         else:
             places[name] = key.span
             plants.known[name] = _plant(name, key, value, findings)
+    if plants.complete:
+        check_couples(plants.known, findings)
     return plants
 
 
@@ -91,7 +94,7 @@ def _plant(name: str, key: Scalar, node: Node, findings: Findings) -> PlantConfi
             message = f"{option} of {what} is not supported yet: the emulator does not simulate plants"
             findings.add("AMX6472", message, section.key_span(option), "leave it out")
     ratio, motor = section.get("motor_overload_ratio"), section.get("motor")
-    line, load, inertia = (section.get(option) for option in _SIMULATED)
+    line, load, inertia, couple = (section.get(option) for option in _SIMULATED)
     needless = next((option for option in _SIMULATED if option in section), "")
     if motor is None and needless:
         findings.add("AMX6009", f"{what} has {needless} and no motor: it is not simulated", section.key_span(needless))
@@ -103,6 +106,7 @@ def _plant(name: str, key: Scalar, node: Node, findings: Findings) -> PlantConfi
         read_supply(line, what, findings) if line else SupplyConfig(),
         read_load(load, what, findings) if load else LoadConfig(),
         read_inertia(inertia, what, findings) if inertia else 1.0,
+        read_couple(couple, what, findings) if couple else None,
     )
     if not findings.errors:
         _check_data(config, key.span, findings)

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from automax_ros.drive.errors import DriveError
 from automax_ros.drive.plant import DrivePlant
+from automax_ros.drive.plant_coupling import CoupledPlants
 from automax_ros.drive.state import SavedState
-from automax_ros.rack.plants.building import build_plants
+from automax_ros.rack.plants.building import build_plants, couple_plants
 from automax_ros.rack.plants.config import PlantConfig
 
 
 class RackPlants(Mapping[str, DrivePlant]):
     """The plants with a motor, by name. They go on whatever becomes of the rack's power."""
 
-    def __init__(self, configs: Iterable[PlantConfig]) -> None:
-        """Make all plants, at rest."""
+    def __init__(self, configs: Sequence[PlantConfig]) -> None:
+        """Make all plants, at rest, and couple them."""
         self._plants = build_plants(configs)
+        self._parts: dict[str, DrivePlant | CoupledPlants] = {
+            **self._plants,
+            **couple_plants(self._plants, configs),
+        }
 
     def __getitem__(self, name: str) -> DrivePlant:
         return self._plants[name]
@@ -28,8 +33,8 @@ class RackPlants(Mapping[str, DrivePlant]):
         return len(self._plants)
 
     def state(self) -> dict[str, SavedState]:
-        """Return all that their future depends on, by name."""
-        return {name: plant.state() for name, plant in self._plants.items()}
+        """Return all that their future depends on, by name; what is between two plants by the names of both."""
+        return {name: part.state() for name, part in self._parts.items()}
 
     def load(self, state: Mapping[str, SavedState]) -> None:
         """Take a state over.
@@ -37,10 +42,10 @@ class RackPlants(Mapping[str, DrivePlant]):
         Raises:
             ValueError: it is not that of these plants.
         """
-        if set(state) != set(self._plants):
+        if set(state) != set(self._parts):
             raise ValueError("the state is that of a rack with other plants")
         try:
-            for name, plant in self._plants.items():
-                plant.restore(state[name])
+            for name, part in self._parts.items():
+                part.restore(state[name])
         except DriveError as error:
             raise ValueError(f"the state of a plant does not fit: {error}") from error
