@@ -25,9 +25,10 @@ plants:
 """
 
 
-def text(
-    first: str = "A: WINDER", second: str = "B: REEL", winder: str = "{motor: dc_10hp_240v}", reel: str = "{}"
-) -> str:
+MOTOR = "{motor: dc_10hp_240v}"
+
+
+def text(first: str = "A: WINDER", second: str = "B: REEL", winder: str = MOTOR, reel: str = "{}") -> str:
     return HEAD.format(first=first, second=second, winder=winder, reel=reel)
 
 
@@ -68,7 +69,7 @@ def test_each_drive_has_its_plant(tmp_path):
         (
             {
                 "winder": "{motor: dc_10hp_240v, couple: {to: REEL, damping_nms_per_rad: 1}}",
-                "reel": "{motor: dc_10hp_240v}",
+                "reel": MOTOR,
             },
             "AMX6478",
             7,
