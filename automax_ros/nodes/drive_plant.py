@@ -1,8 +1,8 @@
 """The node ``drive_plant_SLOT`` (``drive_plant_SLOT_A`` and ``_B`` of a UDC): the plant that a drive turns.
 
 Publishes: ``joint_states`` (sensor_msgs/JointState), the shaft as a joint with the plant's name, and ``plants/NAME``
-(automax_msgs/PlantState), both 100 times a second of rack time; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once
-per second.
+(automax_msgs/PlantState), both 100 times per second of rack time; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray)
+once per second.
 
 Subscribes: ``plants/NAME/load_torque/set`` (std_msgs/Float64, N m) where the plant's load says ``ros: in``, and no
 other topic. A torque counts from the instant at which it comes. Observers are told of no operation: PlantState shows

@@ -128,7 +128,7 @@ class _Loops:
                 message = (
                     f"{names} of the same Processor goes before the current minor loop (priority {loop.task.priority})"
                 )
-                hint = "give this task the highest priority: its scans are due 360 times a second at 60 Hz"
+                hint = "give this task the highest priority: its scans are due 360 times per second at 60 Hz"
                 yield loop.found("AMX6492", message, hint)
 
     def registers(self) -> Iterator[_Found]:
