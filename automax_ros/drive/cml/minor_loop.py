@@ -7,7 +7,7 @@ Given the same state and the same of both it does the same, so a recorded drive 
 from __future__ import annotations
 
 from collections.abc import Sequence as Numbers
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from automax_ros.drive.cml.current_control import CurrentControl
 from automax_ros.drive.cml.faults import Faults
@@ -37,8 +37,10 @@ _REGISTERS = {
 """The registers of the 57C406 at task initialisation (52.7): what they were before does not count."""
 
 
-@dataclass(frozen=True)
-class Outcome:
+_SCR_TEST, _RUN = Phase.SCR_TEST, Phase.RUN
+
+
+class Outcome(NamedTuple):
     """What a scan gives.
 
     Attributes:
@@ -102,12 +104,13 @@ class CurrentMinorLoop(Stateful):
         if ticked:
             problems += self._read(measured, inputs)
         self.control.feed_back(measured, self.latched.lim_bar, pll.period_ns)
-        verdict = self._judge(measured)
+        verdict = self._judge(measured) if sequence.phase is _SCR_TEST else GO_ON
         causes = self.faults.causes(measured, inputs, self.latched, pll, running=sequence.running)
         problems += self._protect(measured, causes, verdict)
         if ticked:
             self._follow_run(now_ns, measured, inputs, causes)
-        problems += self._go_on(now_ns, inputs, verdict)
+        if sequence.under_way:
+            problems += self._go_on(now_ns, inputs, verdict)
         pulses = self._fire(measured)
         block, ok = not sequence.running or self.control.block, self.latched.usable and not self.faults.active
         command = Command(pll.next_ns, sequence.relays, pulses, self.latched.ioc_thresh, block, ok)
@@ -130,19 +133,18 @@ class CurrentMinorLoop(Stateful):
         return problems
 
     def _judge(self, measured: Measured) -> int:
-        """Return what the shorted SCR test says, if one is under way."""
-        if self.sequence.phase is not Phase.SCR_TEST:
-            return GO_ON
+        """Return what the shorted SCR test says."""
         return self.scr_test.judge(measured, reverse=_reverse(measured))
 
     def _protect(self, measured: Measured, causes: int, verdict: int) -> list[int]:
         """Latch faults; with one, without the permissive, or by CML_COAST_STOP the drive coasts; return problems."""
         faults, sequence = self.faults, self.sequence
         problems = faults.blame(verdict) if verdict > PASSED else []
-        problems += faults.latch(causes)
-        if sequence.phase is not Phase.STANDBY:
+        if causes:
+            problems += faults.latch(causes)
+        if sequence.phase:
             called = sequence.running and self.latched.cml_coast_stop
-            if called or faults.stops(self.latched) or not measured.status & PERMISSIVE:
+            if called or not measured.status & PERMISSIVE or (faults.active and faults.stops(self.latched)):
                 sequence.coast()
         return problems
 
@@ -162,7 +164,7 @@ class CurrentMinorLoop(Stateful):
         if sequence.closed(now_ns) and self._tests_scrs:
             sequence.test(now_ns)
             self.scr_test.begin(both=latched.both_bridges)
-        elif sequence.closed(now_ns) or (sequence.phase is Phase.SCR_TEST and verdict == PASSED):
+        elif sequence.closed(now_ns) or (sequence.phase is _SCR_TEST and verdict == PASSED):
             return self._begin_run(now_ns, inputs)
         elif sequence.stopped(now_ns, dropout_s=latched.max_m_dropout, discontinuous=self.control.discontinuous):
             sequence.coast()
@@ -181,12 +183,12 @@ class CurrentMinorLoop(Stateful):
         """Plan the gates up to the next interrupt, as the regulator or the test in use has them."""
         pll, latched, phase = self.pll, self.latched, self.sequence.phase
         reverse = _reverse(measured)
-        if phase < Phase.RUN:
+        if not self.sequence.running:
             none = self.control.off(pll)
-            if phase is Phase.SCR_TEST:
+            if phase is _SCR_TEST:
                 return self.scr_test.fire(pll.position, pll.period_ns, reverse=reverse)
             return none
-        stopping = phase is Phase.STOPPING
+        stopping = phase is not _RUN
         if latched.cml_test:
             delta_us = 0.0 if stopping else (180 - latched.test_alpha) * pll.period_ns / 360_000
             pulses = self.control.open_loop(delta_us, 2 if latched.test_brpol else 1, pll, reverse=reverse)

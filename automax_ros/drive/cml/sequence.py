@@ -27,6 +27,10 @@ class Phase(enum.IntEnum):
     """The current is brought to zero, then the contactor opens."""
 
 
+_RUN = int(Phase.RUN)
+_WAITING = (Phase.CLOSING, Phase.SCR_TEST, Phase.STOPPING)
+
+
 class Sequence(Stateful):
     """The state machine.
 
@@ -47,7 +51,12 @@ class Sequence(Stateful):
     @property
     def running(self) -> bool:
         """DC_CML_STATE: TRUE until a stop has opened the contactor (decision)."""
-        return self.phase >= Phase.RUN
+        return self.phase >= _RUN
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a start or stop waits for its next step."""
+        return self.phase in _WAITING
 
     def tick(self, now_ns: int, *, run: bool, may_start: bool, relay: int) -> None:
         """Follow CML_RUN at a tick; ``may_start``: locked, permitted, no fault."""
