@@ -1,0 +1,170 @@
+"""Recordings of a rack with a drive: its loop runs again without the plant, and an edit shows at its first scan."""
+
+from __future__ import annotations
+
+import pytest
+from rack.drive_tasks import CML, SPEED, rack_of
+
+from automax_ros.bags.reader import BagReader
+from automax_ros.bags.recorder import RecordingOptions
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.replay.report import Kind
+from automax_ros.running.drive_record import COMMAND_VIEW, MEASURED_VIEW
+from automax_ros.wire.messages import Scan
+
+from .replays import edited, record, replayed
+
+SECONDS = 2.0
+HAPPENS = {
+    0: (("PERMIT@", True), ("SPEED%", 1000), ("SPEED_REF%", 3000)),
+    6: (("START@", True),),
+    10: (("SPEED_REF%", -2000),),
+    13: (("OSV%", 6000),),
+    14: (("OSV%", 0), ("START@", False), ("RESET@", True)),
+    15: (("START@", True), ("RESET@", False)),
+}
+"""In twentieths of the run: a start, a reversal, a trip, its reset and a second start."""
+
+
+def happens(rack, number):
+    for name, value in HAPPENS.get(number, ()):
+        rack.write(name, value)
+
+
+def recording(folder, steps=happens, *, options=None, **changes):
+    return record(rack_of(folder, **changes), folder / "bag", steps, seconds=SECONDS, options=options)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    return recording(tmp_path_factory.mktemp("drive"))
+
+
+def scans_of(bag, task="CML"):
+    return [
+        item.message
+        for item in BagReader(bag).messages()
+        if isinstance(item.message, Scan) and item.message.task == task
+    ]
+
+
+def test_drive_runs_again_without_its_plant(bag):
+    report = replayed(bag)
+    assert report.identical, report.text()
+    loop = next(task for task in report.tasks if task.name == "CML")
+    assert loop.scans == 721
+    assert loop.states >= 1
+    errors = [error.code for scan in scans_of(bag) for error in scan.errors]
+    assert 7113 in errors, "the recording has a fault that runs again"
+
+
+def test_recording_is_small(bag):
+    """A drive at rest takes a few numbers a scan, one that runs some more: 720 scans are not a burden."""
+    scans = scans_of(bag)
+    views = [sum(view in (MEASURED_VIEW, COMMAND_VIEW) for view in scan.read.variable) for scan in scans]
+    assert max(views[10:200]) <= 9
+    assert max(views) <= 24
+    assert sum(path.stat().st_size for path in bag.glob("*.mcap")) < 500_000
+
+
+def test_edited_gain_shows_at_the_first_scan_that_regulates(bag):
+    report = replayed(bag, {"CML": edited(CML, ("KP=0.2", "KP=0.25"))})
+    running = next(scan for scan in scans_of(bag) if scan.stamp > 0.6 * NS_PER_S and len(scan.read.variable) > 15)
+    assert report.first.task == "CML"
+    assert report.first.scan == running.scan
+    (pulses,) = [item for item in report.first.differences if item.kind is Kind.COMMAND]
+    assert pulses.name == "gate pulses commanded to the 57C406"
+    assert " at " in pulses.first.recorded
+    assert pulses.first.recorded != pulses.first.replayed
+    assert "57C406 status" in report.text()
+    assert not any(item.task != "CML" for item in report.differences), "others saw what was recorded"
+
+
+def test_edit_that_changes_nothing_is_identical(bag):
+    assert replayed(bag, {"CML": edited(CML, ("1010 SCANS%", "1009 ! nothing\n1010 SCANS%"))}).identical
+
+
+def test_edited_level_shows_at_the_first_scan(bag):
+    report = replayed(bag, {"CML": edited(CML, ("IOC_THRESH=250", "IOC_THRESH=240"))})
+    assert [item.name for item in report.first.differences] == ["overcurrent level commanded to the 57C406"]
+    assert report.first.scan == 1
+    assert (report.first.differences[0].first.recorded, report.first.differences[0].first.replayed) == (
+        "250 %",
+        "240 %",
+    )
+
+
+def test_tolerance_passes_over_commands(bag):
+    report = replayed(bag, {"CML": edited(CML, ("IOC_THRESH=250", "IOC_THRESH=240"))}, tolerance=1)
+    assert report.identical
+
+
+def test_loop_that_became_another_task_commands_nothing(bag):
+    other = "10 COMMON REF%\n1000 CALL SCAN_LOOP(TICKS=1)\n1010 END\n"
+    report = replayed(bag, {"CML": other})
+    assert {item.first.replayed for item in report.differences if item.kind is Kind.COMMAND} == {"no command"}
+
+
+def test_edited_speed_loop_shows_its_own_first_difference(bag):
+    report = replayed(bag, {"SPEED": edited(SPEED, ("CURRENT=8192", "CURRENT=8000"))})
+    assert report.first.task == "SPEED"
+    assert [item.name for item in report.first.differences] == ["REF%"]
+
+
+@pytest.mark.parametrize("from_s", [0.5, 0.65, 1.02, 1.32, 1.61])
+def test_replay_begins_at_a_state_inside(tmp_path_factory, from_s):
+    """Split files begin with the states of the tasks: the loop goes on from the numbers that are in them."""
+    folder = tmp_path_factory.mktemp("split")
+    bag = recording(folder, options=RecordingOptions(split_ns=NS_PER_S // 8))
+    report = replayed(bag, from_ns=round(from_s * NS_PER_S))
+    assert report.identical, report.text()
+    loop = next(task for task in report.tasks if task.name == "CML")
+    assert loop.states >= 2
+    assert loop.scans == pytest.approx((SECONDS - from_s) * 360, abs=2)
+    different = replayed(bag, {"CML": edited(CML, ("KP=0.2", "KP=0.3"))}, from_ns=round(from_s * NS_PER_S))
+    assert different.first.time_s >= from_s
+
+
+def test_modeled_recording_runs_again(tmp_path):
+    report = replayed(recording(tmp_path, extra="execution: modeled\n"))
+    assert report.identical, report.text()
+
+
+def test_what_is_under_a_force_is_recorded(tmp_path):
+    def forced(rack, number):
+        happens(rack, number)
+        if number == 4:
+            rack.force("OSV%", 100)
+            rack.force("REF%", 1200)
+        if number == 17:
+            rack.unforce("OSV%")
+            rack.unforce("REF%")
+
+    bag = recording(tmp_path, forced)
+    assert 7113 in [error.code for scan in scans_of(bag) for error in scan.errors], "it trips under the force"
+    report = replayed(bag)
+    assert report.identical, report.text()
+
+
+def test_operations_on_the_loop_run_again(tmp_path):
+    def operated(rack, number):
+        happens(rack, number)
+        if number == 11:
+            rack.operations.stop("CML")
+        if number == 12:
+            rack.operations.run("CML")
+        if number == 16:
+            rack.operations.stop_all("test")
+        if number == 17:
+            rack.operations.run_all()
+
+    report = replayed(recording(tmp_path, operated))
+    assert report.identical, report.text()
+
+
+def test_local_diagnostic_data_is_state(tmp_path):
+    local = edited(CML, (", DIAG%(37,1)\n20 LOCAL", "\n20 LOCAL DIAG%(37,1),"))
+    bag = recording(tmp_path, cml=local)
+    report = replayed(bag)
+    assert report.identical, report.text()
+    assert all(not scan.written.variable for scan in scans_of(bag))
