@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -140,6 +141,17 @@ def test_whatever_stops_the_rack_stops_the_drive(tmp_path, how):
     assert plant.motor.speed_rad_s <= speed
 
 
+def test_a_force_on_a_relay_changes_what_its_point_shows_only(tmp_path):
+    rack = started(tmp_path)
+    rack.force("FMCR@", False)
+    rack.run(0.1)
+    assert [rack.value(name) for name in ("FMCR@", "STATE@")] == [False, True]
+    assert rack.plants["UNWIND"].bridge.wiring.armature_closed
+    rack.unforce("FMCR@")
+    rack.run(0.01)
+    assert rack.value("FMCR@") is True
+
+
 def test_losing_the_permissive_stops_the_drive(tmp_path):
     rack = started(tmp_path)
     rack.write("PERMIT@", False)
@@ -263,3 +275,43 @@ def test_a_rack_with_a_drive_goes_on_from_a_state_bit_for_bit(tmp_path, slots, d
     assert rack.state() == other.state()
     assert rack.value("STATE@") is True
     assert rack.task("CML").scan_number == other.task("CML").scan_number > 300
+
+
+TWO = """\
+0: {module: 57C413}
+  1: {module: 57C435, tasks: {CML: {priority: 5}}}
+  2: {module: 57C435, tasks: {SECOND: {priority: 4}, WORK: {priority: 8}}}
+  7: {module: 57C406, plant: UNWIND}
+  6: {module: 57C406, plant: WINDER}
+  10: {module: 57C408}"""
+
+
+def test_two_drives_of_a_rack_do_not_disturb_each_other(tmp_path):
+    """The first one is, bit for bit, what it is alone, though both interrupt at the same instants."""
+    own = [name for name in COMMONS if name != "REF%"]
+    second = re.sub("|".join(own), lambda found: f"{found[0][:-1]}2{found[0][-1]}", CML)
+    second = second.replace("IO_CNTL_SLOT=SLOT", "IO_CNTL_SLOT=6").replace("DIG_IO_SLOT=8", "DIG_IO_SLOT=10")
+    (tmp_path / "SECOND.BLK").write_text(second)
+    alone = started(tmp_path)
+    commons = "".join(f"  {name[:-1]}2{name[-1]}: {{}}\n" for name in own)
+    commons += "  PERMIT2@: {slot: 10, register: 0, bit: 0}\n"
+    built(tmp_path)
+    text = (tmp_path / "rack.yaml").read_text().replace(ALONE, TWO) + commons
+    (tmp_path / "rack.yaml").write_text(text.replace("plants:\n", "plants:\n  WINDER: {motor: dc_10hp_240v}\n"))
+    found = load(tmp_path / "rack.yaml")
+    assert found.config is not None, found.diagnostics
+    both = Rack(found.config)
+    both.start()
+    for name in ("PERMIT@", "PERMIT2@"):
+        both.write(name, True)
+    both.write("SPEED%", 2000)
+    both.write("SPEED2%", 2000)
+    both.run(0.6)
+    both.write("RUN@", True)
+    both.write("RUN2@", True)
+    both.run(0.5)
+    both.write("REF%", 1500)
+    both.run(0.5)
+    assert both.value("STATE2@") is True
+    assert both.plants["WINDER"].motor.speed_rad_s > 10
+    assert both.plants["UNWIND"].state() == alone.plants["UNWIND"].state()
