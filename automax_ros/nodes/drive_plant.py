@@ -13,7 +13,7 @@ The plant is the scheduler's: nothing here lets its time pass, and nothing waits
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Float64
@@ -21,18 +21,10 @@ from std_msgs.msg import Float64
 from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.rack.controls import Controls
-from automax_ros.rack.modules.drive_interrupts import InterruptTiming
+from automax_ros.rack.modules.drive_interrupts import Timed
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.plants.driven import DrivenPlant
 from automax_ros.rack.ros_names import load_topic
-
-
-@runtime_checkable
-class _Timed(Protocol):
-    """A module that counts how its interrupts keep their time."""
-
-    @property
-    def timing(self) -> InterruptTiming: ...
 
 
 class DrivePlantNode(ModuleNode):
@@ -46,7 +38,7 @@ class DrivePlantNode(ModuleNode):
         site.stream.add_sink(outlets.get)
         modules = {module.config.slot: module for module in site.rack.modules}
         module = modules[driven.slot]
-        self._timing = module.timing if isinstance(module, _Timed) else None
+        self._timing = module.timing if isinstance(module, Timed) else None
         self._late_told = 0
         self._controls = Controls(site.rack)
         if driven.config.load.from_ros:
