@@ -66,10 +66,10 @@ def traces(bag: Path, names: Sequence[str], window: Window = WHOLE_RUN, progress
     Raises:
         BagError: the recording cannot be read, a name is unknown or a text, there are too many, or the window is empty.
     """
-    errors = _Errors()
+    errors = ErrorMarks()
     series = Series(bag, names, window, progress, errors.take)
     _check_names(bag, series.columns)
-    courses = [_Course() for _ in series.columns]
+    courses = [Course() for _ in series.columns]
     for time, changed in series.changes():
         for index, value in changed.items():
             assert not isinstance(value, str)
@@ -101,14 +101,15 @@ def thinned(times: Floats, values: Floats, columns: int) -> tuple[Floats, Floats
     return times[kept], values[kept]
 
 
-class _Course:
-    """One line while it grows."""
+class Course:
+    """One line while it grows: times in s that do not fall, numbers that are finite; bounded in size."""
 
     def __init__(self) -> None:
         self._times = array("d")
         self._values = array("d")
 
     def append(self, time_s: float, value: float) -> None:
+        """Add a value; a time before the last one counts as that."""
         if self._times and time_s < self._times[-1]:
             time_s = self._times[-1]
         self._times.append(time_s)
@@ -118,17 +119,19 @@ class _Course:
             self._times, self._values = array("d", times.tobytes()), array("d", values.tobytes())
 
     def line(self) -> tuple[Floats, Floats]:
+        """Return the times and the values."""
         return np.array(self._times, np.float64), np.array(self._values, np.float64)
 
 
-class _Errors:
-    """The errors of all tasks, the first ones with their places."""
+class ErrorMarks:
+    """The errors of all tasks: the first ones with their places, and how many more there were."""
 
     def __init__(self) -> None:
         self.marks: list[ErrorMark] = []
         self.unmarked = 0
 
     def take(self, time_ns: int, scan: Scan) -> None:
+        """Take the errors of a scan; its time counts from the start of the run."""
         for error in scan.errors:
             if len(self.marks) < MAX_ERRORS:
                 self.marks.append(ErrorMark(time_ns / NS_PER_S, scan.task, error.line, error.code))

@@ -90,7 +90,15 @@ def write_report(path: Path, report: Mapping[str, Any]) -> None:
     Raises:
         UsageError: it cannot be written.
     """
-    text = json.dumps(report, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    write_text(path, json.dumps(report, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text, as a whole or not at all where the file is a regular one; a link stays a link.
+
+    Raises:
+        UsageError: it cannot be written.
+    """
     try:
         with written_whole(path) as place, open(place, "w", encoding="utf-8", opener=open_at_once) as stream:
             stream.write(text)

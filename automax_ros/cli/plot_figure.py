@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -81,15 +82,27 @@ def save(figure: Any, path: Path) -> None:
     Raises:
         UsageError: the file cannot be written.
     """
-    import matplotlib as mpl
-
-    date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(path.suffix.lower().lstrip("."), {})
     try:
-        with mpl.rc_context({"svg.hashsalt": "automax"}), warnings.catch_warnings(), written_whole(path) as place:
-            warnings.simplefilter("ignore")  # characters that the font lacks, lanes too low for their labels
-            figure.savefig(place, dpi=DPI, metadata=date)
+        with written_whole(path) as place:
+            _draw_into(figure, place, path.suffix.lower().lstrip("."))
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+def picture_of(figure: Any) -> bytes:
+    """Return the figure as a PNG file. The same figure gives the same bytes."""
+    stream = io.BytesIO()
+    _draw_into(figure, stream, "png")
+    return stream.getvalue()
+
+
+def _draw_into(figure: Any, place: Path | io.BytesIO, kind: str) -> None:
+    import matplotlib as mpl
+
+    date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
+    with mpl.rc_context({"svg.hashsalt": "automax"}), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # characters that the font lacks, lanes too low for their labels
+        figure.savefig(place, dpi=DPI, metadata=date, format=kind)
 
 
 def _lanes(lines: Sequence[Line], separate: bool) -> list[list[Line]]:

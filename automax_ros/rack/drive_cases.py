@@ -45,9 +45,6 @@ def _case(
         return Unjudged(drive.name, drive.where, f"without {lacking} in the rack file there is nothing to compute from")
     registers = _Registers(config, drive.slot, programs)
     inputs = given_inputs(drive, config, programs, settings)
-    if drive.plant is not None and drive.plant.motor_overload_ratio is not None and "LIM_BAR" not in inputs:
-        ratio = drive.plant.motor_overload_ratio
-        inputs["LIM_BAR"] = Given(ratio, f"{ratio} (motor_overload_ratio)")
     return DriveCase(
         name=drive.name,
         where=drive.where,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
@@ -20,19 +19,10 @@ from automax_ros.rack.config import RackConfig
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.plants.building import plant_data
 from automax_ros.rack.plants.config import PlantConfig
+from automax_ros.rack.plants.driven import Driving
 
 SLOT = "IO_CNTL_SLOT"
 """The input of the loop that names its 57C406."""
-
-
-@runtime_checkable
-class _DrivesOne(Protocol):
-    plant: PlantConfig | None
-
-
-@runtime_checkable
-class _DrivesSome(Protocol):
-    plants: Mapping[str, PlantConfig]
 
 
 @dataclass(frozen=True)
@@ -90,14 +80,12 @@ def rack_drives(config: RackConfig, programs: Iterable[Program]) -> list[RackDri
     loops = {slot: program for program in programs if (slot := _slot_of(program)) is not None}
     found: list[RackDrive] = []
     for module in config.modules:
-        slot, program = module.slot, loops.pop(module.slot, None)
-        if isinstance(module, _DrivesSome):
-            found += [RackDrive(module, slot, letter, plant) for letter, plant in module.plants.items()]
-        elif isinstance(module, _DrivesOne) and (module.plant is not None or program is not None):
-            found.append(RackDrive(module, slot, "", module.plant, program))
-        elif program is not None:
-            found.append(RackDrive(module, slot, "", None, program))
-    found += [RackDrive(None, slot, "", None, program) for slot, program in loops.items()]
+        loop = loops.pop(module.slot, None)
+        plants = module.plants if isinstance(module, Driving) else {}
+        found += [RackDrive(module, module.slot, item, plant, None if item else loop) for item, plant in plants.items()]
+        if loop is not None and "" not in plants:
+            found.append(RackDrive(module, module.slot, program=loop))
+    found += [RackDrive(None, slot, program=loop) for slot, loop in loops.items()]
     return sorted(found, key=lambda drive: (drive.slot, drive.letter))
 
 
@@ -112,12 +100,15 @@ def given_inputs(
 ) -> dict[str, Given]:
     """Return what is programmed for the inputs of a drive's current minor loop, by keyword, defaults included.
 
+    Of a loop that is in no task only LIM_BAR is known, which is the drive's Motor Overload Ratio (36).
+
     A variable counts as what ``--set`` gives it, as the one constant that tasks ever assign to it, as the present value
     of a tunable, or as its preset, in this order; otherwise it is not known (decision).
     """
     call = drive.call
     if call is None or drive.program is None:
-        return {}
+        ratio = drive.plant.motor_overload_ratio if drive.plant is not None else None
+        return {} if ratio is None else {"LIM_BAR": Given(ratio, f"{ratio} (motor_overload_ratio)")}
     assigned = _assigned(drive.program, programs)
     given = {name: _given(value, source_text(value), "default") for name, value in call.defaults.items()}
     for item in call.block.inputs:

@@ -21,7 +21,7 @@ from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.core.text import did_you_mean
 from automax_ros.language.checks.checker import CheckResult
-from automax_ros.language.program import CommonSpec
+from automax_ros.language.program import CommonSpec, Program
 from automax_ros.language.written import lines_that_write
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import MAX_BYTES
@@ -158,6 +158,14 @@ class StoredRack:
 
     def _checked(self, source: SourceText, module: ModuleConfig, name: str) -> CheckResult:
         return check_source(source, name, module.tick_ns, self._commons, module.times)
+
+    def programs(self) -> list[Program]:
+        """Return the tasks of the rack as they ran when the recording began, those without errors."""
+        modules = {task.name: module for module, task in self.config.placed_tasks}
+        checked = (
+            self._checked(source, modules[name], name) for name, source in self.sources.items() if name in modules
+        )
+        return [result.program for result in checked if result.program is not None]
 
     def check_table(self, table: VariableTable) -> None:
         """Make sure that the recording numbers its variables as its own rack file does.

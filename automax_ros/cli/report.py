@@ -1,0 +1,111 @@
+"""Report a drive's run from a recording: one HTML page that is whole by itself, and a picture.
+
+Speed, current reference and feedback, DELTA, bridge, faults and errors with their times, rms current and energies, and
+what happened in which order; of every drive of the rack, or of the one whose current minor loop is in a task. Without
+--output and --png both are written next to the recording: BAG_report.html and BAG_report.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from automax_ros.bags.columns import require_another_file
+from automax_ros.bags.traces import MAX_LINES, Traces
+from automax_ros.cli.output_files import require_different_files, require_writable, write_text
+from automax_ros.cli.plot_figure import Layout, figure_of, picture_of, save
+from automax_ros.cli.progress import share_shown
+from automax_ros.cli.report_page import page
+from automax_ros.cli.signals import ended_by_signals
+from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.usage import UsageError
+from automax_ros.cli.window import add_window_arguments, window_of
+from automax_ros.replay.drive_report import DriveReport, drive_report
+from automax_ros.replay.stored_rack import SourceRefused
+
+_WIDTH_PX = 1400
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax report``."""
+    parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
+    parser.add_argument("--output", "-o", type=Path, metavar="FILE.html", help="the page")
+    parser.add_argument("--png", type=Path, metavar="FILE.png", help="the picture of all drives")
+    parser.add_argument("--task", type=str.upper, metavar="NAME", help="the drive whose DC_DRIVE_CML is in this task")
+    add_window_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the page and the picture."""
+    bag: Path = arguments.bag
+    output, png = _places(arguments)
+    for path in filter(None, (output, png)):
+        require_writable(path)
+        require_another_file(bag, path)
+    require_different_files({}, {"--output": output, "--png": png})
+    try:
+        with ended_by_signals(), share_shown("report") as progress:
+            report = drive_report(bag, arguments.task, window_of(arguments), progress)
+    except SourceRefused as error:
+        for source, diagnostics in error.findings:
+            print_diagnostics(diagnostics, source, sys.stderr)
+        raise UsageError(f"{bag}: the rack file stored inside has errors") from error
+    name = bag.resolve().name
+    if output is not None:
+        write_text(output, page(report, name, _pictures(report)))
+    if png is not None:
+        save(figure_of(_together(report), Layout(f"{report.rack[:80]}: {name[:80]}", _WIDTH_PX)), png)
+    if arguments.output is None and arguments.png is None and sys.stderr.isatty():
+        print(f"{output}, {png}", file=sys.stderr)
+    return 0
+
+
+def _places(arguments: argparse.Namespace) -> tuple[Path | None, Path | None]:
+    """Return where page and picture go, None for what is not wanted."""
+    output: Path | None = arguments.output
+    png: Path | None = arguments.png
+    if output is None and png is None:
+        bag = arguments.bag.resolve()
+        stem = bag.stem if bag.is_file() else bag.name
+        return bag.with_name(f"{stem}_report.html"), bag.with_name(f"{stem}_report.png")
+    if png is not None and png.suffix.lower() != ".png":
+        raise UsageError(f"--png {png}: the picture is a PNG file", "name it FILE.png")
+    return output, png
+
+
+def _pictures(report: DriveReport) -> dict[str, bytes]:
+    """Return the picture of each drive that has a course, as a PNG file."""
+    found: dict[str, bytes] = {}
+    for run, marks in report.drives:
+        traces = report.traces(run, marks)
+        if traces.lines:
+            found[run.drive.name] = picture_of(figure_of(traces, Layout(run.drive.name, _WIDTH_PX)))
+    return found
+
+
+def _together(report: DriveReport) -> Traces:
+    """Return the lines of all drives for one picture: each has lanes of its own.
+
+    Raises:
+        UsageError: the recording holds no course of a drive.
+    """
+    all_traces = [report.traces(run, marks) for run, marks in report.drives]
+    if not any(traces.lines for traces in all_traces):
+        raise UsageError("the recording holds no course of a drive to draw", "--output alone writes the page")
+    if len(all_traces) == 1:
+        return all_traces[0]
+    lines = []
+    for (run, _), traces in zip(report.drives, all_traces, strict=True):
+        for line in traces.lines:
+            seen = line.variable
+            unit = f"{run.drive.name}: {seen.unit}"
+            lines.append(replace(line, variable=replace(seen, label=f"{run.drive.name} {seen.label}", unit=unit)))
+    errors = {mark for traces in all_traces for mark in traces.errors}
+    return replace(
+        all_traces[0],
+        lines=tuple(lines[:MAX_LINES]),
+        errors=tuple(sorted(errors, key=lambda mark: (mark.time_s, mark.task, mark.line))),
+        unmarked=sum(traces.unmarked for traces in all_traces),
+    )

@@ -1,0 +1,246 @@
+"""A drive's recorded run: its courses for a picture, its faults, what happened in which order, and its totals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+
+from automax_ros.bags.traces import Course, Line
+from automax_ros.bags.variables import Watched
+from automax_ros.core.types import DataType
+from automax_ros.drive.cml.reference import FULL
+from automax_ros.replay.drive_signals import ReportDrive, Signal
+from automax_ros.replay.drive_totals import CountTotals, PlantTotals, rpm_of
+from automax_ros.wire.messages import PlantState
+
+FAULTS = ("IOC_OUT", "SYNC_LOSS_OUT", "TACH_LOSS_OUT", "OSV_OUT", "EXT_IET_OUT", "PHROT_FLT_OUT", "BAD_SCR_OUT")
+"""The fault outputs of DC_DRIVE_CML (52.2.2)."""
+STATES = {
+    "CML_RUN": ("start is requested", "stop is requested"),
+    "CML_COAST_STOP": ("coast stop is requested", "coast stop is requested no longer"),
+    "CML_TEST": ("test mode is selected", "test mode is selected no longer"),
+    "FAULT_RESET": ("fault reset", ""),
+    "SYNC_LOCKED": ("the loop is locked to the line", "the loop is not locked to the line"),
+    "DC_CML_STATE": ("the drive runs", "the drive is in standby"),
+    "BRIDGE_POL": ("bridge 2 is on", "bridge 1 is on"),
+}
+"""Booleans of a drive and what their edges mean, rising and falling."""
+DRAWN_STATES = ("CML_RUN", "DC_CML_STATE", "BRIDGE_POL")
+MOST_EVENTS = 2000
+"""Most events of one drive that are kept; the first ones are (decision: a page that can still be read)."""
+PERCENT_SPEED, PERCENT_CURRENT, DEGREES = "% of full speed", "% of rated current", "deg"
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened, s of the run. ``kind``: ``state``, ``fault``, ``error``, ``plant`` or ``operation``."""
+
+    time_s: float
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class FaultSpan:
+    """A fault output that was on: from when, and until when, s of the run; None where it was still on at the end."""
+
+    keyword: str
+    variable: str
+    text: str
+    begin_s: float
+    end_s: float | None
+
+
+@dataclass
+class DriveRun:
+    """The run of one drive while it is read; changes come in the order of time.
+
+    Attributes:
+        drive: which drive.
+        counts: totals from its commons.
+        plant: totals from its plant's messages.
+        faults: fault outputs that were on and are off again; ``finish`` adds the others.
+        events: what happened, at most ``MOST_EVENTS``; ``untold`` counts the rest.
+        starts, changes: how often it began to run, and how often the bridge changed while it ran.
+    """
+
+    drive: ReportDrive
+    counts: CountTotals = field(init=False)
+    plant: PlantTotals = field(default_factory=PlantTotals)
+    faults: list[FaultSpan] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    untold: int = 0
+    starts: int = 0
+    changes: int = 0
+    _values: dict[str, float] = field(default_factory=dict)
+    _courses: dict[tuple[str, str, DataType], Course] = field(default_factory=dict)
+    _begun: dict[str, float] = field(default_factory=dict)
+    _time_s: float | None = None
+    _broken: tuple[str, ...] = ()
+    _contactor: bool | None = None
+
+    def __post_init__(self) -> None:
+        """Begin with nothing known."""
+        self.counts = CountTotals(self.drive.parameters)
+
+    def take(self, time_s: float, changed: Mapping[str, float]) -> None:
+        """Take the new values of signals, by keyword, at an instant; a fault is told before what follows from it."""
+        self._pass_to(time_s)
+        seen = {
+            keyword: float(not value) if self.drive.signals[keyword].inverted else float(value)
+            for keyword, value in changed.items()
+        }
+        for keyword, value in sorted(seen.items(), key=_cause_first):
+            signal = self.drive.signals[keyword]
+            before = self._values.get(keyword)
+            self._values[keyword] = value
+            self._note(time_s, signal, before, value)
+        for keyword in changed:
+            self._draw(time_s, self.drive.signals[keyword])
+
+    def _pass_to(self, time_s: float) -> None:
+        if self._time_s is not None and time_s > self._time_s:
+            speed = self._values.get("SPEED_FDBK")
+            self.counts.pass_time(
+                time_s - self._time_s,
+                self._percent("I_FDBK"),
+                None if speed is None else 100 * speed / FULL,
+                running=self._values.get("DC_CML_STATE", 1.0) != 0.0,
+            )
+        self._time_s = time_s
+
+    def _percent(self, keyword: str) -> float | None:
+        """Return a current, % of rated; None where it is not known."""
+        value, lim_bar = self._values.get(keyword), self.drive.lim_bar
+        return None if value is None or lim_bar is None else value / FULL * lim_bar
+
+    def _note(self, time_s: float, signal: Signal, before: float | None, value: float) -> None:
+        """Follow an edge."""
+        keyword, on = signal.keyword, value != 0.0
+        if keyword in FAULTS:
+            self._note_fault(time_s, signal, on=on)
+        if before is None or (before != 0.0) == on:
+            return
+        if keyword in STATES:
+            text = STATES[keyword][0 if on else 1]
+            if text:
+                self.tell(time_s, "state", f"{text} ({signal.variable})")
+        if keyword == "DC_CML_STATE":
+            self.starts += on
+        elif keyword == "BRIDGE_POL":
+            self.changes += self._values.get("DC_CML_STATE", 1.0) != 0.0
+
+    def _note_fault(self, time_s: float, signal: Signal, *, on: bool) -> None:
+        keyword = signal.keyword
+        what = signal.text.removeprefix("fault: ").partition(";")[0]
+        if on and keyword not in self._begun:
+            self._begun[keyword] = time_s
+            self.tell(time_s, "fault", f"fault: {what} ({keyword} {signal.variable})")
+        elif not on and keyword in self._begun:
+            self.faults.append(FaultSpan(keyword, signal.variable, what, self._begun.pop(keyword), time_s))
+            self.tell(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
+
+    def _draw(self, time_s: float, signal: Signal) -> None:
+        keyword = signal.keyword
+        label = f"{keyword} {signal.variable}"
+        if keyword in DRAWN_STATES or keyword in FAULTS:
+            self._append(label, "", DataType.BOOLEAN, time_s, self._values[keyword])
+        elif keyword in _CONVERSIONS:
+            unit, convert = _CONVERSIONS[keyword]
+            found = convert(self)
+            shown = (unit, found) if found is not None else ("counts", self._values[keyword])
+            self._append(label, shown[0], DataType.REAL, time_s, shown[1])
+        elif keyword.startswith("register "):
+            self._append(label, "counts", DataType.REAL, time_s, self._values[keyword])
+
+    def _append(self, label: str, unit: str, kind: DataType, time_s: float, value: float) -> None:
+        if isfinite(value):
+            self._courses.setdefault((label, unit, kind), Course()).append(time_s, value)
+
+    def degrees(self) -> float | None:
+        """Return DELTA in degrees of the line's period, measured where it is recorded."""
+        period_us = self._values.get("LINE_PERIOD") or 1e6 / self.drive.line_hz
+        return 360 * self._values["DELTA"] / period_us
+
+    def take_plant(self, time_s: float, message: PlantState) -> None:
+        """Take a message of the plant."""
+        self.plant.take(message)
+        parameters = self.drive.parameters
+        if parameters is None:
+            self._append("speed of the plant", "rpm", DataType.REAL, time_s, message.speed_rpm)
+            self._append("current of the plant", "A", DataType.REAL, time_s, message.current_a)
+        else:
+            base = rpm_of(parameters.values["base_speed_rad_s"].value)
+            speed, current = 100 * message.speed_rpm / base, 100 * message.current_a / parameters.amps
+            self._append("speed of the plant", PERCENT_SPEED, DataType.REAL, time_s, speed)
+            self._append("current of the plant", PERCENT_CURRENT, DataType.REAL, time_s, current)
+        if "BRIDGE_POL" not in self.drive.signals:
+            for number in (1, 2):
+                conducts = float(message.bridge == number)
+                self._append(f"bridge {number} conducts", "", DataType.BOOLEAN, time_s, conducts)
+        self._note_plant(time_s, message)
+
+    def _note_plant(self, time_s: float, message: PlantState) -> None:
+        if self._contactor is not None and message.contactor != self._contactor:
+            self.tell(time_s, "plant", "the contactor is closed" if message.contactor else "the contactor is open")
+        self._contactor = message.contactor
+        broken = tuple(message.faults)
+        for name in broken:
+            if name not in self._broken:
+                self.tell(time_s, "plant", f"the plant has {name}")
+        for name in self._broken:
+            if name not in broken:
+                self.tell(time_s, "plant", f"the plant has {name} no longer")
+        self._broken = broken
+
+    def tell(self, time_s: float, kind: str, text: str) -> None:
+        """Note an event."""
+        if len(self.events) < MOST_EVENTS:
+            self.events.append(Event(time_s, kind, text))
+        else:
+            self.untold += 1
+
+    def finish(self, end_s: float) -> None:
+        """End the run: what still holds, holds to the end."""
+        self._pass_to(end_s)
+        for keyword, begin_s in self._begun.items():
+            signal = self.drive.signals[keyword]
+            what = signal.text.removeprefix("fault: ").partition(";")[0]
+            self.faults.append(FaultSpan(keyword, signal.variable, what, begin_s, None))
+        self._begun.clear()
+        self.faults.sort(key=lambda span: (span.begin_s, FAULTS.index(span.keyword)))
+        self.events.sort(key=lambda event: event.time_s)
+
+    @property
+    def lines(self) -> list[Line]:
+        """The courses for a picture: speed, current, DELTA, what else is counted, then booleans."""
+        order = [PERCENT_SPEED, "rpm", PERCENT_CURRENT, "A", DEGREES, "counts", ""]
+        keys = sorted(self._courses, key=lambda key: order.index(key[1]))
+        return [
+            Line(Watched(label, number, 0, kind, unit), *self._courses[label, unit, kind].line())
+            for number, (label, unit, kind) in enumerate(keys)
+        ]
+
+
+def _cause_first(item: tuple[str, float]) -> int:
+    keyword, value = item
+    return 1 if keyword not in FAULTS else 0 if value else 2
+
+
+def _speed(run: DriveRun) -> float | None:
+    return 100 * run._values["SPEED_FDBK"] / FULL
+
+
+def _current(keyword: str) -> Callable[[DriveRun], float | None]:
+    return lambda run: run._percent(keyword)
+
+
+_CONVERSIONS: dict[str, tuple[str, Callable[[DriveRun], float | None]]] = {
+    "SPEED_FDBK": (PERCENT_SPEED, _speed),
+    "REFERENCE": (PERCENT_CURRENT, _current("REFERENCE")),
+    "REF_LAG_OUT": (PERCENT_CURRENT, _current("REF_LAG_OUT")),
+    "I_FDBK": (PERCENT_CURRENT, _current("I_FDBK")),
+    "DELTA": (DEGREES, DriveRun.degrees),
+}
+"""The numbers that are drawn: unit and value; counts where the scale is not known."""

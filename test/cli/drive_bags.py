@@ -1,0 +1,78 @@
+"""Recordings of drives for the tests of `automax report`, made message by message: nothing of the loop runs here."""
+
+from pathlib import Path
+
+from bags.recordings import RUN
+
+from automax_ros.bags.writer import BagWriter
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.types import DataType, type_of_name
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.messages import (
+    NAMES,
+    CommonImage,
+    CommonWrite,
+    Operation,
+    PlantState,
+    Scan,
+    ScanError,
+    Values,
+    Variable,
+    VariableTable,
+)
+from automax_ros.wire.qos import LATCHED, SCAN
+
+S = 1_000_000_000
+
+
+class DriveBag:
+    """A recording of a rack with a drive that is written step by step; times in s."""
+
+    def __init__(self, folder: Path, rack: str, names: list[str], sources: dict[str, str], **options: object) -> None:
+        self.folder, self._names, self._sequence = folder, names, 0
+        self._writer = BagWriter(folder, **options)
+        self._writer.attach("rack.yaml", "application/yaml", rack.encode())
+        for name, text in sources.items():
+            self._writer.attach(name, "text/plain", text.encode())
+        variables = tuple(Variable(number, name, type_of_name(name).number) for number, name in enumerate(names))
+        self._send("variables", VariableTable(0, "D1", RUN, variables, ()), 0, LATCHED)
+        zeros = [0.0 for name in names if type_of_name(name) is not DataType.STRING]
+        values = Values(range(len(names)), [0] * len(names), zeros, ())
+        self._send("backplane/snapshot", CommonImage(0, RUN, 0, values), 0, LATCHED)
+
+    def __enter__(self) -> "DriveBag":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.close()
+
+    def write(self, time_s: float, **changes: float) -> None:
+        """Change commons; a name ends with I for %, B for @, so REF_I is REF%."""
+        self._sequence += 1
+        marks = {"I": "%", "B": "@"}
+        numbers = [self._names.index(f"{name[:-2]}{marks[name[-1]]}") for name in changes]
+        values = Values(numbers, [0] * len(numbers), [float(value) for value in changes.values()], ())
+        stamp = round(time_s * S)
+        self._send("backplane", CommonWrite(stamp, RUN, 1, 1, WriteKind.COMMIT, self._sequence, values), stamp, SCAN)
+
+    def error(self, time_s: float, task: str, line: int, code: int) -> None:
+        """Let a task log an error."""
+        stamp = round(time_s * S)
+        self._send("scans", Scan(stamp, 1, task, 1, errors=(ScanError(line, code),)), stamp, SCAN)
+
+    def operation(self, time_s: float, what: str, detail: str, reason: str = "") -> None:
+        """Let a person do something."""
+        stamp = round(time_s * S)
+        message = Operation(stamp, RUN, what, "", not reason, reason, detail)
+        self._send("operations", message, stamp, SCAN)
+
+    def plant(self, time_s: float, name: str = "UNWIND", **fields: object) -> None:
+        """Let a plant tell how it stands."""
+        stamp = round(time_s * S)
+        still = dict.fromkeys(PlantState._fields, 0.0) | {"slot": 7, "drive": "", "bridge": 0, "contactor": False}
+        still |= {"stamp": stamp, "plant": name, "faults": (), "line_hz": 60.0, "line_v": 460.0}
+        self._send(f"plants/{name}", PlantState(**{**still, **fields}), stamp, SCAN)
+
+    def _send(self, topic, message, stamp, quality) -> None:
+        channel = self._writer.channel(f"/d1/{topic}", NAMES[type(message)], quality)
+        self._writer.write(channel, stamp, encode(message))
