@@ -16,6 +16,7 @@ from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import is_rack_name
+from automax_ros.rack.plants.feeds import read_feeds
 from automax_ros.rack.plants.reading import Plants, read_plants
 from automax_ros.rack.ros_names import namespace
 from automax_ros.rack.scalars import boolean_value, text_value
@@ -107,6 +108,7 @@ class _RackReader:
         variables = CommonReader(modules, self._findings).read(common) if common is not None else ()
         if common is not None:
             self._check_size(variables, modules, section.key_span("common"))
+        feeds = read_feeds(plants.feeds, variables, modules, self._findings)
         if name is None or self._findings.errors:
             return None
         return RackConfig(
@@ -122,6 +124,7 @@ class _RackReader:
             auto_run=auto_run,
             on_module_loss=loss,
             plants=tuple(plants.known.values()),
+            feeds=feeds,
         )
 
     def _name(self, node: Node | None) -> str | None:

@@ -25,6 +25,7 @@ from automax_ros.rack.installation import Finding, Installation
 from automax_ros.rack.modules.kind import Module, Parts
 from automax_ros.rack.observers import Observers, RackObserver
 from automax_ros.rack.operations import Operations
+from automax_ros.rack.plants.feeding import PlantFeeds
 from automax_ros.rack.plants.running import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
 from automax_ros.rack.rack_state import RackState
@@ -87,6 +88,7 @@ class Rack:
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
         self.plants = RackPlants(config.plants)
         self.sampling = PlantSampling(self.plants, self.scheduler)
+        self._feeds = PlantFeeds(config, self.plants, self.memory, self._inputs, self.scheduler)
         parts = Parts(
             memory=self.memory,
             scheduler=self.scheduler,
@@ -198,6 +200,7 @@ class Rack:
             self._inputs.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
         self.observers.tell_writes()
         self.operations.start()
+        self._feeds.begin(self.operations, self.observers)
         self.sampling.begin()
 
     def run(self, seconds: float) -> None:
@@ -323,6 +326,7 @@ class Rack:
             module.load(state.modules[module.config.slot])
         self._forcing.load()
         self.events.load(state.events)
+        self._feeds.begin(self.operations, self.observers)
         self.sampling.begin()
 
     def _execution(self, module: str) -> Execution:

@@ -10,11 +10,12 @@ from automax_ros.rack.config import RackConfig
 from automax_ros.rack.interrupt_check import interrupt_findings
 from automax_ros.rack.modules.drive_rules import drive_findings
 from automax_ros.rack.modules.udc_rules import udc_findings
+from automax_ros.rack.plants.feeds import feed_findings
 
 Rule = Callable[[RackConfig, Mapping[str, Program]], Mapping[str, Sequence[Diagnostic]]]
 """Returns what is wrong by the task in whose source it stands; it is given the programs without errors."""
 
-RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings)
+RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings, feed_findings)
 """All such rules."""
 
 

@@ -28,9 +28,9 @@ _FIRST_TASK = 3
 
 
 def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
-    """Return all writers of a rack, in the order of their ids: outside sources, tasks by slot and name, modules.
+    """Return all writers of a rack by their ids: outside sources, tasks by slot and name, modules, plants.
 
-    A module with interrupts writes registers, and one that says so; no other does.
+    A module with interrupts writes registers, and one that says so; no other does. Only plants with feeds write.
     """
     home = config.home_slot
     outside = [
@@ -44,9 +44,14 @@ def writers_of(config: RackConfig) -> tuple[WriterSpec, ...]:
         for task in sorted(module.tasks, key=lambda task: task.name)
     ]
     modules = [(module.slot, module.name) for module in config.modules if module.registers.writes]
+    plants = [(home, plant) for plant in dict.fromkeys(feed.plant for feed in config.feeds)]
     first = _FIRST_TASK + len(tasks)
     return (
         *outside,
         *(WriterSpec(number, name, WriterKind.TASK, slot) for number, (slot, name) in enumerate(tasks, _FIRST_TASK)),
         *(WriterSpec(number, name, WriterKind.IO, slot) for number, (slot, name) in enumerate(modules, first)),
+        *(
+            WriterSpec(number, name, WriterKind.PLANT, slot)
+            for number, (slot, name) in enumerate(plants, first + len(modules))
+        ),
     )

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from automax_ros.drive.nameplate import EXAMPLES, NamePlate
 from automax_ros.drive.plant_coupling import CouplingData
+from automax_ros.rack.scale import Scale
 
 MOTORS = {"dc_10hp_240v": "10hp", "dc_150hp_500v": "150hp", "dc_800hp_700v": "800hp"}
 """Motors that a plant may have by name, each with its name in ``drive/nameplate``."""
@@ -92,3 +93,26 @@ class PlantConfig:
         if self.motor is None:
             return None
         return self.motor if isinstance(self.motor, NamePlate) else EXAMPLES[MOTORS[self.motor]]
+
+
+@dataclass(frozen=True)
+class FeedConfig:
+    """A signal of a plant that an instrument brings into a common.
+
+    Attributes:
+        plant: the plant's name.
+        common: the variable's full name.
+        element: which element of it.
+        signal: a name of ``drive/plant_signals.SIGNALS``.
+        every_ns: how often, ns.
+        scale: what counts of an INTEGER mean, None for a REAL, which has the signal itself.
+        line: the line of the file.
+    """
+
+    plant: str
+    common: str
+    element: int
+    signal: str
+    every_ns: int
+    scale: Scale | None = None
+    line: int = 0

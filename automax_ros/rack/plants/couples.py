@@ -29,7 +29,10 @@ KEYS = ("to", *RANGES)
 def read_couple(node: Node, what: str, findings: Findings) -> CoupleConfig | None:
     """Return what a plant is coupled to, None where there was something to report."""
     where = f"couple of {what}"
-    section = Section(entries_of(node, where, findings) or (), where, KEYS, findings)
+    entries = entries_of(node, where, findings)
+    if entries is None:
+        return None
+    section = Section(entries, where, KEYS, findings)
     if not section.require(("to",), where, node.span, findings):
         return None
     named = section.get("to")

@@ -23,9 +23,8 @@ from automax_ros.rack.sections import Section, entries_of, report_twice
 
 MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
 """Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
-_SIMULATED = ("line", "load", "inertia", "couple")
-_NOT_YET = ("feeds",)
-KEYS = ("motor", "motor_overload_ratio", *_SIMULATED, *_NOT_YET)
+_SIMULATED = ("line", "load", "inertia", "couple", "feeds")
+KEYS = ("motor", "motor_overload_ratio", *_SIMULATED)
 """What may be said of a plant."""
 _PLATE = ("hp", "volts", "rpm", "amps", "resistance_ohm", "inductance_h", "inertia_kg_m2")
 _PLATE_REQUIRED = ("hp", "volts", "rpm")
@@ -36,11 +35,12 @@ _LIMIT = 100
 
 @dataclass
 class Plants:
-    """The plants of one rack file, and who has claimed them."""
+    """The plants of one rack file, and who has claimed them; ``feeds`` are those of each, read with the commons."""
 
     findings: Findings
     known: dict[str, PlantConfig] = field(default_factory=dict)
     complete: bool = True
+    feeds: list[tuple[str, Node]] = field(default_factory=list)
     _claimed: dict[str, tuple[str, Span]] = field(default_factory=dict)
 
     def claim(self, node: Node, what: str) -> PlantConfig | None:
@@ -80,24 +80,23 @@ def read_plants(node: Node | None, findings: Findings) -> Plants:
             report_twice(key, f"plant {name}", places[name], findings)
         else:
             places[name] = key.span
-            plants.known[name] = _plant(name, key, value, findings)
+            plants.known[name] = _plant(name, key, value, plants)
     if plants.complete:
         check_couples(plants.known, findings)
     return plants
 
 
-def _plant(name: str, key: Scalar, node: Node, findings: Findings) -> PlantConfig:
+def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
+    findings = plants.findings
     what = f"plant {name}"
     section = Section(entries_of(node, what, findings) or (), what, KEYS, findings)
-    for option in _NOT_YET:
-        if option in section:
-            message = f"{option} of {what} is not supported yet: the emulator does not simulate plants"
-            findings.add("AMX6472", message, section.key_span(option), "leave it out")
     ratio, motor = section.get("motor_overload_ratio"), section.get("motor")
-    line, load, inertia, couple = (section.get(option) for option in _SIMULATED)
+    line, load, inertia, couple, feeds = (section.get(option) for option in _SIMULATED)
     needless = next((option for option in _SIMULATED if option in section), "")
     if motor is None and needless:
         findings.add("AMX6009", f"{what} has {needless} and no motor: it is not simulated", section.key_span(needless))
+    if feeds is not None:
+        plants.feeds.append((name, feeds))
     config = PlantConfig(
         name,
         _motor(motor, f"motor of {what}", findings) if motor else None,

@@ -1,0 +1,92 @@
+"""Brings signals of plants into commons, at whole multiples of each feed's time, before the scans of the instant.
+
+A value is written where it differs from what is there (decision: the write log has changes, not samples). Feeds go on
+while a rack is stopped, and rest without its power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from automax_ros.core.kinds import WriterKind
+from automax_ros.core.types import Value
+from automax_ros.drive.plant import DrivePlant
+from automax_ros.drive.plant_signals import SIGNALS
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.observers import Observers
+from automax_ros.rack.operations import Operations
+from automax_ros.rack.plants.config import FeedConfig
+from automax_ros.rack.writers import writers_of
+from automax_ros.running.memory import CommonMemory
+from automax_ros.running.process_inputs import ProcessInputs
+from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+
+_AFTER_MODULES = 16
+"""Priority among the I/O of an instant: modules have those of their slots."""
+
+
+@dataclass(frozen=True)
+class _Feed:
+    """A feed with the place in memory that it writes."""
+
+    config: FeedConfig
+    view: int
+    writer: int
+    signal: Callable[[DrivePlant], float]
+
+    def value(self, plant: DrivePlant) -> Value:
+        """Return what the instrument shows now."""
+        found = self.signal(plant)
+        scale = self.config.scale
+        return found if scale is None else scale.counts_of(found)[0]
+
+
+class PlantFeeds:
+    """The feeds of one rack."""
+
+    def __init__(
+        self,
+        config: RackConfig,
+        plants: Mapping[str, DrivePlant],
+        memory: CommonMemory,
+        inputs: ProcessInputs,
+        scheduler: Scheduler,
+    ) -> None:
+        """Take what is fed; nothing is posted yet."""
+        self._plants, self._memory, self._inputs, self._scheduler = plants, memory, inputs, scheduler
+        writers = {item.name: item.id for item in writers_of(config) if item.kind is WriterKind.PLANT}
+        self._groups: dict[tuple[str, int], list[_Feed]] = {}
+        for item in config.feeds:
+            feed = _Feed(item, memory.view(item.common), writers[item.plant], SIGNALS[item.signal])
+            self._groups.setdefault((item.plant, item.every_ns), []).append(feed)
+
+    def begin(self, operations: Operations, observers: Observers) -> None:
+        """Begin, with this instant where it is one of theirs: at the rack's start, and at a state that was loaded."""
+        scheduler = self._scheduler
+        for (name, every_ns), feeds in self._groups.items():
+            key = EventKey(EventClass.IO, _AFTER_MODULES, f"{name} {every_ns:014}")
+            act = partial(self._feed, self._plants[name], feeds, operations, observers)
+            scheduler.every(every_ns, -(-scheduler.now_ns // every_ns) * every_ns, key, act)
+
+    def _feed(
+        self,
+        plant: DrivePlant,
+        feeds: Sequence[_Feed],
+        operations: Operations,
+        observers: Observers,
+        now_ns: int,
+        _: int,
+    ) -> None:
+        plant.advance(now_ns)
+        if not operations.powered:
+            return
+        memory = self._memory
+        memory.now_ns = now_ns
+        for feed in feeds:
+            view, element = feed.view, feed.config.element
+            value = memory.accepted(view, feed.value(plant), element)
+            if memory.read_now(view, element) != value:
+                self._inputs.write(view, element, value, feed.writer)
+        observers.tell_writes()
