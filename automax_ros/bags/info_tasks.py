@@ -16,7 +16,10 @@ RACK_FILE = "rack.yaml"
 
 @dataclass(frozen=True)
 class TaskFacts:
-    """A task as the rack file and its source have it; None where the source is missing or has errors."""
+    """A task as the rack file and its source have it; None where the source is missing or has errors.
+
+    ``ticks`` is None too for a task that does not scan every so many ticks, ``period_ns`` without a scan period.
+    """
 
     slot: int
     processor: str
@@ -24,11 +27,7 @@ class TaskFacts:
     priority: int
     target: str | None = None
     ticks: int | None = None
-
-    @property
-    def period_ns(self) -> int | None:
-        """The scan period."""
-        return None if self.ticks is None else self.ticks * self.tick_ns
+    period_ns: int | None = None
 
 
 def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
@@ -53,6 +52,7 @@ def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
                 processor.tick_ns,
                 task.priority,
                 program.target if program else None,
-                program.ticks if program else None,
+                (program.ticks or None) if program else None,
+                (program.period_ns or None) if program else None,
             )
     return facts

@@ -20,7 +20,7 @@ class Advised:
     @property
     def text(self) -> str:
         """The rule as a sentence."""
-        return f"Without {self.parameter} there is {self.without}."
+        return f"In a speed regulator {self.parameter} must be programmed: without it there is {self.without} (52.1.5)."
 
     def faults(self, given: Mapping[str, Given]) -> list[Fault]:
         """Return the warning of a CALL without the parameter."""

@@ -83,7 +83,7 @@ def _text(loads: Iterable[ModuleLoad]) -> list[str]:
             header = ("  task", "least us", "most us", "period us", "load %", "")
             lines += table([header, *map(_row, load.tasks)], right=range(1, 5))
     if any(task.times.estimated for load in loads for task in load.tasks):
-        lines += ["", "estimated: BASIC statements are in the sum, whose times no manual prints"]
+        lines += ["", "estimated: BASIC statements or a drive's loop are in the sum, whose times no manual prints"]
     return lines
 
 

@@ -14,6 +14,7 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS, tick_ns
 from automax_ros.language.checks.checker import CheckResult, check
+from automax_ros.language.program import Program
 from automax_ros.language.syntax.task_kind import NotATask, is_task_file, kind_of_file
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.names import DeclarationFault, check_task_name
@@ -96,6 +97,21 @@ def check_task_file(path: Path, target: Target) -> tuple[SourceText, CheckResult
         too_large = Diagnostic("AMX0001", f"the text {fault}", Span(1, 1, 2), hint="divide the task")
         return SourceText(str(path), ""), CheckResult(None, [too_large])
     return source, check_text(path, source.text, target)
+
+
+def require_clock(path: Path, program: Program) -> None:
+    """Refuse a task whose scans follow an AC line: no clock begins them, so they have no scan period to count with.
+
+    Raises:
+        UsageError: it is one.
+    """
+    if program.cml is not None:
+        message = (
+            f"{path} runs a drive's {program.cml.block.name}: the interrupts of a 57C406 begin its scans, not the clock"
+        )
+        raise UsageError(
+            message, "run it in a rack: automax run CONFIG --simulated; automax drive-check tells of its loop"
+        )
 
 
 def check_text(path: Path, text: str, target: Target) -> CheckResult:

@@ -23,7 +23,7 @@ from typing import TextIO
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.stimuli_file import StimuliRefused, entries_of
-from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
+from automax_ros.cli.task_files import add_target_arguments, check_task_file, require_clock, target_of
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.trace_input import InputTable
 from automax_ros.cli.trace_stimuli import StimulatedScans
@@ -75,6 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     if result.program is None:
         print_diagnostics(result.diagnostics, source, sys.stderr)
         return 1
+    require_clock(arguments.file, result.program)
     lone = LoneTask(result.program)
     watched = _watched(lone, watch_list(arguments.watch))
     read = {"FILE": arguments.file, "--input": arguments.input, "--stimuli": arguments.stimuli}

@@ -19,7 +19,7 @@ from pathlib import Path
 from automax_ros.blocks.declaration import Platform
 from automax_ros.cli.call_options import add_call_arguments, chosen_calls
 from automax_ros.cli.numbers import number, whole_number
-from automax_ros.cli.task_files import add_target_arguments, check_task_file, target_of
+from automax_ros.cli.task_files import add_target_arguments, check_task_file, require_clock, target_of
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
@@ -71,6 +71,7 @@ def checked_program(arguments: argparse.Namespace) -> Program | None:
     if result.program is None or has_errors(result.diagnostics):
         print_diagnostics(result.diagnostics, source, sys.stderr)
         return None
+    require_clock(arguments.file, result.program)
     return result.program
 
 

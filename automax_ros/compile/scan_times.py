@@ -76,7 +76,8 @@ def scan_times(program: Program, model: CostModel) -> ScanTimes:
     times = ways.get(_Way.END) or ways.get(_Way.STOP) or Span(0, longest_turn(edges, first))
     around = NOTHING if program.is_basic else _around(program, model, ended=_Way.END in ways)
     times = times.plus(around)
-    return ScanTimes(times.least, times.most, is_estimated(program.scan[first:], model))
+    estimated = is_estimated(program.scan[first:], model) or _loop_ns(program, model) > 0
+    return ScanTimes(times.least, times.most, estimated)
 
 
 def period_ns(program: Program) -> int | None:
@@ -97,9 +98,14 @@ def _first_repeated(program: Program) -> int:
 
 
 def _around(program: Program, model: CostModel, ended: bool) -> Span:
-    """Return the time of SCAN_LOOP, and of END where the scan comes to it."""
-    time = model.scan_loop_ns(program) + (model.end_ns(program) if ended else 0)
+    """Return the time of SCAN_LOOP, or what takes its place, and of END where the scan comes to it."""
+    time = model.scan_loop_ns(program) + _loop_ns(program, model) + (model.end_ns(program) if ended else 0)
     return Span(time, time)
+
+
+def _loop_ns(program: Program, model: CostModel) -> int:
+    """Return the time of the current minor loop, 0 in a task without one."""
+    return 0 if program.cml is None else model.loop_ns
 
 
 def is_estimated(statements: tuple[Statement, ...], model: CostModel) -> bool:

@@ -19,7 +19,7 @@ from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
 from automax_ros.language.checks.checker import CheckResult
-from automax_ros.language.program import CommonSpec
+from automax_ros.language.program import CommonSpec, Program
 from automax_ros.language.syntax.parser import parse
 from automax_ros.language.syntax.task_kind import TaskKind, is_task_file, kind_of_source
 from automax_ros.language.syntax.tree import Declaration, Declared, Scope
@@ -93,6 +93,7 @@ class Draft:
             "slots:",
             commented(f"  0: {{module: {self._memory_module()}}}", "common memory"),
             *self._processor_lines(processors),
+            *self._drive_lines(processors),
             "common:" if self.commons else "common: {}",
             *self._common_lines(),
         ]
@@ -119,6 +120,25 @@ class Draft:
                 comment = f"a scan every {period / NS_PER_MS:g} ms" if scanned else _without_period(task)
                 yield commented(f"      {task.name}: {{{file}priority: {priority}}}", comment)
 
+    def _drive_lines(self, processors: int) -> Iterator[str]:
+        """Yield the modules whose slots the tasks of drives name, in the order of slots.
+
+        Where two things want one slot the first has it, and a comment names the other (decision).
+        """
+        taken = dict.fromkeys(range(processors + 1), "")
+        lines: dict[int, list[str]] = {}
+        for task in self.tasks:
+            for slot, model in _drive_modules(self.results[task.name].program):
+                if taken.setdefault(slot, model) == model:
+                    line = commented(f"  {slot}: {{module: {model}}}", f"of the drive of {task.name}")
+                    lines.setdefault(slot, [line])
+                else:
+                    lines.setdefault(slot, []).append(f"  # {task.name} wants a {model} in slot {slot}: choose another")
+        if lines:
+            yield "  # A drive turns a motor where its 57C406 has a plant: docs/rack_yaml.md."
+        for slot in sorted(lines):
+            yield from lines[slot]
+
     def _period_ns(self, task: DraftedTask) -> int:
         program = self.results[task.name].program
         return program.period_ns if program is not None and not program.is_basic else _UNKNOWN_NS
@@ -141,6 +161,14 @@ class Draft:
         )
         fitting = (model for model, size in sorted(COMMON_REGISTERS.items()) if needed <= size)
         return next(fitting, max(COMMON_REGISTERS))
+
+
+def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
+    """Return slots and models of the modules that the CALL of a drive's task names; none of any other task."""
+    if program is None or program.cml is None:
+        return []
+    facts = program.cml.facts
+    return [(int(facts[item.variable]), item.module) for item in program.cml.block.inputs if item.module]
 
 
 def _without_period(task: DraftedTask) -> str:

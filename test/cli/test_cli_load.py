@@ -99,7 +99,7 @@ def test_a_table_for_people(automax, plant):
         "  task  least us  most us  period us  load %\n"
         f"  OLD     {SPEED_6011:.2f}   {SPEED_6011:.2f}      11000    5.25\n"
         "\n"
-        "estimated: BASIC statements are in the sum, whose times no manual prints\n"
+        "estimated: BASIC statements or a drive's loop are in the sum, whose times no manual prints\n"
     )
 
 

@@ -114,13 +114,19 @@ def _check_keywords(context: Context, block: Block, call: Call, given: Collectio
         context.report("AMX4072", message, _keyword(context, argument), hint)
         meant.add(name)
         for variable in variables_in(argument.value):
-            if isinstance(variable, Reference) and variable.name not in context.events:
+            if isinstance(variable, Reference) and not _may_stand_whole(context, variable.name):
                 check_variable(context, variable)
     for name in missing:
         if name not in meant:
             place = context.place_of(call.block, call.span)
             context.report("AMX4074", f"{block.name} needs {name}", place, _missing_hint(block, name))
     return not missing and not strangers
+
+
+def _may_stand_whole(context: Context, name: str) -> bool:
+    """Return whether a name without subscripts is an event or an array, which some parameter may want."""
+    symbol = context.symbols.get(name)
+    return name in context.events or (symbol is not None and bool(symbol.dimensions))
 
 
 def _keyword(context: Context, argument: Argument) -> Span:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from automax_ros.blocks.declaration import Block, Form, Input, Output, Special
 from automax_ros.core.types import DataType
-from automax_ros.core.values import range_text
+from automax_ros.core.values import range_text, value_text
 from automax_ros.language.checks.constant_values import fits, hex_hint, literal_of
 from automax_ros.language.checks.context import Context
 from automax_ros.language.checks.expressions import check_expression, check_variable
@@ -148,7 +148,7 @@ def _check_range(context: Context, parameter: Input, literal: _Constant, written
         bounds = f"{low} to {high}"
     else:
         bounds = f"{low} or more" if low is not None else f"{high} or less"
-    context.report("AMX4080", f"{parameter.name} = {value} is out of range: {bounds}", written.span)
+    context.report("AMX4080", f"{parameter.name} = {value_text(value)} is out of range: {bounds}", written.span)
 
 
 def _check_choice(context: Context, parameter: Input, value: float, written: Expression) -> None:
