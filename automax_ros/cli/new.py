@@ -21,6 +21,8 @@ from automax_ros.core.text import count_of, quoted
 from automax_ros.rack.drafting import Draft, DraftFault, draft
 from automax_ros.rack.loader import load
 from automax_ros.rack.modules.processor import MAX_PROCESSORS
+from automax_ros.rack.task_rules import findings_by_task
+from automax_ros.rack.tasks_check import with_findings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -92,8 +94,10 @@ def _has_errors(output: Path, drafted: Draft) -> bool:
     loaded = load(output)
     print_diagnostics(loaded.diagnostics, loaded.source, sys.stderr)
     wrong = has_errors(loaded.diagnostics)
+    programs = {name: result.program for name, result in drafted.results.items() if result.program is not None}
+    among = findings_by_task(loaded.config, programs) if loaded.config is not None else {}
     for task in drafted.tasks:
-        found = drafted.results[task.name].diagnostics
+        found = with_findings(drafted.results[task.name], among.get(task.name, ())).diagnostics
         print_diagnostics(found, task.source, sys.stderr)
         wrong = wrong or has_errors(found)
     return wrong
