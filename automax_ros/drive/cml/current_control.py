@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from automax_ros.drive.cml.bridge_change import FLOOR, QUIET, BridgeChange, Stage, preset_us
 from automax_ros.drive.cml.firing import Firing
 from automax_ros.drive.cml.reference import FULL, ReferenceChain
-from automax_ros.drive.cml.regulator import Regulator
+from automax_ros.drive.cml.regulator import STEPS, Regulator
 from automax_ros.drive.cml.signals import RATED, Measured, Pulse
 from automax_ros.drive.state import Stateful
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 LONGEST_ZERO_US = 3472
 """Largest DC_TIME, us (52.2.1)."""
+FRESH_SCANS = 2
+"""Scans that a preset is given to show a current before the search goes on from it (decision)."""
 
 
 class CurrentControl(Stateful):
@@ -28,52 +31,56 @@ class CurrentControl(Stateful):
     Attributes:
         i_fdbk: I_FDBK of the last scan, counts.
         dc_time: DC_TIME of the last scan, us.
-        bridge: 1 or 2.
-        discontinuous: whether the current was zero at some time in the last scan.
+        part: part of the last scan in which current flowed.
         block: whether gates that are on shall end at once.
     """
 
-    _kept = ("i_fdbk", "dc_time", "bridge", "discontinuous", "block")
+    _kept = ("i_fdbk", "dc_time", "part", "block", "_fresh")
 
     def __init__(self) -> None:
         """Begin with everything off."""
         self.i_fdbk = 0
         self.dc_time = 0
-        self.bridge = 1
-        self.discontinuous = False
+        self.part = 0.0
         self.block = False
+        self._fresh = 0
         self.chain = ReferenceChain()
         self.regulator = Regulator()
+        self.change = BridgeChange()
         self.firing = Firing()
-        self.parts: tuple[Stateful, ...] = (self, self.chain, self.regulator, self.firing)
+        self.parts: tuple[Stateful, ...] = (self, self.chain, self.regulator, self.change, self.firing)
+
+    @property
+    def bridge(self) -> int:
+        """The bridge in use, 1 or 2."""
+        return self.change.bridge
 
     @property
     def delta_us(self) -> float:
         """DELTA of the last scan, us."""
         return self.regulator.delta_us
 
+    @property
+    def discontinuous(self) -> bool:
+        """Whether the current was zero at some time in the last scan."""
+        return self.part < 1.0
+
     def begin(self) -> None:
         """Begin a run: references and DELTA at 0, on bridge 1."""
-        self.bridge = 1
         self.chain.begin()
-        self.regulator.begin(0.0)
-        self.firing.begin()
+        self._take(1, 0.0)
 
     def feed_back(self, measured: Measured, lim_bar: int, period_ns: int) -> None:
         """Scale the mean current of the last scan, 4095 counts at LIM_BAR: once each scan, whatever the drive does."""
-        counts = measured.current * FULL * 100 / (RATED * lim_bar)
-        self.i_fdbk = self.regulator.feedback(counts, measured.zero_us, period_ns / 6000)
-        self.dc_time = min(measured.zero_us, LONGEST_ZERO_US)
-        self.discontinuous = measured.zero_us > 0
+        counts = measured.current * (FULL * 100 / RATED) / lim_bar
+        zero_us = measured.zero_us
+        # DC_TIME is in whole us, and the scan a little longer.
+        self.part = max(0.0, 1.0 - zero_us * 6000 / (period_ns - 12_000)) if zero_us else 1.0
+        self.i_fdbk = self.regulator.feedback(counts, self.part)
+        self.dc_time = zero_us if zero_us < LONGEST_ZERO_US else LONGEST_ZERO_US
 
     def scan(
-        self,
-        measured: Measured,  # noqa: ARG002
-        reference: int,
-        settings: Latched,
-        pll: Pll,
-        *,
-        reverse: bool,
+        self, measured: Measured, reference: int, settings: Latched, pll: Pll, *, reverse: bool
     ) -> tuple[Pulse, ...]:
         """Regulate the current and plan the pulses up to the next interrupt.
 
@@ -84,18 +91,52 @@ class CurrentControl(Stateful):
             pll: where the line is.
             reverse: whether the SCRs are fired in the order of the other rotation.
         """
-        interval_s = pll.period_ns / 6e9
-        wanted = self.chain.scan(reference, settings.ref_rate, settings.ref_lag, interval_s)
-        self.bridge = 2 if wanted < 0 else 1
-        error = (wanted - self.i_fdbk) * (1 if self.bridge == 1 else -1)
-        highest_us = pll.period_ns / 2000
-        self.regulator.scan(error, settings.kp, settings.pi_w_lead, 1.0, interval_s, highest_us)
+        period_us = pll.period_ns * 1e-3
+        scan_us = period_us / 6
+        wanted = self.chain.scan(reference, settings.ref_rate, settings.ref_lag, scan_us * 1e-6)
+        fast = settings.fast_change
+        self.block = False
+        if self.change.scan(measured, wanted, scan_us, fast=fast):
+            bridge = self.change.bridge
+            self._take(bridge, preset_us(measured, bridge, abs(wanted), settings.cc_thresh, period_us) if fast else 0.0)
+        elif self.change.stage == Stage.BACK:
+            back = QUIET if self.part < 1.0 else FLOOR
+            self.regulator.begin(min(self.regulator.delta_us, back * period_us))
+            return self._fire(pll, self.regulator.delta_us, self.bridge, reverse)
+        elif self.change.stage == Stage.OFF:
+            self.block = True
+            self.regulator.begin(0.0)
+            return self.off(pll)
+        self._regulate(wanted, settings, period_us)
         return self._fire(pll, self.regulator.delta_us, self.bridge, reverse)
+
+    def _regulate(self, wanted: float, settings: Latched, period_us: float) -> None:
+        """Find DELTA for the bridge in use."""
+        regulator, part = self.regulator, self.part
+        if self.bridge == 2:
+            error = self.i_fdbk - wanted if wanted < 0.0 else self.i_fdbk
+            wanted = -wanted
+        else:
+            error = wanted - self.i_fdbk if wanted > 0.0 else -self.i_fdbk
+        kp = int(settings.kp * STEPS + 0.5) / STEPS
+        if part <= 0.0:
+            if self._fresh > 0:
+                self._fresh -= 1
+            elif wanted >= 1.0:
+                regulator.search(error, kp, wanted / FULL, period_us)
+            return
+        self._fresh = 0
+        gain = kp * settings.pi_w_lead * period_us / 6e6
+        if part < 1.0:
+            regulator.discontinuous(error, kp, gain, settings.ag_factor, settings.cc_thresh, part, period_us)
+        else:
+            regulator.continuous(error, kp, gain, period_us, FLOOR * period_us)
 
     def open_loop(self, delta_us: float, bridge: int, pll: Pll, *, reverse: bool) -> tuple[Pulse, ...]:
         """Fire at a DELTA (us) on bridge 1 or 2 without regulation: the test mode (52.1.4)."""
-        self.bridge = bridge
+        self.change.begin(bridge)
         self.regulator.begin(delta_us)
+        self.block = False
         return self._fire(pll, delta_us, bridge, reverse)
 
     def off(self, pll: Pll) -> tuple[Pulse, ...]:
@@ -109,6 +150,14 @@ class CurrentControl(Stateful):
         outputs.ref_rate_out, outputs.ref_lag_out = round(self.chain.rate_out), round(self.chain.lag_out)
         outputs.fdbk_gain, outputs.i_fdbk = self.regulator.fdbk_gain, self.i_fdbk
         outputs.integral_gain, outputs.delta = self.regulator.integral_gain, round(self.regulator.delta_us)
+
+    def _take(self, bridge: int, delta_us: float) -> None:
+        """Begin to use a bridge that has no current at a DELTA, us."""
+        self.change.begin(bridge)
+        self.regulator.begin(delta_us)
+        self.firing.begin()
+        self.block = False
+        self._fresh = FRESH_SCANS if delta_us else 0
 
     def _fire(self, pll: Pll, delta_us: float, bridge: int, reverse: bool) -> tuple[Pulse, ...]:
         return self.firing.pulses(pll.position, pll.period_ns, round(delta_us * 1000), bridge, reverse)

@@ -1,6 +1,11 @@
 """The current regulator: P + I with gains that follow the conduction time (52.1.2, 52.2.1).
 
-All that is between the published end points is a decision: the tables stand here.
+Published are the end points alone. In continuous conduction the integral gain is KP x PI_W_LEAD x the scan's time
+(decision). The proportional part takes into account what its last push has not shown yet in the mean of a scan: an SCR
+is fired up to a scan after the interrupt (decision). In discontinuous conduction the current depends on DELTA
+alone, with the cube of the part of the scan that conducts: the integral gain is what takes off ``INTEGRAL_STEP`` of an
+error in a scan, at most AG_FACTOR times the continuous one (decision). While nothing conducts, DELTA moves by steps
+(decision).
 """
 
 from __future__ import annotations
@@ -8,11 +13,30 @@ from __future__ import annotations
 from automax_ros.drive.state import Stateful
 
 GAIN_CONTINUOUS, GAIN_LOWEST = 1280, 512
-"""FDBK_GAIN without and with nothing but zero current, in 1/1024; between them it falls in proportion to DC_TIME."""
-FEEDBACK_LIMIT = 10238
-"""Largest I_FDBK (52.2.1)."""
+"""FDBK_GAIN without and with nothing but zero current, in 1/1024; between them it falls in proportion to DC_TIME
+(decision)."""
 RAW_LIMIT = 8190
-"""Largest raw feedback: twice LIM_BAR (decision: 8190 x 1.25 is the largest I_FDBK)."""
+"""Largest raw feedback: twice LIM_BAR (decision: 8190 x 1.25 is the largest I_FDBK, 10238)."""
+STEPS = 1024
+"""Steps of KP, and of the gains that are shown, in 1."""
+LARGEST_GAIN = 32767
+BOUNDARY_WAY = 1 / 12
+"""From the first current to continuous conduction DELTA moves by about this part of a period (decision)."""
+INTEGRAL_STEP = 0.55
+"""Part of an error that the integral takes off in a scan, in discontinuous conduction (decision)."""
+LEAST_PART = 0.05
+"""Conducting part of a scan below which the integral gain rises no more (decision)."""
+RAISED, FALL = 0.11, 0.88
+"""After discontinuous conduction the continuous integral gain is greater by this part of an error, which falls by this
+factor each scan: the drop over the resistance comes with the current (decision)."""
+RISE = 0.28
+"""DELTA rises in a scan by at most this part of a scan in discontinuous conduction, or what conducts would not tell
+(decision)."""
+AHEAD = 0.4
+"""Part of the last proportional push that the mean of a scan does not show if the SCR is fired at the scan's end
+(decision)."""
+SEARCH_LEAST, SEARCH_MOST = 0.018, 0.040
+"""Step of DELTA while nothing conducts, over the period: for the smallest reference and for LIM_BAR (decision)."""
 
 
 class Regulator(Stateful):
@@ -20,50 +44,91 @@ class Regulator(Stateful):
 
     Attributes:
         integral_us: the integrator, us of DELTA.
+        push_us: the proportional part, us.
         delta_us: DELTA of the last scan, us.
+        before_us: DELTA of the scan before that, us.
+        raised: what is left of the raised integral gain, us a count and scan.
         fdbk_gain: FDBK_GAIN of the last scan.
         integral_gain: INTEGRAL_GAIN of the last scan: us of DELTA a count of error and scan, in 1/1024.
     """
 
-    _kept = ("integral_us", "delta_us", "fdbk_gain", "integral_gain")
+    _kept = ("integral_us", "push_us", "delta_us", "before_us", "raised", "fdbk_gain", "integral_gain")
 
     def __init__(self) -> None:
         """Begin at DELTA 0."""
-        self.integral_us = self.delta_us = 0.0
+        self.begin(0.0)
         self.fdbk_gain = self.integral_gain = 0
 
     def begin(self, delta_us: float) -> None:
         """Begin at a DELTA, us."""
-        self.integral_us = self.delta_us = delta_us
+        self.integral_us = self.delta_us = self.before_us = delta_us
+        self.push_us = self.raised = 0.0
 
-    def feedback(self, counts: float, zero_us: int, interval_us: float) -> int:
-        """Return I_FDBK, counts: the mean current of the scan, limited as the raw signal is."""
-        part = min(1.0, zero_us / interval_us)
-        self.fdbk_gain = gain = round(GAIN_CONTINUOUS + (GAIN_LOWEST - GAIN_CONTINUOUS) * part)
-        raw = max(-RAW_LIMIT, min(RAW_LIMIT, counts * 1024 / gain))
-        return round(raw * gain / 1024)
+    def feedback(self, counts: float, part: float) -> int:
+        """Return I_FDBK, counts: the mean current of the scan, limited as the raw signal is.
 
-    def scan(
-        self,
-        error: float,
-        kp: float,
-        lead_rad_s: float,
-        factor: float,
-        interval_s: float,
-        highest_us: float,
-    ) -> float:
-        """Move on by a scan and return DELTA, us.
+        Args:
+            counts: the mean current.
+            part: the part of the scan that conducted, 0 to 1.
+        """
+        self.fdbk_gain = gain = int(GAIN_LOWEST + (GAIN_CONTINUOUS - GAIN_LOWEST) * part + 0.5)
+        limit = RAW_LIMIT * gain / STEPS
+        return round(limit if counts > limit else -limit if counts < -limit else counts)
+
+    def search(self, error: float, kp: float, wanted: float, period_us: float) -> None:
+        """Move DELTA on by a step while nothing conducts: the greater the reference (over LIM_BAR), the faster."""
+        step = (SEARCH_LEAST + (SEARCH_MOST - SEARCH_LEAST) * min(1.0, wanted)) * period_us
+        self.before_us = self.delta_us
+        self.delta_us = min(self.delta_us + step, 0.5 * period_us)
+        self.push_us = kp * error
+        self.integral_us = self.delta_us - self.push_us
+
+    def continuous(self, error: float, kp: float, gain: float, period_us: float, lowest_us: float) -> None:
+        """Move on by a scan in which current flowed all the time.
 
         Args:
             error: counts, positive where the bridge in use must carry more.
             kp: KP, us a count.
-            lead_rad_s: PI_W_LEAD, rad/s.
-            factor: by how much the integral gain is raised, 1 or more.
-            interval_s: the time of a scan.
-            highest_us: largest DELTA, us.
+            gain: integral gain, us a count and scan.
+            period_us: the line's period.
+            lowest_us: least DELTA.
         """
-        self.integral_gain = min(32767, round(kp * lead_rad_s * interval_s * factor * 1024))
-        self.integral_us += self.integral_gain / 1024 * error
-        self.integral_us = max(0.0, min(highest_us, self.integral_us))
-        self.delta_us = max(0.0, min(highest_us, self.integral_us + kp * error))
-        return self.delta_us
+        if self.raised > 0.0:
+            gain += self.raised
+            self.raised = self.raised * FALL if self.raised > 0.01 * gain else 0.0
+        fired = (0.5 * period_us - self.delta_us) * 6.0 / period_us % 1.0
+        self.push_us = kp * error - AHEAD * fired * self.push_us
+        self._move(gain, gain * error, lowest_us, 0.5 * period_us)
+
+    def discontinuous(
+        self, error: float, kp: float, gain: float, factor: float, thresh: int, part: float, period_us: float
+    ) -> None:
+        """Move on by a scan in which no current flowed for a part of the time.
+
+        Args:
+            error: counts, positive where the bridge in use must carry more.
+            kp: KP, us a count.
+            gain: integral gain in continuous conduction, us a count and scan.
+            factor: AG_FACTOR.
+            thresh: CC_THRESH, counts; 0 leaves the integral gain as it is.
+            part: the part of the scan that conducted, below 1.
+            period_us: the line's period.
+        """
+        move = gain * error
+        if thresh > 0:
+            # I = thresh x part^3, and part grows by 1 on the way to the boundary.
+            steepest = 3.0 / (BOUNDARY_WAY * period_us) * thresh
+            x = part if part > LEAST_PART else LEAST_PART
+            self.raised = min(RAISED / steepest, gain * (factor - 1.0))
+            gain = min(max(gain, INTEGRAL_STEP / (steepest * x * x)), gain * factor)
+            boundary = 0.5 * (self.delta_us + self.before_us) + (1.0 - part) * BOUNDARY_WAY * period_us
+            move = min(gain * error, max(move, boundary - self.integral_us))
+        self.push_us = kp * error
+        self._move(gain, move, 0.0, min(0.5, self.delta_us / period_us + RISE / 6.0) * period_us)
+
+    def _move(self, gain: float, move_us: float, lowest_us: float, highest_us: float) -> None:
+        """Move the integrator, and find DELTA between two bounds."""
+        self.integral_gain = min(LARGEST_GAIN, int(gain * STEPS + 0.5))
+        self.integral_us = integral = min(max(self.integral_us + move_us, lowest_us), highest_us)
+        self.before_us = self.delta_us
+        self.delta_us = min(max(integral + self.push_us, lowest_us), highest_us)

@@ -1,0 +1,108 @@
+"""The change from one bridge to the other: phase back, zero current, then the other's gates (52.6).
+
+Ordinary: current must be seen to be zero over a whole scan, then the new bridge begins at DELTA 0 and searches: the
+more CEMF is against it and the smaller the reference, the longer that takes (decision). Fast (register 4146 bit 0):
+the new bridge begins as soon as the SCRs have recovered, at the DELTA that the CEMF asks for (decision).
+"""
+
+from __future__ import annotations
+
+import enum
+from math import acos, pi
+
+from automax_ros.drive.cml.regulator import BOUNDARY_WAY
+from automax_ros.drive.cml.signals import VOLTAGE, VOLTS, Measured
+from automax_ros.drive.state import Stateful
+
+DEAD_BAND = 4.0
+"""Counts of reference of the other sign that do not ask for a change: it would never rest at reference 0
+(decision)."""
+FLOOR = 27 / 360
+"""DELTA over the period that inversion needs while current is continuous: overlap at 2.5 times the rated current, and
+the turn-off time of SCRs (decision)."""
+QUIET = 8 / 360
+"""DELTA over the period in the phase back once current is discontinuous: it fires next to nothing, and turns off
+(decision)."""
+RECOVERY_US = 500
+"""Time without current after which SCRs block, with a margin (decision)."""
+VD0 = 1.3505
+"""Ideal mean voltage of a bridge over the line-to-line voltage: 3 sqrt(2) / pi."""
+HIGHEST_COS = 0.95
+"""Alpha of a preset lies between the angles of this cosine (decision)."""
+
+
+class Stage(enum.IntEnum):
+    """How far a change is."""
+
+    NONE = 0
+    BACK = 1
+    """The old bridge is phased back."""
+    OFF = 2
+    """No current was seen; all gates are off."""
+
+
+class BridgeChange(Stateful):
+    """Chooses the bridge.
+
+    Attributes:
+        bridge: 1 or 2, the one in use.
+        stage: how far a change to the other is.
+    """
+
+    _kept = ("bridge", "stage")
+
+    def __init__(self) -> None:
+        """Begin on bridge 1."""
+        self.bridge = 1
+        self.stage = Stage.NONE
+
+    def begin(self, bridge: int) -> None:
+        """Begin on a bridge, without current."""
+        self.bridge = bridge
+        self.stage = Stage.NONE
+
+    def scan(self, measured: Measured, wanted: float, scan_us: float, *, fast: bool) -> bool:
+        """Move on by a scan; return whether the other bridge is in use from now on.
+
+        Args:
+            measured: what was measured in the last scan.
+            wanted: the reference after the lag, counts.
+            scan_us: the time of a scan.
+            fast: whether the fast change is on.
+        """
+        against = wanted if self.bridge == 2 else -wanted
+        if self.stage == Stage.NONE:
+            if against < DEAD_BAND:
+                return False
+            self.stage = Stage.BACK
+        elif against < -DEAD_BAND:
+            self.stage = Stage.NONE
+            return False
+        if measured.tail_us <= 0:
+            self.stage = Stage.BACK
+            return False
+        if measured.tail_us < (RECOVERY_US if fast else int(scan_us)):
+            self.stage = Stage.OFF
+            return False
+        self.begin(3 - self.bridge)
+        return True
+
+
+def preset_us(measured: Measured, bridge: int, wanted: float, thresh: int, period_us: float) -> float:
+    """Return the DELTA with which a bridge begins so that it gives a current at once, by the CEMF measured.
+
+    Without armature voltage feedback the CEMF is taken as 0 (decision).
+
+    Args:
+        measured: what was measured at the end of the last scan, in which no current flowed.
+        bridge: 1 or 2.
+        wanted: magnitude of the reference, counts.
+        thresh: CC_THRESH, counts: a smaller reference begins with an earlier DELTA.
+        period_us: the line's period.
+    """
+    ratio = measured.voltage / (VOLTS * VD0) if measured.status & VOLTAGE else 0.0
+    if bridge == 2:
+        ratio = -ratio
+    continuous = (1.0 - acos(max(-HIGHEST_COS, min(HIGHEST_COS, ratio))) / pi) * 0.5 * period_us
+    part = 1.0 if wanted >= thresh else (wanted / thresh) ** (1 / 3)
+    return continuous - (1.0 - part) * BOUNDARY_WAY * period_us

@@ -1,0 +1,82 @@
+"""Steps of the current with the gains that are proposed: rise, overshoot, settled mean; three motors, both bridges."""
+
+import pytest
+
+from .support import Bench
+
+SIZES = {"10hp": 210.0, "150hp": 450.0, "800hp": 640.0}
+"""Motors, with an EMF near base speed."""
+MS = 1e-6
+FULL = 4095
+
+
+def crossing_ns(scans, before, level, rising):
+    """When the feedback first passes a level, between scans by a straight line."""
+    last_ns, last = scans[0].now_ns, before
+    for scan in scans:
+        if (scan.feedback >= level) if rising else (scan.feedback <= level):
+            if scan.feedback == last:
+                return last_ns
+            return last_ns + (level - last) / (scan.feedback - last) * (scan.now_ns - last_ns)
+        last_ns, last = scan.now_ns, scan.feedback
+    raise AssertionError(f"the feedback never reached {level}")
+
+
+def step(bench, start, end):
+    """Step the reference (counts); return rise in ms, overshoot in % of the step, mean at the end."""
+    bench.set(reference=start)
+    bench.run(0.4)
+    bench.set(reference=end)
+    scans = bench.run(0.5)
+    way, rising = end - start, end > start
+    low, high = (crossing_ns(scans, start, start + part * way, rising) for part in (0.1, 0.9))
+    over = max((scan.feedback - end) * (1 if rising else -1) for scan in scans)
+    tail = scans[-60:]
+    return (high - low) * MS, 100 * over / abs(way), sum(scan.feedback for scan in tail) / len(tail)
+
+
+CASES = [
+    (size, hertz, part * emf, sign)
+    for size, emf in SIZES.items()
+    for hertz in (60, 50)
+    for part in (0.0, 0.44, 1.0)
+    for sign in (1, -1)
+]
+SLOWER = {("800hp", 50, 640.0, 1): 16.5}
+"""Rise in ms where a step from zero current takes longer than 15 ms."""
+
+
+@pytest.mark.parametrize(("size", "hertz", "emf", "sign"), CASES)
+def test_steps_of_the_current(size, hertz, emf, sign):
+    bench = Bench(size, hertz)
+    bench.emf(emf)
+    bench.start()
+    for start, end, most in ((0, 50, 20), (30, 60, 15), (50, 20, 15)):
+        first, last = (round(sign * FULL * part / 100) for part in (start, end))
+        rise, over, mean = step(bench, first, last)
+        allowed = SLOWER.get((size, hertz, emf, sign), 15.0) if start == 0 else 15.0
+        assert 0.0 < rise < allowed, f"{start} to {end} %"
+        assert over < most, f"{start} to {end} %"
+        assert abs(mean - last) < 0.01 * abs(last)
+
+
+def test_small_currents_settle_in_discontinuous_conduction():
+    bench = Bench("150hp")
+    bench.emf(200.0)
+    bench.start()
+    for percent in (2, 5, 10, -3, -8):
+        wanted = round(FULL * percent / 100)
+        bench.set(reference=wanted)
+        scans = bench.run(0.8)[-60:]
+        assert all(scan.measured.zero_us > 0 for scan in scans)
+        mean = sum(scan.feedback for scan in scans) / len(scans)
+        assert abs(mean - wanted) < 0.01 * abs(wanted)
+        assert max(abs(scan.feedback - mean) for scan in scans) <= 2
+
+
+def test_first_pulse_of_a_small_reference_is_small():
+    bench = Bench("150hp")
+    bench.start()
+    bench.set(reference=41)
+    scans = bench.run(0.4)
+    assert 41 <= max(scan.feedback for scan in scans) < 41 + 0.03 * FULL
