@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.bags.common_log import Cell, CommonLog, WatchedValues
+from automax_ros.bags.common_log import Cell, CommonLog, Entry, WatchedValues
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.locals import WatchedLocals, is_local
+from automax_ros.bags.plant_columns import WatchedPlants, is_plant
 from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.run_facts import run_facts
 from automax_ros.bags.span import span_of
 from automax_ros.bags.variables import Watched, watched_by_default, watched_by_name
 from automax_ros.core.names import NameFault
 from automax_ros.core.ticks import seconds_text
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, Variable, VariableTable
+from automax_ros.wire.messages import CommonImage, CommonWrite, PlantState, Scan, TaskState, Variable, VariableTable
 
 MAX_GRID_ROWS = 20_000_000
 """Most rows of an export on a grid of time (decision): a day at 5.5 ms has 15.7 million."""
 _TYPES = frozenset(f"automax_msgs/msg/{name}" for name in ("CommonImage", "CommonWrite", "VariableTable"))
 _SCAN = "automax_msgs/msg/Scan"
 _STATE = "automax_msgs/msg/TaskState"
+_PLANT = "automax_msgs/msg/PlantState"
 
 Change = tuple[int, dict[int, Cell]]
 """Nanoseconds from the start of the run, and the new values by index of column."""
@@ -49,7 +51,7 @@ class Series:
     """The watched variables of a recording, to be read once.
 
     Without ``watch`` all simple numeric and boolean variables are watched; array elements are named like ``TABLE%(3)``,
-    locals of tasks like ``SPEED.RATIO%``.
+    locals of tasks like ``SPEED.RATIO%``, signals of plants like ``UNWIND/current_a``.
     ``columns`` are the watched variables, ``rack`` and ``origin_ns`` the rack's name and the stamp at the start of its
     run; ``end_ns`` is the end of what was read, once it is read. ``take_scan``, if given, is called with each scan of
     the window.
@@ -74,10 +76,12 @@ class Series:
         types = _TYPES | {_SCAN} if take_scan else _TYPES
         if any(map(is_local, watch or ())):
             types |= {_STATE}
+        if any(map(is_plant, watch or ())):
+            types |= {_PLANT}
         self._messages = self._reader.messages(types=types)
         self._log = CommonLog(bag, run_facts(self._reader))
         table, variables = self._log.facts.table, self._log.variables
-        self._locals = WatchedLocals(bag)
+        self._locals, self._plants = WatchedLocals(bag), WatchedPlants(bag)
         self.columns: tuple[Watched, ...] = tuple(self._watched(variables, watch))
         self.rack = table.rack
         self.origin_ns = table.stamp
@@ -99,6 +103,7 @@ class Series:
             found = True
             yield change
         self._locals.require_all()
+        self._plants.require_all()
         if not found and self.columns:
             last = f"the recording ends at {seconds_text(self.end_ns)} s"
             start = seconds_text(self._window.start_ns)
@@ -110,7 +115,9 @@ class Series:
         watched: dict[str, Watched] = {}
         try:
             for name in watch:
-                if is_local(name):
+                if is_plant(name):
+                    item = self._plants.add(len(watched), name)
+                elif is_local(name):
                     item = self._locals.add(len(watched), name)
                 else:
                     (item,) = watched_by_name(variables, [name])
@@ -124,22 +131,27 @@ class Series:
         values, instant = self._values, self.origin_ns
         for entry in self._messages:
             message = entry.message
-            if isinstance(message, (CommonImage, CommonWrite, TaskState)):
-                entries = None if isinstance(message, TaskState) else self._log.take(message)
-                if entries is None and not isinstance(message, TaskState):
-                    continue
-                if message.stamp != instant:
-                    changed = values.changes()
-                    if changed:
-                        yield max(0, instant - self.origin_ns), changed
-                    instant = message.stamp
-                if isinstance(message, TaskState):
-                    for column, value in self._locals.values(message):
-                        values.tell(column, value)
-                else:
-                    values.take(entries or ())
+            told: Iterable[tuple[int, Cell]] = ()
+            entries: Iterable[Entry] | None = ()
+            if isinstance(message, TaskState):
+                told = self._locals.values(message)
+            elif isinstance(message, PlantState):
+                told = self._plants.values(message)
+            elif isinstance(message, (CommonImage, CommonWrite)):
+                entries = self._log.take(message)
             else:
                 self._take_other(entry)
+                continue
+            if entries is None:
+                continue
+            if message.stamp != instant:
+                changed = values.changes()
+                if changed:
+                    yield max(0, instant - self.origin_ns), changed
+                instant = message.stamp
+            for column, value in told:
+                values.tell(column, value)
+            values.take(entries)
         changed = values.changes()
         if changed:
             yield max(0, instant - self.origin_ns), changed

@@ -5,12 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.export import export_csv
 from automax_ros.bags.info import bag_info
 from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.live.topics import LiveTopics
 from automax_ros.bags.playback import survey
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder
+from automax_ros.bags.traces import traces
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.engine import replay
 from automax_ros.wire.cdr import decode
@@ -106,3 +111,35 @@ def test_recorder_outside_takes_plants_that_the_graph_offers(tmp_path: Path) -> 
     stamps = [item.stamp for item in decoded(tmp_path / "bag", STATES)]
     assert stamps == [1_700_000_000_000_000_000 + number * 10_000_000 for number in range(10)]
     assert replay(tmp_path / "bag").identical
+
+
+def test_signals_are_columns_of_exports_and_lines_of_pictures(tmp_path: Path) -> None:
+    bag = recorded(tmp_path)
+    watch = ["unwind/SPEED_RPM", "REF%", "UNWIND/contactor", "UNWIND/bridge", "UNWIND/line_v"]
+    export_csv(bag, tmp_path / "out.csv", watch)
+    header, *rows = (tmp_path / "out.csv").read_text().splitlines()
+    assert header == "time_s,UNWIND/speed_rpm,REF%,UNWIND/contactor,UNWIND/bridge,UNWIND/line_v"
+    assert [row.split(",")[0] for row in rows] == ["0", *(f"0.0{number}" for number in range(1, 10))]
+    states = decoded(bag, STATES)
+    for row, state in zip(rows, states, strict=True):
+        assert float(row.split(",")[1]) == pytest.approx(state.speed_rpm, rel=1e-7)
+    assert [row.split(",")[2:] for row in rows] == [["100", "0", "0", "460.0"]] * 10
+    drawn = traces(bag, ["UNWIND/speed_rpm"]).lines[0]
+    assert (drawn.variable.unit, drawn.variable.label) == ("rpm", "UNWIND/speed_rpm")
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "hint"),
+    [
+        ("UNWIND/speed", "AMX6821", "UNWIND/speed_rpm"),
+        ("UNWIND/faults", "AMX6821", ""),
+        ("UNWIND/", "AMX6821", "write PLANT/SIGNAL"),
+        ("WINDER/speed_rpm", "AMX6850", "it holds those of UNWIND"),
+    ],
+)
+def test_signal_that_is_not_there_is_told(tmp_path: Path, name: str, code: str, hint: str) -> None:
+    bag = recorded(tmp_path)
+    with pytest.raises(BagError) as caught:
+        export_csv(bag, tmp_path / "out.csv", [name])
+    assert caught.value.code == code
+    assert hint in caught.value.hint
