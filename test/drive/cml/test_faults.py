@@ -195,10 +195,11 @@ def test_a_pll_register_of_0_or_less_is_a_sync_loss(state, register, value):
     assert starts_again(drive)
 
 
-def test_a_pll_register_of_0_counts_before_the_first_lock():
+@pytest.mark.parametrize("registers", [(109, 0, 2, 0), (109, 4, 0, 0)])
+def test_a_pll_register_of_0_counts_before_the_first_lock(registers):
     drive = Drive()
     drive.scan()
-    drive.registers = (109, 0, 0, 0)
+    drive.registers = registers
     drive.run(0.02)
     assert drive.faults == {"SYNC_LOSS_OUT"}
 

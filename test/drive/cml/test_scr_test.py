@@ -3,7 +3,8 @@
 import pytest
 
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.drive.cml.signals import gate_numbers
+from automax_ros.drive.cml.scr_test import GO_ON, THRESHOLD, ScrTest
+from automax_ros.drive.cml.signals import Measured, gate_numbers
 from automax_ros.drive.nameplate import EXAMPLES, derive
 from automax_ros.drive.plant import DrivePlant, PlantData
 
@@ -56,7 +57,7 @@ def test_the_other_rotation_makes_no_difference(scr):
     assert (drive.faults, drive["BAD_SCR_NUM"]) == ({"BAD_SCR_OUT"}, PAIR[scr])
 
 
-@pytest.mark.parametrize("emf", [120.0, 300.0, 470.0, -120.0, -300.0])
+@pytest.mark.parametrize("emf", [120.0, 300.0, 470.0, -120.0, -300.0, -480.0])
 @pytest.mark.parametrize("scr", PAIR)
 def test_a_motor_that_turns_hides_no_short(scr, emf):
     drive = Drive(tests_scrs=True)
@@ -64,6 +65,36 @@ def test_a_motor_that_turns_hides_no_short(scr, emf):
     drive.plant.circuit.short_scr(scr)
     after_start(drive)
     assert ("BAD_SCR_OUT" in drive.faults, drive["BAD_SCR_NUM"]) == (True, PAIR[scr])
+
+
+# Where current flows once an SCR is fired alone on a line A, B, C, and the leg that must be shorted for it:
+# (fired, currents of line and armature at the interrupt, pair). SCR 1 leads A to P, 2 leads M to C (docs/drive.md).
+WAYS = [
+    (1, "line", 5), (1, "both", 2), (1, "armature", 4),
+    (2, "line", 6), (2, "both", 3), (2, "armature", 5),
+    (3, "line", 1), (3, "both", 4), (3, "armature", 6),
+    (6, "line", 4), (6, "both", 1), (6, "armature", 3),
+    (11, "line", 2), (11, "both", 5), (11, "armature", 1),
+    (16, "line", 1), (16, "both", 4), (16, "armature", 6),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("fired", "way", "pair"), WAYS)
+def test_the_way_of_the_current_names_the_leg(fired, way, pair):
+    test = ScrTest()
+    test.begin(both=True)
+    numbers = ()
+    for position in range(108):
+        (pulse,) = test.fire(position % 6, 16_666_667, reverse=False)
+        numbers = gate_numbers(pulse.gates)
+        if numbers == (fired,):
+            break
+        assert test.judge(Measured(0, tail_us=2778), reverse=False) == GO_ON
+    assert numbers == (fired,)
+    ways = {"line": (THRESHOLD, 0, 2778), "both": (THRESHOLD, 900, 0), "armature": (0, -THRESHOLD, 0)}
+    line, current, tail_us = ways[way]
+    assert test.judge(Measured(0, current, 0, tail_us, line=line), reverse=False) == pair
+    assert test.judge(Measured(0, current // 2, 0, tail_us, line=line // 2), reverse=False) == GO_ON
 
 
 @pytest.mark.parametrize("size", ["10hp", "150hp", "800hp"])
