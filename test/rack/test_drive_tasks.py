@@ -8,8 +8,10 @@ import pytest
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.drive.cml.minor_loop import CurrentMinorLoop
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.retention import Retention
 from automax_ros.running.scan_record import Status
 from automax_ros.running.views import MemoryValueError
 
@@ -227,3 +229,21 @@ def test_local_of_a_fault_input_cannot_be_forced(tmp_path):
     with pytest.raises(MemoryValueError, match="an input of DC_DRIVE_CML"):
         rack.force("CML.SPEED%", 1)
     rack.force("SPEED%", 1)
+
+
+def test_kept_state_has_locals_and_log_and_no_loop(tmp_path):
+    """2.4.5: what a power cycle keeps; the loop itself begins again."""
+    rack = rack_of(tmp_path)
+    kept = Retention(rack, tmp_path / "state")
+    permit(rack)
+    rack.write("OSV%", 6000)
+    rack.run(1.5)
+    assert kept.save()
+    again = rack_of(tmp_path)
+    assert Retention(again, tmp_path / "state").restore().notes == ()
+    assert again.task("CML").errors.first.problem == "AMX7113"
+    assert again.task("CML").value("SCANS%") == rack.task("CML").value("SCANS%") > 500
+    assert again.task("CML").loop.numbers() == CurrentMinorLoop().numbers()
+    permit(again)
+    again.run(0.6)
+    assert again.value("LOCKED@") is True

@@ -1,0 +1,58 @@
+"""Rules of a rack's current minor loop tasks: what `check` says, where, and what is right."""
+
+from __future__ import annotations
+
+import pytest
+
+from automax_ros.rack.loader import load
+from automax_ros.rack.tasks_check import check_tasks
+from rack.drive_tasks import CML, YAML, edited, folder_of
+
+
+def found(folder, **changes):
+    """Code, task, line and message of what the rack has against its tasks."""
+    result = load(folder_of(folder, **changes))
+    assert result.config is not None, result.diagnostics
+    return [
+        (item.code, task.name, item.span.line, item.message, item.hint)
+        for task, _, checked in check_tasks(result.config)
+        for item in checked.diagnostics
+    ]
+
+
+def test_example_is_right(tmp_path):
+    assert found(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "column_line", "message"),
+    [
+        (("IO_CNTL_SLOT=7", "IO_CNTL_SLOT=3"), "AMX6486", 3, "in slot 3 is no module in rack.yaml"),
+        (("IO_CNTL_SLOT=7", "IO_CNTL_SLOT=8"), "AMX6486", 3, "in slot 8 is the 57C408 (rack.yaml:5)"),
+        (("DIG_IO_SLOT=8", "DIG_IO_SLOT=7"), "AMX6487", 3, "in slot 7 is the 57C406 (rack.yaml:4)"),
+    ],
+)
+def test_slots_are_told_with_both_lines(tmp_path, change, code, column_line, message):
+    ((seen, task, line, text, hint),) = found(tmp_path, cml=edited(CML, change))
+    assert (seen, task, line) == (code, "CML", column_line)
+    assert message in text
+    assert "the rack has one in slot" in hint
+
+
+def test_equal_priority_is_not_before(tmp_path):
+    assert found(tmp_path, yaml=edited(YAML, ("SPEED: {priority: 6}", "SPEED: {priority: 4}"))) == []
+    ((code, task, _, text, _),) = found(tmp_path, yaml=edited(YAML, ("CML: {priority: 4}", "CML: {priority: 8}")))
+    assert (code, task) == ("AMX6492", "CML")
+    assert "SPEED of the same Processor" in text
+
+
+def test_tick_of_the_processor_must_be_the_default(tmp_path):
+    """52.0: set to the default tick rate (5.5 ms)."""
+    tasks = found(tmp_path, yaml=edited(YAML, ("module: 57C435, tasks", "module: 57C435, tick_ms: 5, tasks")))
+    assert tasks
+    assert {task for _, task, *_ in tasks} == {"CML"}
+
+
+def test_outputs_may_not_be_input_points(tmp_path):
+    yaml = edited(YAML, ("  STATE@: {}", "  STATE@: {slot: 8, register: 0, bit: 5}"))
+    assert [task for _, task, *_ in found(tmp_path, yaml=yaml)] == ["CML"]
