@@ -19,7 +19,8 @@ from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
-from automax_ros.drive.assessment import DriveFindings, Verdict, assess
+from automax_ros.drive.assessment import assess
+from automax_ros.drive.drive_case import DriveFindings, Verdict
 from automax_ros.language.program import Program
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.drive_cases import drive_cases

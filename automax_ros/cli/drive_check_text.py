@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from automax_ros.core.text import printable
-from automax_ros.drive.assessment import DriveCase, DriveFindings, Finding
+from automax_ros.drive.drive_case import DriveCase, DriveFindings, Finding
 
 _WIDTH = 120
 _INDENT = " " * 14

@@ -1,337 +1,37 @@
-"""What the manual's formulas say of one drive: each with its numbers put in, and whether all is well (52.4 to 52.6)."""
+"""Judges a drive by all rules that are for it."""
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from math import pi
+from collections.abc import Callable
 
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.limits import (
-    DEFAULT_THRESHOLD_DEG,
-    LARGEST_THRESHOLD_DEG,
-    LEAST_JBAR_S,
-    OVERCURRENT_RATIO,
-    TABLE_3_MH_A,
-    delta_bound_deg,
-    jbar_s,
-    largest_inductance_mh,
-    ripple_amps,
-    table_3_line_v,
+from automax_ros.drive.drive_case import DriveCase, DriveFindings, Finding, Unjudged, Verdict
+from automax_ros.drive.drive_rules import (
+    bridge_change,
+    inertia_time,
+    line_frequency,
+    overcurrent,
+    pmi_overcurrent,
+    tach_loss,
 )
-from automax_ros.drive.nameplate import DriveParameters
-
-PMI_TRIP_POINTS, PMI_MOST_TRIP = 75, 225
-"""By how much a PMI trips above the largest current, and its highest trip, % of rated current (S-3006 p. 109)."""
-
-
-class Verdict(enum.Enum):
-    """How a drive stands to a rule."""
-
-    FINE = "fine"
-    ATTENTION = "attention"
-    """A person should look at it: it depends on what is not known here."""
-    WRONG = "wrong"
-    """The drive will not run, trip, or is not safe."""
-
-
-@dataclass(frozen=True)
-class Given:
-    """What is programmed: its value, None where that is not known, and in words where it comes from."""
-
-    value: float | None
-    text: str
-
-
-@dataclass(frozen=True)
-class DriveCase:
-    """A drive, as far as it is known.
-
-    Attributes:
-        name: its plant.
-        where: the module that fires it, in words.
-        parameters: the motor and its line.
-        inertia: inertia of motor and load over the motor's own.
-        task: the task with its current minor loop, "" where that is not a task's.
-        inputs: the inputs of DC_DRIVE_CML by keyword, those not programmed left out.
-        threshold: register 4136.
-        fast_change: bit 0 of register 4146; value None where it may be either.
-        voltage: whether the armature voltage is wired to a 57C405.
-        registers: whether it is driven by a 57C406, with registers and a loop in a task.
-    """
-
-    name: str
-    where: str
-    parameters: DriveParameters
-    inertia: float = 1.0
-    task: str = ""
-    inputs: Mapping[str, Given] = field(default_factory=dict)
-    threshold: Given = Given(DEFAULT_THRESHOLD_DEG, "default")
-    fast_change: Given = Given(0, "default")
-    voltage: bool = False
-    registers: bool = True
-
-    @property
-    def armature_v(self) -> float:
-        """Rated armature voltage, V."""
-        values = self.parameters.values
-        return values["emf_v"].value + values["resistance_ohm"].value * self.parameters.amps
-
-    @property
-    def base_rpm(self) -> float:
-        """Base speed, rpm."""
-        return self.parameters.values["base_speed_rad_s"].value * 30 / pi
-
-    @property
-    def rated_n_m(self) -> float:
-        """Rated torque at the shaft, N m."""
-        return self.parameters.values["shaft_torque_n_m"].value
-
-    @property
-    def loop_inductance_h(self) -> float:
-        """Armature and two phases of the source, H."""
-        return self.parameters.motor.inductance_h + 2 * self.parameters.source_h
-
-    def value(self, keyword: str) -> float | None:
-        """Return the value of an input; None where it is not programmed or not known."""
-        given = self.inputs.get(keyword)
-        return None if given is None else given.value
-
-    def text(self, keyword: str) -> str:
-        """Return what is known of an input, in words."""
-        given = self.inputs.get(keyword)
-        return "not known" if given is None else given.text
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What came out of one rule.
-
-    Attributes:
-        rule: what was looked at, in a few words.
-        verdict: how it stands.
-        result: what was found, in a sentence.
-        formula: the manual's formula and where it stands.
-        numbers: the same with numbers; "" where one is not known.
-        values: what a program may want to know, by name with its unit.
-    """
-
-    rule: str
-    verdict: Verdict
-    result: str
-    formula: str
-    numbers: str = ""
-    values: Mapping[str, float | None] = field(default_factory=dict)
-
-
-def line_frequency(case: DriveCase) -> Finding:
-    """AC_LINE_FREQ must not be above the lowest frequency of the line (52.1.1)."""
-    line_hz, given = case.parameters.line_hz, case.value("AC_LINE_FREQ")
-    if given is None or given == line_hz:
-        verdict, why = Verdict.FINE, "that of the line"
-    elif given > line_hz:
-        verdict, why = Verdict.WRONG, "more than the line has: enter the lowest frequency that is expected"
-    else:
-        verdict, why = Verdict.ATTENTION, "less than the line has: right only where the frequency falls as low"
-    return Finding(
-        "AC_LINE_FREQ",
-        verdict,
-        f"{case.text('AC_LINE_FREQ')} Hz, {why}",
-        "AC_LINE_FREQ = lowest frequency of the line (52.1.1)",
-        f"line {line_hz:g} Hz",
-        {"ac_line_freq": given, "line_hz": line_hz},
-    )
-
-
-def tach_loss(case: DriveCase) -> Finding:
-    """Register 4136 and its upper limit (52.4.1, equation 1); above the default JBAR must allow it (equation 2)."""
-    formula = "DELTA THRESHOLD <= 180 - ARCOS[(0.75 VDC) / (1.35 VLL)] (52.4.1, equation 1)"
-    volts, line_v = case.armature_v, case.parameters.line_v
-    try:
-        bound = min(delta_bound_deg(volts, line_v), float(LARGEST_THRESHOLD_DEG))
-        exact = delta_bound_deg(volts, line_v)
-    except ParameterError as error:
-        return Finding("tach loss threshold", Verdict.WRONG, str(error), formula)
-    numbers = f"180 - ARCOS[(0.75 x {volts:.4g}) / (1.35 x {line_v:.4g})] = {exact:.1f} deg"
-    used, jbar = case.threshold.value, _jbar(case)
-    return Finding(
-        "tach loss threshold",
-        _threshold_verdict(used, bound, jbar),
-        f"register 4136: {case.threshold.text}; at most {_bound_text(exact)}" + _raised(used, jbar),
-        formula,
-        numbers,
-        {"delta_bound_deg": exact, "register_4136": used},
-    )
-
-
-def _bound_text(exact: float) -> str:
-    if exact > LARGEST_THRESHOLD_DEG:
-        return f"{exact:.1f} deg, of which {LARGEST_THRESHOLD_DEG} are used"
-    return f"{exact:.1f} deg"
-
-
-def _threshold_verdict(used: float | None, bound: float, jbar: float | None) -> Verdict:
-    if used is None:
-        return Verdict.ATTENTION
-    if used > bound:
-        return Verdict.WRONG
-    if used > DEFAULT_THRESHOLD_DEG and (jbar is None or jbar < LEAST_JBAR_S):
-        return Verdict.ATTENTION if jbar is None else Verdict.WRONG
-    return Verdict.FINE
-
-
-def _raised(used: float | None, jbar: float | None) -> str:
-    if used is None or used <= DEFAULT_THRESHOLD_DEG or (jbar is not None and jbar >= LEAST_JBAR_S):
-        return ""
-    return f"; it may be above {DEFAULT_THRESHOLD_DEG} only with a JBAR of {LEAST_JBAR_S:g} s or more"
-
-
-def _jbar(case: DriveCase) -> float | None:
-    lim_bar = case.value("LIM_BAR")
-    if not lim_bar or lim_bar < 0:
-        return None
-    inertia = case.parameters.motor.inertia_kg_m2 * case.inertia
-    return jbar_s(inertia, case.base_rpm, case.rated_n_m * lim_bar / 100)
-
-
-def inertia_time(case: DriveCase) -> Finding:
-    """JBAR, which says whether the threshold may be raised (52.4.1, equation 2).
-
-    WR2 is that of motor and load as the plant has them; T is LIM_BAR of the rated torque at the shaft (decision).
-    """
-    formula = "JBAR = (WR x WR x SB) / (308 T) >= 0.2 s (52.4.1, equation 2)"
-    jbar = _jbar(case)
-    if jbar is None:
-        result = f"LIM_BAR is {case.text('LIM_BAR')}: the largest torque is not known"
-        return Finding("JBAR", Verdict.ATTENTION, result, formula)
-    wr2 = case.parameters.motor.inertia_kg_m2 * case.inertia / 0.04214
-    torque = case.rated_n_m * (case.value("LIM_BAR") or 0.0) / 100 / 1.3558179483
-    enough = jbar >= LEAST_JBAR_S
-    result = (
-        f"{jbar:.3g} s: the tach loss threshold may be raised"
-        if enough
-        else f"{jbar:.3g} s, less than {LEAST_JBAR_S:g}: leave register 4136 at {DEFAULT_THRESHOLD_DEG}"
-    )
-    verdict = Verdict.FINE if enough else Verdict.ATTENTION
-    numbers = f"({wr2:.4g} lb ft2 x {case.base_rpm:.4g} rpm) / (308 x {torque:.4g} lb ft) = {jbar:.3g} s"
-    return Finding("JBAR", verdict, result, formula, numbers, {"jbar_s": jbar})
-
-
-def bridge_change(case: DriveCase) -> Finding:
-    """The armature inductance against table 3, and what else fast bridge change needs (52.6)."""
-    inductance = case.parameters.motor.inductance_h * 1e3
-    column = table_3_line_v(case.parameters.line_v)
-    formula = "largest inductance = K / RATED I (every number of table 3, 52.6)"
-    switched = case.fast_change.value
-    values: dict[str, float | None] = {"inductance_mh": inductance, "largest_inductance_mh": None}
-    if column is None:
-        verdict = Verdict.ATTENTION if switched != 0 else Verdict.FINE
-        columns = ", ".join(f"{volts:g}" for volts in TABLE_3_MH_A)
-        result = f"table 3 has no column for {case.parameters.line_v:g} V (it has {columns})"
-        return Finding("fast bridge change", verdict, result, formula, values=values)
-    amps = case.parameters.amps
-    largest = values["largest_inductance_mh"] = largest_inductance_mh(column, amps)
-    numbers = f"{TABLE_3_MH_A[column]:.7g} mH A / {amps:.4g} A = {largest:.4g} mH at {column:g} V"
-    verdict, result = _change_verdict(case, inductance <= largest)
-    text = f"armature {inductance:.4g} mH, at most {largest:.4g}: {result}"
-    return Finding("fast bridge change", verdict, text, formula, numbers, values)
-
-
-def _change_verdict(case: DriveCase, small: bool) -> tuple[Verdict, str]:
-    switched = case.fast_change.value
-    state = f"register 4146 bit 0: {case.fast_change.text}"
-    if not small:
-        verdict = Verdict.ATTENTION if switched is None else Verdict.WRONG if switched else Verdict.FINE
-        return verdict, f"too large, leave it off ({state})"
-    if switched == 0:
-        return Verdict.FINE, f"small enough; it is off ({state})"
-    if not case.voltage:
-        verdict = Verdict.ATTENTION if switched is None else Verdict.WRONG
-        return verdict, f"without the armature voltage at a 57C405 it ends in IOC ({state})"
-    return Verdict.FINE, f"small enough ({state})"
-
-
-def overcurrent(case: DriveCase) -> Finding:
-    """IOC_THRESH against LIM_BAR: below 1.8 times (52.1.5), and above the peaks of the largest current (decision)."""
-    formula = f"IOC_THRESH < {OVERCURRENT_RATIO:g} LIM_BAR (52.1.5); above LIM_BAR and the ripple's peak"
-    level, lim_bar = case.value("IOC_THRESH"), case.value("LIM_BAR")
-    programmed = f"IOC_THRESH {case.text('IOC_THRESH')}, LIM_BAR {case.text('LIM_BAR')}"
-    if level is None or lim_bar is None:
-        return Finding("IOC_THRESH", Verdict.ATTENTION, f"{programmed}: give both to compare them", formula)
-    most = OVERCURRENT_RATIO * lim_bar
-    peak = lim_bar + _ripple_percent(case)
-    if level >= most:
-        verdict, why = Verdict.WRONG, "IOC calculation error at task initialization: the drive will not run"
-    elif level <= peak:
-        verdict, why = Verdict.ATTENTION, f"at LIM_BAR the ripple's peaks reach {peak:.4g} %: it will trip"
-    else:
-        verdict, why = Verdict.FINE, f"above the peaks at LIM_BAR, {peak:.4g} %"
-    numbers = f"{level:g} < {OVERCURRENT_RATIO:g} x {lim_bar:g} = {most:g}; peaks {lim_bar:g} + {peak - lim_bar:.3g} %"
-    values = {"ioc_thresh": level, "lim_bar": lim_bar, "most": most, "peak": peak}
-    return Finding("IOC_THRESH", verdict, f"{programmed}: {why}", formula, numbers, values)
-
-
-def _ripple_percent(case: DriveCase) -> float:
-    amps = ripple_amps(case.parameters.line_v, case.parameters.line_hz, case.loop_inductance_h)
-    return 100 * amps / case.parameters.amps
-
-
-def pmi_overcurrent(case: DriveCase) -> Finding:
-    """The trip of a UDC's drive: 75 points above the Motor Overload Ratio, 225 % at most (S-3006 p. 109)."""
-    formula = f"trip = armature amps x (maximum current + {PMI_TRIP_POINTS} %) <= {PMI_MOST_TRIP} % (S-3006 p. 109)"
-    lim_bar = case.value("LIM_BAR")
-    if lim_bar is None:
-        result = "give the plant its motor_overload_ratio"
-        return Finding("overcurrent trip", Verdict.ATTENTION, result, formula)
-    trip = lim_bar + PMI_TRIP_POINTS
-    peak = lim_bar + _ripple_percent(case)
-    amps = case.parameters.amps
-    if trip > PMI_MOST_TRIP:
-        verdict, why = Verdict.ATTENTION, f"the parameter screen takes {PMI_MOST_TRIP} % of the power module at most"
-    elif trip <= peak:
-        verdict, why = Verdict.ATTENTION, f"at the largest current the ripple's peaks reach {peak:.4g} %: it will trip"
-    else:
-        verdict, why = Verdict.FINE, f"above the peaks at the largest current, {peak:.4g} %"
-    numbers = f"{amps:.4g} A x ({lim_bar:g} + {PMI_TRIP_POINTS}) % = {amps * trip / 100:.4g} A"
-    values = {"lim_bar": lim_bar, "trip": trip, "most": float(PMI_MOST_TRIP), "peak": peak}
-    return Finding("overcurrent trip", verdict, f"{trip:g} %: {why}", formula, numbers, values)
-
+from automax_ros.drive.gain_rules import GAIN_RULES
 
 Rule = Callable[[DriveCase], Finding]
-MANUAL_RULES: tuple[Rule, ...] = (line_frequency, tach_loss, inertia_time, bridge_change, overcurrent)
-"""The rules of section 52, for a drive with a 57C406, in the order in which they are told."""
+LOOP_RULES: tuple[Rule, ...] = (
+    line_frequency,
+    tach_loss,
+    inertia_time,
+    bridge_change,
+    overcurrent,
+    *GAIN_RULES,
+)
+"""The rules for a drive with a 57C406 and a loop in a task, in the order in which they are told."""
 PMI_RULES: tuple[Rule, ...] = (pmi_overcurrent,)
 """The rules for a drive of a UDC, whose loop is in its power module's interface."""
-
-
-@dataclass(frozen=True)
-class Unjudged:
-    """A drive that nothing can be computed of: its name, its module, and why."""
-
-    name: str
-    where: str
-    reason: str
-
-
-@dataclass(frozen=True)
-class DriveFindings:
-    """All that was found of one drive; ``case`` is None where nothing could be computed."""
-
-    name: str
-    where: str
-    case: DriveCase | None
-    findings: tuple[Finding, ...]
-
-    @property
-    def verdict(self) -> Verdict:
-        """The worst one."""
-        return max((item.verdict for item in self.findings), key=list(Verdict).index, default=Verdict.FINE)
 
 
 def assess(case: DriveCase | Unjudged) -> DriveFindings:
     """Return what the rules say of a drive."""
     if isinstance(case, Unjudged):
         return DriveFindings(case.name, case.where, None, (Finding("plant", Verdict.ATTENTION, case.reason, ""),))
-    rules = MANUAL_RULES if case.registers else PMI_RULES
+    rules = LOOP_RULES if case.registers else PMI_RULES
     return DriveFindings(case.name, case.where, case, tuple(rule(case) for rule in rules))

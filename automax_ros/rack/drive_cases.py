@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from automax_ros.core.types import Value
-from automax_ros.drive.assessment import DriveCase, Given, Unjudged
+from automax_ros.drive.drive_case import DriveCase, Given, Unjudged
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.limits import DEFAULT_THRESHOLD_DEG
 from automax_ros.language.program import Program
@@ -50,6 +50,7 @@ def _case(
         where=drive.where,
         parameters=data.parameters,
         inertia=data.inertia,
+        source_ohm=data.resistance_ohm,
         task=drive.program.name if drive.program is not None else "",
         inputs=inputs,
         threshold=registers.given(TACH_THRESHOLD, DEFAULT_THRESHOLD_DEG),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
-from automax_ros.drive.assessment import Given
+from automax_ros.drive.drive_case import Given
 from automax_ros.drive.plant import PlantData
 from automax_ros.language.checks.constant_values import constant_value
 from automax_ros.language.program import BoundCall, Program

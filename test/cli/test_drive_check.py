@@ -1,8 +1,11 @@
 """`automax drive-check`: the manual's numbers of drives in racks, where they come from, and its exit codes."""
 
 import json
+from math import pi
 
 import pytest
+
+from automax_ros.drive.limits import boundary_amps
 
 from .drive_racks import loop_task, rack_file, write_rack
 
@@ -185,3 +188,54 @@ def test_wrong_use(automax, options):
     result = automax("drive-check", *options)
     assert result.code == 2
     assert result.err.startswith("automax drive-check: error: ")
+
+
+# hp, A, ohm and H with source, line V: the example motors of the nameplate's own test, LIM_BAR 150
+CIRCUITS = {
+    "dc_150hp_500v": (245.8, 0.0915 + 0.01 + 360 * 0.14e-3, 2.22e-3 + 0.28e-3, 460),
+    "dc_10hp_240v": (36.1, 0.531 + 0.01 + 360 * 0.478e-3, 7.25e-3 + 0.956e-3, 230),
+    "dc_800hp_700v": (906.6, 0.0216 + 0.01 + 360 * 0.0683e-3, 0.534e-3 + 0.1366e-3, 660),
+}
+
+
+@pytest.mark.parametrize("motor", CIRCUITS)
+def test_gains_are_proposed_for_the_motor(judged, motor):
+    amps, ohm, henry, volts = CIRCUITS[motor]
+    found = judged(rack_file(f"motor: {motor}"))
+    counts = 4095 / (1.5 * amps)
+    proposed = {rule: item["values"]["proposed"] for rule, item in found.items() if "proposed" in item["values"]}
+    assert list(proposed) == ["KP", "PI_W_LEAD", "REF_LAG", "CC_THRESH", "AG_FACTOR"]
+    # a microsecond of DELTA at alpha 90 degrees raises the mean voltage by Vd0 w 1e-6 for one scan of 1 / (6 f)
+    step = 1.3505 * volts * 2 * pi * 60 * 1e-6 / 360 / henry * counts
+    assert proposed["KP"] == pytest.approx(0.65 / step, rel=0.01)
+    assert proposed["PI_W_LEAD"] == pytest.approx(ohm / henry, abs=1)
+    assert proposed["CC_THRESH"] == pytest.approx(boundary_amps(volts, 60, henry) * counts, rel=0.01)
+    assert 10 <= proposed["REF_LAG"] <= 400
+    assert 1 < proposed["AG_FACTOR"] <= 300
+    told = {rule: float(found[rule]["result"].split()[0]) for rule in proposed}
+    assert told == pytest.approx(proposed, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict", "source"),
+    [
+        ("0.2246", "fine", "0.2246"), ("0.44", "fine", "0.44"), ("0.12", "fine", "0.12"), ("0.5", "attention", "0.5"),
+        ("0.1", "attention", "0.1"), ("KP", "attention", "KP = 0.5 (tunable)"),
+    ],
+)  # fmt: skip
+def test_a_gain_is_fine_within_a_factor_of_two(judged, text, verdict, source):
+    found = judged(task=loop_task(KP=text))["KP"]
+    assert found["verdict"] == verdict
+    assert found["result"].endswith(f"programmed: {source}")
+
+
+def test_defaults_of_gains_are_told_as_such(judged):
+    found = judged()
+    assert found["CC_THRESH"]["result"].endswith("programmed: 0 (default)")
+    assert (found["CC_THRESH"]["verdict"], found["AG_FACTOR"]["verdict"]) == ("attention", "attention")
+
+
+def test_without_lim_bar_there_is_no_proposal(judged):
+    found = judged(task=loop_task(LIM_BAR="LEVEL%"))["KP"]
+    assert found["values"] == {}
+    assert "no proposal, LIM_BAR is LEVEL% (not known)" in found["result"]

@@ -1,0 +1,95 @@
+"""Gains for a drive's motor next to what is programmed: the proposals of ``drive/cml/proposals`` with their numbers.
+
+A gain that is within a factor of two of the proposal is fine (decision): the loop is not that particular.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from automax_ros.drive.cml.proposals import (
+    BOUNDARY,
+    LEAST_CONDUCTION,
+    LOOP_GAIN,
+    VD0,
+    Circuit,
+    ag_factor,
+    cc_thresh,
+    circuit_of,
+    gain_continuous,
+    kp,
+    pi_w_lead,
+    ref_lag,
+)
+from automax_ros.drive.drive_case import DriveCase, Finding, Verdict
+
+NEAR = 2.0
+"""A factor between programmed and proposed up to which all is well."""
+
+
+def _kp(circuit: Circuit) -> tuple[float, str]:
+    gain = gain_continuous(circuit)
+    ideal, millihenry = VD0 * circuit.line_v, circuit.inductance_h * 1e3
+    per_scan = f"pi / 3 x {ideal:.4g} V x 1 us / {millihenry:.4g} mH x {circuit.counts_a:.4g} counts per A"
+    return kp(circuit), f"{LOOP_GAIN:g} / ({per_scan} = {gain:.4g})"
+
+
+def _pi_w_lead(circuit: Circuit) -> tuple[float, str]:
+    return pi_w_lead(circuit), f"{circuit.resistance_ohm:.4g} ohm / {circuit.inductance_h * 1e3:.4g} mH"
+
+
+def _ref_lag(circuit: Circuit) -> tuple[float, str]:
+    return ref_lag(circuit), ""
+
+
+def _cc_thresh(circuit: Circuit) -> tuple[float, str]:
+    amps = cc_thresh(circuit) / circuit.counts_a
+    ideal = VD0 * circuit.line_v
+    reactance = f"2 pi x {circuit.line_hz:g} Hz x {circuit.inductance_h * 1e3:.4g} mH"
+    return (
+        cc_thresh(circuit),
+        f"{BOUNDARY:g} x {ideal:.4g} V / ({reactance}) = {amps:.4g} A, x {circuit.counts_a:.4g} counts per A",
+    )
+
+
+def _ag_factor(circuit: Circuit) -> tuple[float, str]:
+    return ag_factor(circuit), ""
+
+
+_PROPOSALS: dict[str, tuple[Callable[[Circuit], tuple[float, str]], str]] = {
+    "KP": (_kp, f"KP = {LOOP_GAIN:g} / counts that 1 us of DELTA adds in a scan, continuous, alpha 90 degrees (ours)"),
+    "PI_W_LEAD": (_pi_w_lead, "PI_W_LEAD = R / L of armature and line (ours)"),
+    "REF_LAG": (_ref_lag, "REF_LAG = the fastest that 50 and 60 Hz allow (ours)"),
+    "CC_THRESH": (_cc_thresh, "CC_THRESH = current where it becomes continuous at standstill, in counts (ours)"),
+    "AG_FACTOR": (
+        _ag_factor,
+        f"AG_FACTOR = integral gain where {LEAST_CONDUCTION * 100:g} % of a scan conduct / continuous one (ours)",
+    ),
+}
+"""For each gain what computes it with its numbers, and the formula."""
+
+
+def gain(keyword: str, case: DriveCase) -> Finding:
+    """Compare a gain with the proposal for this motor, its line and LIM_BAR."""
+    compute, formula = _PROPOSALS[keyword]
+    lim_bar = case.value("LIM_BAR")
+    if not lim_bar or lim_bar < 0:
+        result = f"{case.text(keyword)}; no proposal, LIM_BAR is {case.text('LIM_BAR')}"
+        return Finding(keyword, Verdict.ATTENTION, result, formula)
+    circuit = circuit_of(case.parameters, int(lim_bar), source_ohm=case.source_ohm)
+    proposed, numbers = compute(circuit)
+    given = case.value(keyword)
+    fine = given is None or proposed / NEAR <= given <= proposed * NEAR
+    return Finding(
+        keyword,
+        Verdict.FINE if fine else Verdict.ATTENTION,
+        f"{proposed:.4g} is proposed; programmed: {case.text(keyword)}",
+        formula,
+        f"{numbers} = {proposed:.4g}" if numbers else "",
+        {"proposed": float(proposed), "programmed": given},
+    )
+
+
+GAIN_RULES = tuple(partial(gain, keyword) for keyword in _PROPOSALS)
+"""A rule for each gain."""
