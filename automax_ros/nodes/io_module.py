@@ -20,13 +20,15 @@ class IoModuleNode(ModuleNode):
         super().__init__(site, module.config.name)
         self._module = module.config
         self._bank = site.rack.backplane.bank(module.config.slot)
+        registers = module.config.registers
+        self._shown = [number for number in range(registers.count) if number not in registers.reserved]
         self.diagnose(self._health)
 
     def _health(self, _: int) -> list[DiagnosticStatus]:
         """Return the registers as hexadecimal words; the module itself is always well."""
         values = {}
         if self._bank is not None:
-            for register in set(range(self._bank.registers)).difference(self._module.registers.reserved):
+            for register in self._shown:
                 word = self.site.rack.memory.read_now(self._bank.view, register)
                 values[f"register_{register}"] = f"{int(word) & 0xFFFF:04X}H"
         return [self.status(self._module.model, DiagnosticStatus.OK, "running", self._module.slot, values)]
