@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
 import pytest
 
 from automax_ros.rack.loader import load
+from automax_ros.rack.modules.drive_interrupts import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.reader import read_for_rack
@@ -275,6 +277,42 @@ def test_a_rack_with_a_drive_goes_on_from_a_state_bit_for_bit(tmp_path, slots, d
     assert rack.state() == other.state()
     assert rack.value("STATE@") is True
     assert rack.task("CML").scan_number == other.task("CML").scan_number > 300
+
+
+@pytest.mark.parametrize("late_ms", [[0.3, 1.1], [2.9, 7.0, 0.05], [40.0, 1.0, 13.7]])
+def test_however_late_the_host_is_the_drive_does_the_same(tmp_path, late_ms):
+    """On the wall clock interrupts that are late are carried out in order, at their instants of rack time."""
+    slots = ALONE.replace(", WORK: {priority: 8}", "")
+    simulated, live = built(tmp_path, slots=slots), built(tmp_path, slots=slots)
+
+    def pass_to(seconds: float) -> None:
+        until_ns = round(seconds * 1e9) + 1
+        simulated.scheduler.run_until(until_ns)
+        lateness = cycle(late_ms)
+        while live.now_ns < until_ns:
+            live.scheduler.run_due(min(until_ns, live.now_ns + round(next(lateness) * 1e6)))
+
+    def set_both(name: str, value: object) -> None:
+        for rack in (simulated, live):
+            rack.write(name, value)
+
+    for rack in (simulated, live):
+        rack.start()
+    set_both("PERMIT@", True)
+    set_both("SPEED%", 2000)
+    pass_to(0.6)
+    set_both("RUN@", True)
+    pass_to(1.1)
+    set_both("REF%", 1500)
+    pass_to(1.5)
+    assert live.value("STATE@") is True
+    assert live.plants["UNWIND"].motor.speed_rad_s > 5
+    assert simulated.task("CML").scan_number == live.task("CML").scan_number
+    simulated.plants["UNWIND"].advance(1_500_000_001)
+    live.plants["UNWIND"].advance(1_500_000_001)
+    assert simulated.plants.state() == live.plants.state()
+    greatest_ns = next(module.timing for module in live.modules if isinstance(module, Timed)).greatest_ns
+    assert greatest_ns <= max(late_ms) * 1e6
 
 
 TWO = """\
