@@ -106,7 +106,7 @@ class CurrentControl(Stateful):
         elif self.change.stage == Stage.OFF:
             self.block = True
             self.regulator.begin(0.0)
-            return self.off(pll)
+            return self.off()
         self._regulate(wanted, settings, period_us)
         return self._fire(pll, self.regulator.delta_us, self.bridge, reverse)
 
@@ -139,9 +139,10 @@ class CurrentControl(Stateful):
         self.block = False
         return self._fire(pll, delta_us, bridge, reverse)
 
-    def off(self, pll: Pll) -> tuple[Pulse, ...]:
+    def off(self) -> tuple[Pulse, ...]:
         """Fire nothing; the cycle is counted on."""
-        return self._fire(pll, 0.0, 0, False)
+        self.firing.idle()
+        return ()
 
     def show(self, outputs: Outputs) -> None:
         """Write the loop's outputs; to be called in run alone, they are held in standby (52.2.1)."""
@@ -160,4 +161,5 @@ class CurrentControl(Stateful):
         self._fresh = FRESH_SCANS if delta_us else 0
 
     def _fire(self, pll: Pll, delta_us: float, bridge: int, reverse: bool) -> tuple[Pulse, ...]:
-        return self.firing.pulses(pll.position, pll.period_ns, round(delta_us * 1000), bridge, reverse)
+        delta_ns = round(delta_us * 1000)
+        return self.firing.pulses(pll.position, pll.period_ns, pll.next_ns, delta_ns, bridge, reverse)

@@ -1,8 +1,8 @@
 """Phase firing: which gates are pulsed when, from one interrupt to the next (52.2.1, DELTA).
 
-An SCR is fired DELTA before the instant of alpha 180 degrees, and the one before it again (double pulse). At an
-interrupt all is planned that falls due before the next. What a greater DELTA makes late is fired at once; what a
-smaller one moves behind itself is not fired twice (decision).
+An SCR is fired DELTA before the instant of alpha 180 degrees, and the one before it again (double pulse), for a sixth
+of a cycle. At an interrupt all is planned that falls due before the next. What a greater DELTA makes late is fired at
+once if the next is not due yet; none is fired twice (decision).
 """
 
 from __future__ import annotations
@@ -14,6 +14,16 @@ STANDARD = (2, 3, 4, 5, 6, 1)
 """The SCR whose natural commutation is at each position of a cycle, on a line of the standard rotation."""
 REVERSED = (6, 5, 4, 3, 2, 1)
 """The same on a line of the other rotation."""
+
+
+def _words(order: tuple[int, ...], add: int) -> tuple[int, ...]:
+    """Return the gate bits of each position: its SCR and the one fired before it."""
+    return tuple(gate_bits(order[place] + add, order[place - 1] + add) for place in range(6))
+
+
+_GATES = {
+    (bridge, order is REVERSED): _words(order, 10 * (bridge - 1)) for bridge in (1, 2) for order in (STANDARD, REVERSED)
+}
 
 
 class Firing(Stateful):
@@ -30,37 +40,38 @@ class Firing(Stateful):
         """Begin anew: any SCR may be fired next."""
         self.last = self.count - 6
 
-    def pulses(self, position: int, period_ns: int, delta_ns: int, bridge: int, reverse: bool) -> tuple[Pulse, ...]:
+    def idle(self) -> None:
+        """Fire nothing up to the next interrupt; the cycle is counted on."""
+        self.count += 1
+
+    def pulses(
+        self, position: int, period_ns: int, next_ns: int, delta_ns: int, bridge: int, reverse: bool
+    ) -> tuple[Pulse, ...]:
         """Plan the time from an interrupt, at a position of the cycle, to the next.
 
         Args:
             position: which sixth of the cycle begins, 0 to 5.
             period_ns: the line's period, ns.
+            next_ns: time to the next interrupt, ns.
             delta_ns: DELTA, ns, 0 to half a period.
-            bridge: 1 or 2; 0 fires nothing.
+            bridge: 1 or 2.
             reverse: whether the line has the other rotation.
         """
-        self.count += 1
-        if not bridge:
-            return ()
+        self.count = count = self.count + 1
         sixth = period_ns // 6
-        delay = period_ns // 2 - delta_ns
-        found = []
-        for back in (3, 2, 1, 0):
-            number = self.count - back
-            after = delay - back * sixth
-            if number > self.last and after < sixth:
-                found.append((max(after, 0), number))
-        if not found:
+        delay = 3 * sixth - delta_ns
+        newest = count if delay < next_ns else count - 1 - (delay - next_ns) // sixth
+        number = max(self.last + 1, count - 3)
+        if newest < number:
             return ()
-        order = REVERSED if reverse else STANDARD
-        due = [item for item in found if item[0] > 0] or found[-1:]
-        if len(found) > len(due):
-            due.insert(0, found[len(found) - len(due) - 1])
+        self.last = newest
+        words = _GATES[bridge, reverse]
         planned = []
-        for after, number in due:
-            place = (position - (self.count - number)) % 6
-            scrs = order[place], order[(place - 1) % 6]
-            planned.append(Pulse(after, sixth, gate_bits(*(scr + 10 * (bridge == 2) for scr in scrs))))
-        self.last = due[-1][1]
+        while number <= newest:
+            after = delay - (count - number) * sixth
+            if after >= 0:
+                planned.append(Pulse(after, sixth, words[(position - count + number) % 6]))
+            elif after + sixth > 0:
+                planned.append(Pulse(0, sixth + after, words[(position - count + number) % 6]))
+            number += 1
         return tuple(planned)

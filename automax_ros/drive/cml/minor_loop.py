@@ -184,7 +184,7 @@ class CurrentMinorLoop(Stateful):
         pll, latched, phase = self.pll, self.latched, self.sequence.phase
         reverse = _reverse(measured)
         if not self.sequence.running:
-            none = self.control.off(pll)
+            none = self.control.off()
             if phase is _SCR_TEST:
                 return self.scr_test.fire(pll.position, pll.period_ns, reverse=reverse)
             return none
