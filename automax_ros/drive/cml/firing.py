@@ -59,7 +59,7 @@ class Firing(Stateful):
         """
         self.count = count = self.count + 1
         sixth = period_ns // 6
-        delay = 3 * sixth - delta_ns
+        delay = max(0, 3 * sixth - delta_ns)
         newest = count if delay < next_ns else count - 1 - (delay - next_ns) // sixth
         number = max(self.last + 1, count - 3)
         if newest < number:

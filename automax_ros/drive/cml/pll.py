@@ -19,8 +19,8 @@ LOCKED_NS = 100_000
 """Phase error within which a cycle counts towards the lock, ns (decision)."""
 LOCK_CYCLES = 6
 """Cycles in a row with a small error that make the lock (decision)."""
-SHORTEST_US, LONGEST_US = 16_129, 20_833
-"""Range of LINE_PERIOD, us: 62 to 48 Hz (52.2.1)."""
+SHORTEST_NS, LONGEST_NS = 16_128_500, 20_833_499
+"""Range of the period, ns: LINE_PERIOD is 16129 to 20833, 62 to 48 Hz (52.2.1)."""
 NEVER = -1
 
 
@@ -95,7 +95,7 @@ class Pll(Stateful):
         self.next_ns = self.period_ns // 6 + max(-phase_ns, min(phase_ns, error))
 
     def _take_period(self, period_ns: int) -> None:
-        self.period_ns = max(1000 * SHORTEST_US, min(1000 * LONGEST_US, period_ns))
+        self.period_ns = max(SHORTEST_NS, min(LONGEST_NS, period_ns))
 
     def _look(self, since_ns: int) -> None:
         """Wait for two maxima of T1; then put the next interrupt on a natural commutation."""
