@@ -134,6 +134,29 @@ def test_a_reset_counts_in_standby_alone():
     assert resets(drive)
 
 
+def test_a_reset_that_was_held_from_before_the_run_does_nothing_in_it():
+    drive = Drive(reference=1500, tach_loss_stop=False, speed_fdbk=0, fault_reset=True)
+    drive.plant.motor.speed_rad_s = 130.0
+    drive.start()
+    drive.run(0.4)
+    drive.run(0.2, speed_fdbk=4000)
+    assert (drive.faults, drive["DC_CML_STATE"], drive.codes) == ({"TACH_LOSS_OUT"}, True, ["AMX7112"])
+    drive.run(0.1, cml_run=False)
+    assert drive.faults == set()
+
+
+def test_drive_ok_goes_away_with_a_fault():
+    drive = Drive()
+    assert all(outcome.command.ok for outcome in drive.run(LOCKED_S))
+    drive.status |= EXTERNAL_TRIP
+    assert not drive.scan().command.ok
+    drive.status = PERMISSIVE
+    assert not any(outcome.command.ok for outcome in drive.run(0.1))
+    assert resets(drive)
+    assert drive.scan().command.ok
+    assert not any(outcome.command.ok for outcome in Drive(lim_bar=0).run(0.1))
+
+
 def test_a_start_with_the_reset_is_refused():
     drive = Drive()
     drive.run(LOCKED_S)
@@ -318,6 +341,18 @@ def test_tach_loss_stop_chooses_between_stop_and_indication(stop):
     assert not drive.relay
     assert resets(drive)
     assert starts_again(drive)
+
+
+def test_a_new_run_does_not_remember_the_delta_of_the_last():
+    drive = Drive(reference=1500, speed_fdbk=0)
+    drive.plant.motor.speed_rad_s = 130.0
+    drive.start()
+    drive.run(0.4)
+    assert tripped(drive, "TACH_LOSS_OUT")
+    drive.plant.motor.speed_rad_s = 0.0
+    assert resets(drive)
+    assert starts_again(drive)
+    assert drive.codes == ["AMX7112"]
 
 
 def test_a_standing_motor_with_current_is_no_tach_loss():

@@ -59,8 +59,8 @@ def test_a_start_needs_an_edge():
 @pytest.mark.parametrize("hinder", ["permissive", "lock", "fault", "coast stop before"])
 def test_an_edge_that_comes_too_early_is_forgotten(hinder):
     drive = Drive()
-    if hinder != "lock":
-        drive.run(LOCKED_S)
+    drive.run(0.02 if hinder == "lock" else LOCKED_S)
+    assert drive["SYNC_LOCKED"] == (hinder != "lock")
     if hinder == "permissive":
         drive.status = 0
     elif hinder == "fault":
