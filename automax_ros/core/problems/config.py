@@ -134,8 +134,8 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6833", "value that the recording does not hold"),
     Problem("AMX6834", "picture cannot be drawn"),
     Problem("AMX6840", "nothing to play"),
-    Problem("AMX6860", "recording without a drive to report"),
     Problem("AMX6850", "plant not in the recording"),
+    Problem("AMX6860", "recording without a drive to report"),
     # the command line: files and the tables of `automax trace` and `automax compare`
     Problem("AMX6900", "file that no task can be named after", Severity.WARNING),
     Problem("AMX6910", "not a CSV table"),
