@@ -233,13 +233,14 @@ class TaskReplay:
         Raises:
             BagError: with the recorded state it cannot be executed; no task can have come to such a state.
         """
+        now_ns = max(0, scan.stamp - self._tallies.origin)  # rack time: on the wall clock stamps are the time of day
         try:
             if scan.scan == 0:
                 self._stopped_in = None
-                record = self._task.run(scan.stamp)
+                record = self._task.run(now_ns)
             else:
                 self._task.scan_number = scan.scan - 1
-                record = self._overlap(scan) or self._task.scan(scan.stamp, scan.skipped)
+                record = self._overlap(scan) or self._task.scan(now_ns, scan.skipped)
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             what = f"scan {scan.scan} of task {self.name} cannot be executed: {error}"
             hint = "its recorded state is none that the task can have"
@@ -251,7 +252,7 @@ class TaskReplay:
     def _overlap(self, scan: Scan) -> ScanRecord | None:
         """Fault the task where the recorded one was faulted by its time: no execution of a source tells that."""
         code = next((error.code for error in scan.errors if error.code in (OVERLAP, EVENT_TIMEOUT)), None)
-        return None if code is None else self._task.fault(code, scan.stamp)
+        return None if code is None else self._task.fault(code, max(0, scan.stamp - self._tallies.origin))
 
     def _compare_state(self, state: TaskState) -> None:
         self._states += 1
