@@ -16,6 +16,7 @@ rack: PM1
 slots:
   1: {module: 57C435, tasks: {SPEED: {priority: 5}}}
   0: {module: 57C413}
+plants: {UNWIND: {motor: dc_150hp_500v}}
 common: {REF%: {}, RUN@: {}, SUM!: {}, TABLE%(3): {}, TACH%: {}, LIMIT_SW@: {}}
 """
 
@@ -36,12 +37,12 @@ def test_examples_are_stimuli(rack, tmp_path):
         file = read(rack, tmp_path, text)
         assert file.diagnostics == []
         verbs = {entry.verb for entry in file.stimuli or ()}
-        assert {"set", "ramp", "sine", "square", "reload", "power", "tune", "run_all"} <= verbs
+        assert {"set", "ramp", "sine", "square", "reload", "power", "tune", "run_all", "plant"} <= verbs
 
 
 def test_the_example_runs(rack, tmp_path):
     stimulation = playing(rack, tmp_path, blocks("yaml")[0])
-    rack.run(20.0)
+    rack.run(21.0)
     assert [(item.what, item.ok) for item in stimulation.happened if not item.ok] == []
     assert rack.value("REF%") == 0, "power has gone"
 
