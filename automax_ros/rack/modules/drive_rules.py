@@ -82,7 +82,7 @@ class _Loops:
                     there = f"the {module.model} {place}" if module else f"no module {place}"
                     slots = [str(slot) for slot, item in sorted(self.modules.items()) if item.model == model]
                     hint = f"the rack has one in slot {' and '.join(slots)}" if slots else f"put a {model} there"
-                    message = f"{keyword} must name a {model}; in slot {loop.slot(keyword)} is {there}"
+                    message = f"{keyword} must name a {model}; slot {loop.slot(keyword)} holds {there}"
                     yield loop.found(code, message, hint, keyword)
 
     def own_modules(self) -> Iterator[_Found]:

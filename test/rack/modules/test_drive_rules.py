@@ -27,9 +27,9 @@ def test_example_is_right(tmp_path):
 @pytest.mark.parametrize(
     ("change", "code", "column_line", "message"),
     [
-        (("IO_CNTL_SLOT=7", "IO_CNTL_SLOT=3"), "AMX6486", 3, "in slot 3 is no module in rack.yaml"),
-        (("IO_CNTL_SLOT=7", "IO_CNTL_SLOT=8"), "AMX6486", 3, "in slot 8 is the 57C408 (rack.yaml:5)"),
-        (("DIG_IO_SLOT=8", "DIG_IO_SLOT=7"), "AMX6487", 3, "in slot 7 is the 57C406 (rack.yaml:4)"),
+        (("IO_CNTL_SLOT=7", "IO_CNTL_SLOT=3"), "AMX6486", 3, "slot 3 holds no module in rack.yaml"),
+        (("IO_CNTL_SLOT=7", "IO_CNTL_SLOT=8"), "AMX6486", 3, "slot 8 holds the 57C408 (rack.yaml:5)"),
+        (("DIG_IO_SLOT=8", "DIG_IO_SLOT=7"), "AMX6487", 3, "slot 7 holds the 57C406 (rack.yaml:4)"),
     ],
 )
 def test_slots_are_told_with_both_lines(tmp_path, change, code, column_line, message):
