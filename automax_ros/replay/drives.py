@@ -13,6 +13,7 @@ from automax_ros.running.drive_record import (
     MEASURED_VIEW,
     command_of,
     measured_of,
+    time_of,
 )
 from automax_ros.running.drives import NO_LINE
 from automax_ros.running.scheduler import EventKey, PeriodicAction
@@ -33,6 +34,7 @@ class RecordedDrive:
     def __init__(self) -> None:
         """Begin with no scan."""
         self._measured = NO_LINE
+        self._now_ns: int | None = None
         self._recorded: Command | None = None
         self._own: Command | None = None
 
@@ -40,12 +42,17 @@ class RecordedDrive:
         """Take what a recorded scan was told and has commanded."""
         noted = [(view, element, int(value)) for view, element, value in entries]
         self._measured = measured_of(noted) or NO_LINE
+        self._now_ns = time_of(noted)
         self._recorded = command_of(noted)
         self._own = None
 
     def port(self, slot: int) -> RecordedDrive:  # noqa: ARG002
         """Return itself, whatever slot an edited task names: the recording has one drive for each task."""
         return self
+
+    def rack_ns(self, now_ns: int) -> int:
+        """Return the recorded rack time of the scan."""
+        return now_ns if self._now_ns is None else self._now_ns
 
     def initialise(self) -> None:
         """Do nothing: what a 57C406 did stands in the recording."""

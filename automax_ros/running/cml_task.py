@@ -20,7 +20,7 @@ from automax_ros.drive.cml.signals import Command, Measured
 from automax_ros.language.program import BoundCall
 from automax_ros.language.syntax.tree import Reference, Scope
 from automax_ros.running.backplane import NO_MODULES, Backplane
-from automax_ros.running.drive_record import noted_command, noted_measured
+from automax_ros.running.drive_record import noted_command, noted_measured, noted_time
 from automax_ros.running.drives import DriveAccess, DrivePort, Drives
 from automax_ros.running.error_log import LOG_NUMBERS
 from automax_ros.running.events import Events
@@ -54,8 +54,9 @@ class CmlIo(TaskIo):
         """
         task = self._cml
         measured = Measured(*self._hear(task.measure))
-        outcome = task.loop.scan(self._latched_ns, measured, Inputs(*self._true(inputs)))
-        self._note(measured, outcome.command)
+        now_ns = task.rack_ns(self._latched_ns)
+        outcome = task.loop.scan(now_ns, measured, Inputs(*self._true(inputs)))
+        self._note(now_ns, measured, outcome.command)
         self._hear(lambda: task.command(outcome.command))
         for code in outcome.problems:
             self.log(task.cml.line, code)
@@ -78,7 +79,7 @@ class CmlIo(TaskIo):
         value: Value = self._hear(lambda: self._cml.memory.under_force(view))
         return value
 
-    def _note(self, measured: Measured, command: Command) -> None:
+    def _note(self, now_ns: int, measured: Measured, command: Command) -> None:
         """Note nothing: the scan is not recorded."""
 
     def _keep(self, record: Record, records: list[Value] | None) -> None:
@@ -102,8 +103,9 @@ class RecordingCmlIo(CmlIo, RecordingIo):
         self.record.reads.append((view, 0, value))
         return value
 
-    def _note(self, measured: Measured, command: Command) -> None:
+    def _note(self, now_ns: int, measured: Measured, command: Command) -> None:
         self.record.reads += noted_measured(measured)
+        self.record.reads += noted_time(now_ns)
         self.record.reads += noted_command(command)
 
 
@@ -153,6 +155,10 @@ class CmlTask(Task):
     def port(self) -> DrivePort:
         """The 57C406 that IO_CNTL_SLOT names."""
         return self._drives.port(self._slots[0])
+
+    def rack_ns(self, now_ns: int) -> int:
+        """Return the rack time of an instant as the task's memory has it."""
+        return self._drives.rack_ns(now_ns)
 
     def measure(self) -> tuple[int, ...]:
         """Return what the 57C406 has measured."""

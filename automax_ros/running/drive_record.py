@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.drive.cml.signals import Command, Measured, Pulse
 
 MEASURED_VIEW = 0xFFF0
-"""The view of what was measured; the element is the place in ``Measured``."""
+"""The view of what was measured; the element is the place in ``Measured``. After it comes the rack time: s, then ns."""
 COMMAND_VIEW = 0xFFEF
 """The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers a pulse."""
-MEASURED_NAMES = Measured._fields
+MEASURED_NAMES = (*Measured._fields, "time s", "time ns")
 COMMAND_NAMES = tuple(name for name in Command._fields if name != "pulses")
 MOST_PULSES = 16
 """Most gate windows of one command that are told (decision: six SCRs, each as first and as second, are twelve)."""
@@ -25,7 +26,8 @@ Noted = tuple[int, int, int]
 """View, element, number."""
 
 _PULSE = len(Pulse._fields)
-_USUAL = tuple(int(Measured._field_defaults.get(name, 0)) for name in MEASURED_NAMES)
+_SECONDS, _REST = len(Measured._fields), len(Measured._fields) + 1
+_USUAL = tuple(int(Measured._field_defaults.get(name, 0)) for name in Measured._fields)
 _USUAL_COMMAND = tuple(int(Command._field_defaults.get(name, 0)) for name in COMMAND_NAMES)
 
 
@@ -36,6 +38,12 @@ def noted_measured(measured: Measured) -> list[Noted]:
         for place, (value, usual) in enumerate(zip(measured, _USUAL, strict=True))
         if value != usual or not place
     ]
+
+
+def noted_time(now_ns: int) -> list[Noted]:
+    """Return what is noted of rack time: the stamp of a scan may be one of the wall clock."""
+    seconds, rest = divmod(now_ns, NS_PER_S)
+    return [(MEASURED_VIEW, _SECONDS, seconds), (MEASURED_VIEW, _REST, rest)]
 
 
 def noted_command(command: Command) -> list[Noted]:
@@ -60,9 +68,15 @@ def command_numbers(command: Command) -> list[int]:
 def measured_of(noted: Iterable[Noted]) -> Measured | None:
     """Return the measurement that was noted, None where there is none among what is given."""
     numbers = dict(_of_view(MEASURED_VIEW, noted))
-    if not numbers:
+    if 0 not in numbers:
         return None
     return Measured(*(numbers.get(place, usual) for place, usual in enumerate(_USUAL)))
+
+
+def time_of(noted: Iterable[Noted]) -> int | None:
+    """Return the rack time that was noted in ns, None where there is none among what is given."""
+    numbers = dict(_of_view(MEASURED_VIEW, noted))
+    return numbers[_SECONDS] * NS_PER_S + numbers.get(_REST, 0) if _SECONDS in numbers else None
 
 
 def command_of(noted: Iterable[Noted]) -> Command | None:

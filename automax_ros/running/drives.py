@@ -61,6 +61,10 @@ class DriveAccess(Protocol):
         """Return the 57C406 of a slot; without one, what measures no line."""
         ...
 
+    def rack_ns(self, now_ns: int) -> int:
+        """Return the rack time of an instant as the task's memory has it: a recording may have stamps of the day."""
+        ...
+
 
 VoltageFeedback = Callable[[float, float], None]
 """Shows the armature voltage, V, of a drive on a line of a nominal voltage, V: the 57C405 that is wired to it."""
@@ -77,6 +81,10 @@ class Drives:
     def attach(self, slot: int, port: DrivePort) -> None:
         """Take the module of a slot."""
         self._ports[slot] = port
+
+    def rack_ns(self, now_ns: int) -> int:
+        """Return the instant: it is one of rack time."""
+        return now_ns
 
     def port(self, slot: int) -> DrivePort:
         """Return the 57C406 of a slot; without one, what measures no line."""

@@ -6,11 +6,12 @@ import pytest
 from rack.drive_tasks import CML, SPEED, rack_of
 
 from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import RecordingOptions
+from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.replay.report import Kind
 from automax_ros.running.drive_record import COMMAND_VIEW, MEASURED_VIEW
 from automax_ros.wire.messages import Scan
+from automax_ros.wire.stream import RackStream
 
 from .replays import edited, record, replayed
 
@@ -62,16 +63,25 @@ def test_recording_is_small(bag):
     """A drive at rest takes a few numbers a scan, one that runs some more: 720 scans are not a burden."""
     scans = scans_of(bag)
     views = [sum(view in (MEASURED_VIEW, COMMAND_VIEW) for view in scan.read.variable) for scan in scans]
-    assert max(views[10:200]) <= 9
-    assert max(views) <= 24
+    assert max(views[10:200]) <= 11
+    assert max(views) <= 26
     assert sum(path.stat().st_size for path in bag.glob("*.mcap")) < 500_000
 
 
-def test_edited_gain_shows_at_the_first_scan_that_regulates(bag):
-    report = replayed(bag, {"CML": edited(CML, ("KP=0.2", "KP=0.25"))})
-    running = next(scan for scan in scans_of(bag) if scan.stamp > 0.6 * NS_PER_S and len(scan.read.variable) > 15)
-    assert report.first.task == "CML"
-    assert report.first.scan == running.scan
+def done(scan):
+    """What a scan has committed, written and commanded."""
+    entries = zip(scan.read.variable, scan.read.element, scan.read.value, strict=True)
+    return scan.committed, scan.written, [entry for entry in entries if entry[0] == COMMAND_VIEW]
+
+
+def test_edited_gain_shows_at_the_first_scan_that_does_otherwise(bag, tmp_path):
+    """Up to the first difference open and closed loop are the same: a rack that runs the edited task tells where it is."""
+    text = edited(CML, ("KP=0.2", "KP=0.25"))
+    pairs = zip(scans_of(bag), scans_of(recording(tmp_path, cml=text)), strict=False)
+    expected = next(one.scan for one, other in pairs if done(one) != done(other))
+    report = replayed(bag, {"CML": text})
+    assert (report.first.task, report.first.scan) == ("CML", expected)
+    assert expected > 200, "the drive does not regulate before it is started"
     (pulses,) = [item for item in report.first.differences if item.kind is Kind.COMMAND]
     assert pulses.name == "gate pulses commanded to the 57C406"
     assert " at " in pulses.first.recorded
@@ -123,6 +133,22 @@ def test_replay_begins_at_a_state_inside(tmp_path_factory, from_s):
     assert loop.scans == pytest.approx((SECONDS - from_s) * 360, abs=2)
     different = replayed(bag, {"CML": edited(CML, ("KP=0.2", "KP=0.3"))}, from_ns=round(from_s * NS_PER_S))
     assert different.first.time_s >= from_s
+
+
+def test_recording_with_stamps_of_the_day_runs_again(tmp_path):
+    """A live run's stamps are those of the wall clock: the loop still counts ticks of rack time."""
+    rack = rack_of(tmp_path)
+    stream = RackStream(rack, rack.fingerprint)
+    recorder = Recorder(rack, stream, tmp_path / "bag")
+    stream.begin(1_795_368_236_123_456_789)
+    rack.start()
+    for number in range(20):
+        happens(rack, number)
+        rack.run(SECONDS / 20)
+    stream.end()
+    recorder.close()
+    report = replayed(tmp_path / "bag")
+    assert report.identical, report.text()
 
 
 def test_modeled_recording_runs_again(tmp_path):

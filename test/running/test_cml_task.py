@@ -141,7 +141,7 @@ def test_record_has_what_was_measured_and_commanded():
     for record in scans(task, port, 1400 * MS):
         assert command_of(record.reads) == port.commands[-1]
     # A drive at rest: status and time since sync, interrupt, level and block of the gates.
-    assert len(record.reads) <= 8
+    assert len(record.reads) <= 10
     assert {view for view, *_ in record.reads} == {MEASURED_VIEW, COMMAND_VIEW, memory.view("DELTA%")}
 
 

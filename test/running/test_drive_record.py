@@ -19,6 +19,8 @@ from automax_ros.running.drive_record import (
     measured_of,
     noted_command,
     noted_measured,
+    noted_time,
+    time_of,
 )
 
 NUMBER = st.integers(*DataType.DOUBLE.range)
@@ -26,12 +28,14 @@ USUAL = st.sampled_from([0, 2, 4, 109, 400]) | NUMBER
 PULSES = st.lists(st.builds(Pulse, NUMBER, NUMBER, st.integers(0, 0x3F3F)), max_size=MOST_PULSES).map(tuple)
 
 
-@given(st.tuples(*[USUAL] * MEASURED_NUMBERS).map(lambda numbers: Measured(*numbers)))
+@given(st.tuples(*[USUAL] * len(Measured._fields)).map(lambda numbers: Measured(*numbers)))
 @repeatable(200)
 def test_measurement_comes_back(measured):
     noted = noted_measured(measured)
     assert measured_of([(COMMAND_VIEW, 0, 5), *noted, (3, 0, 1)]) == measured
-    assert all(view == MEASURED_VIEW and 0 <= element < MEASURED_NUMBERS for view, element, _ in noted)
+    assert all(
+        view == MEASURED_VIEW and 0 <= element < len(Measured._fields) < MEASURED_NUMBERS for view, element, _ in noted
+    )
 
 
 @given(NUMBER, st.integers(0, 3), PULSES, USUAL, st.booleans())
@@ -49,6 +53,15 @@ def test_command_comes_back(next_ns, relays, pulses, level, block):
     assert all(0 <= element < COMMAND_NUMBERS for _, element, _ in noted)
 
 
+@given(st.integers(0, 10**18))
+@repeatable(100)
+def test_time_comes_back(now_ns):
+    noted = noted_time(now_ns)
+    assert time_of([*noted_measured(Measured(9)), *noted]) == now_ns
+    assert measured_of(noted) is None
+    assert all(value in range(-(2**31), 2**31) for *_, value in noted)
+
+
 def test_usual_numbers_are_left_out():
     assert noted_measured(Measured(9)) == [(MEASURED_VIEW, 0, 9)]
     assert noted_measured(Measured(0, 7, options=1)) == [
@@ -59,6 +72,7 @@ def test_usual_numbers_are_left_out():
     assert noted_command(Command(2_777_778)) == [(COMMAND_VIEW, 0, 2_777_778)]
     assert measured_of([]) is None
     assert command_of([]) is None
+    assert time_of([]) is None
 
 
 def test_views_are_nobody_elses():
