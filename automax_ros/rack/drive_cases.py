@@ -77,22 +77,24 @@ class _Registers:
 
     def given(self, register: int, default: int) -> Given:
         """Return a register's value."""
-        return _of(self._words(register), default)
+        return _of(self._words(register, default), default)
 
     def bit_0(self, register: int) -> Given:
         """Return whether bit 0 of a register is on."""
-        words = [None if word is None else word & 1 for word in self._words(register)]
-        return _of([*words, *self._points(register, 0)], 0)
+        words = [None if word is None else word & 1 for word in self._words(register, 0)]
+        return _of([*words, *self._points(register, 0, 0)], 0)
 
-    def _words(self, register: int) -> list[int | None]:
+    def _words(self, register: int, default: int) -> list[int | None]:
         numbered = numbered_writes(self.programs).get((self.slot, register), [])
-        return [*self._points(register, None), *numbered]
+        return [*self._points(register, None, default), *numbered]
 
-    def _points(self, register: int, bit: int | None) -> list[int | None]:
+    def _points(self, register: int, bit: int | None, default: int) -> list[int | None]:
         """Return what tasks write to the points of a register, or of one of its bits."""
         place = Point(self.slot, register, bit)
         names = {variable.name for variable in self.config.declared if variable.point == place}
-        written = (item for program in self.programs for item in written_constants(program, Scope.COMMON).items())
+        written = (
+            item for program in self.programs for item in written_constants(program, Scope.COMMON, default).items()
+        )
         return [None if value is None else int(value) for name, value in written if name in names]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from automax_ros.compile.functions import BUILTINS
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 from automax_ros.drive.drive_case import Given
@@ -12,7 +13,7 @@ from automax_ros.drive.plant import PlantData
 from automax_ros.language.checks.constant_values import constant_value
 from automax_ros.language.program import BoundCall, Program
 from automax_ros.language.syntax.statement_text import print_expression
-from automax_ros.language.syntax.tree import Assignment, Expression, Scope, Unary
+from automax_ros.language.syntax.tree import Assignment, Expression, FunctionCall, Reference, Scope, Unary
 from automax_ros.language.syntax.walk import statements_in_order
 from automax_ros.language.written import places_that_write
 from automax_ros.rack.config import RackConfig
@@ -173,19 +174,40 @@ def _assigned(own: Program, programs: Iterable[Program]) -> dict[str, Value | No
     return found | written_constants(own, Scope.LOCAL)
 
 
-def written_constants(program: Program, scope: Scope) -> dict[str, Value | None]:
-    """Return the variables that a task writes, with the value of those that get one constant in one place."""
-    constants = _constants(program)
+def written_constants(program: Program, scope: Scope, start: int | None = None) -> dict[str, Value | None]:
+    """Return the variables that a task writes, with the value of those that get one constant in one place.
+
+    ``start`` is what a variable held before, for functions such as BIT_SET% of the variable itself; None: not known.
+    """
+    constants = _constants(program, start)
     return {
         name: constants[name][0] if len(places) == 1 and name in constants else None
         for name, places in places_that_write(program, scope).items()
     }
 
 
-def _constants(program: Program) -> dict[str, list[Value | None]]:
+def _constants(program: Program, start: int | None) -> dict[str, list[Value | None]]:
     """Return what the assignments of a task give each simple variable, None for what is not a constant."""
     found: dict[str, list[Value | None]] = {}
     for statement, _ in statements_in_order((*program.startup, *program.scan)):
         if isinstance(statement, Assignment):
-            found.setdefault(print_expression(statement.target), []).append(constant_value(statement.value))
+            name = print_expression(statement.target)
+            found.setdefault(name, []).append(_value(statement.value, name, start))
     return found
+
+
+def _value(expression: Expression, name: str, start: int | None) -> Value | None:
+    """Return what an expression gives, None where that is not known; ``start`` is what the variable ``name`` held."""
+    if isinstance(expression, Reference) and expression.name == name:
+        return start
+    if not isinstance(expression, FunctionCall) or expression.name not in BUILTINS:
+        return constant_value(expression)
+    arguments = [_value(item, name, start) for item in expression.arguments]
+    if None in arguments:
+        return None
+    builtin = BUILTINS[expression.name]
+    result = builtin.carry_out(*arguments)
+    if builtin.fallible:
+        assert isinstance(result, tuple)
+        result = result[0]
+    return result if isinstance(result, (bool, int, float, str)) else None

@@ -10,6 +10,7 @@ from automax_ros.bags.traces import Course, Line
 from automax_ros.bags.variables import Watched
 from automax_ros.core.types import DataType
 from automax_ros.drive.cml.reference import FULL
+from automax_ros.drive.scr import FORWARD, PARTNER
 from automax_ros.replay.drive_signals import ReportDrive, Signal
 from automax_ros.replay.drive_totals import CountTotals, PlantTotals, rpm_of
 from automax_ros.wire.messages import PlantState
@@ -27,6 +28,8 @@ STATES = {
 }
 """Booleans of a drive and what their edges mean, rising and falling."""
 DRAWN_STATES = ("CML_RUN", "DC_CML_STATE", "BRIDGE_POL")
+SUSPECT = "BAD_SCR_NUM"
+"""The output with the number of a suspected SCR: that one or its anti-parallel partner (52.3.1)."""
 MOST_EVENTS = 2000
 """Most events of one drive that are kept; the first ones are (decision: a page that can still be read)."""
 PERCENT_SPEED, PERCENT_CURRENT, DEGREES = "% of full speed", "% of rated current", "deg"
@@ -120,6 +123,9 @@ class DriveRun:
         keyword, on = signal.keyword, value != 0.0
         if keyword in FAULTS:
             self._note_fault(time_s, signal, on=on)
+        elif keyword == SUSPECT and value != before and on:
+            self.tell(time_s, "fault", f"suspected shorted SCR: {_suspects(int(value))} ({signal.variable})")
+            return
         if before is None or (before != 0.0) == on:
             return
         if keyword in STATES:
@@ -221,6 +227,10 @@ class DriveRun:
             Line(Watched(label, number, 0, kind, unit), *self._courses[label, unit, kind].line())
             for number, (label, unit, kind) in enumerate(keys)
         ]
+
+
+def _suspects(number: int) -> str:
+    return f"{number} or {PARTNER[number]}" if number in FORWARD else f"{number}"
 
 
 def _cause_first(item: tuple[str, float]) -> int:

@@ -130,6 +130,7 @@ def test_line_frequency(judged, hertz, given, verdict, code):
     ("statement", "wired", "millihenry", "verdict", "code"),
     [
         ("OPT% = 1", True, 2.22, "fine", 0), ("OPT% = 1", False, 2.22, "wrong", 1), ("OPT% = 1", True, 9.6, "wrong", 1),
+        ("OPT% = BIT_SET%(OPT%, 0)", True, 9.6, "wrong", 1), ("OPT% = BIT_SET%(OPT%, 1)", False, 9.6, "fine", 0),
         ("OPT% = 2", False, 9.6, "fine", 0), ("OPT% = REF%", True, 9.6, "attention", 0),
         ("FAST@ = TRUE", False, 2.22, "wrong", 1), ("REF% = 1", False, 9.6, "fine", 0),
     ],

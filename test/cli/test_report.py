@@ -137,6 +137,17 @@ def test_the_sequence_tells_what_happened_in_order(automax, bag):
     assert fault == ["4.0000", "5.0000", "instantaneous overcurrent", "IOC_OUT", "IOC@"]
 
 
+def test_the_suspected_scrs_are_named_by_the_pair(automax, bag):
+    names = [*COMMONS, "SCR%"]
+    task = loop_task(BAD_SCR_OUT="TACH@", TACH_LOSS_OUT=None, BAD_SCR_NUM="SCR%").replace("REF%,", "REF%, SCR%,", 1)
+    with bag(rack=rack_file(more="  SCR%: {}\n"), task=task, names=names) as recording:
+        recording.write(1.0, TACH_B=1, SCR_I=3)
+    ((run, _),) = drive_report(automax.folder / "bag").drives
+    assert [event.text for event in run.events] == [
+        "fault: shorted SCR (BAD_SCR_OUT TACH@)", "suspected shorted SCR: 3 or 16 (SCR%)"
+    ]  # fmt: skip
+
+
 def test_a_fault_that_stays_is_still_on(automax, bag):
     with bag() as recording:
         recording.write(1.0, TACH_B=1)
