@@ -171,3 +171,12 @@ def test_looks_go_on_at_the_same_instants_from_a_state(tmp_path: Path) -> None:
     heard.rack.run(0.02)
     stamps = [stamp for stamp, _ in heard.messages["/line1/plants/UNWIND UNWIND"]]
     assert stamps == [20_000_000, 30_000_000]
+
+
+def test_late_looks_follow_in_order(tmp_path: Path) -> None:
+    heard = Heard(rack_of(tmp_path))
+    heard.rack.start()
+    for wall_ns in (3_000_000, 47_000_000, 50_000_000):
+        heard.rack.scheduler.run_due(wall_ns)
+    stamps = [stamp for stamp, _ in heard.messages["/line1/joint_states WINDER"]]
+    assert stamps == [number * 10_000_000 for number in range(6)]

@@ -1,7 +1,8 @@
 """Looks at all plants of a rack at a fixed rate of rack time, for whoever wants to know: streams, reports.
 
 They are looked at whether or not somebody wants to know: where a plant's time stops on its way decides the last bits of
-its numbers, and a run that is watched must be the same as one that is not (decision).
+its numbers, and a run that is watched must be the same as one that is not (decision). For the same reason no look is
+left out where the host is late: late ones follow in order, as the interrupts of drives do (decision).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 
 SAMPLE_NS = 10_000_000
 """Time between two looks, ns: 100 a second (decision)."""
+_KEY = EventKey(EventClass.OBSERVE, 0, "")
 Look = Callable[[int], None]
 """Is told the instant (ns) of a look: all plants are at that instant, and nothing else happens at it any more."""
 
@@ -33,10 +35,10 @@ class PlantSampling:
         """Begin, with this instant where it is one of the rate's; a rack without plants has no looks."""
         if self._plants:
             first_ns = -(-self._scheduler.now_ns // SAMPLE_NS) * SAMPLE_NS
-            key = EventKey(EventClass.OBSERVE, 0, "")
-            self._scheduler.every(SAMPLE_NS, first_ns, key, self._look)
+            self._scheduler.at(first_ns, _KEY, self._look)
 
-    def _look(self, now_ns: int, _: int) -> None:
+    def _look(self, now_ns: int) -> None:
+        self._scheduler.at(now_ns + SAMPLE_NS, _KEY, self._look)
         for plant in self._plants.values():
             plant.advance(now_ns)
         for look in self._looks:

@@ -243,13 +243,9 @@ def test_however_late_the_host_is_the_drive_does_the_same(tmp_path, late_ms):
     assert live.value("STATE@") is True
     assert live.plants["UNWIND"].motor.speed_rad_s > 5
     assert simulated.task("CML").scan_number == live.task("CML").scan_number
-    # Who only looks at a plant looks less often when the host is late: its speed is integrated in other steps.
-    one, other = simulated.plants["UNWIND"], live.plants["UNWIND"]
-    one.advance(1_500_000_001)
-    other.advance(1_500_000_001)
-    assert other.motor.speed_rad_s == pytest.approx(one.motor.speed_rad_s, rel=1e-4)
-    assert other.circuit.current_a == pytest.approx(one.circuit.current_a, rel=1e-3, abs=0.1)
-    assert live.value("I_FDBK%") == pytest.approx(simulated.value("I_FDBK%"), rel=1e-2)
+    simulated.plants["UNWIND"].advance(1_500_000_001)
+    live.plants["UNWIND"].advance(1_500_000_001)
+    assert simulated.plants.state() == live.plants.state()
     greatest_ns = next(module.timing for module in live.modules if isinstance(module, Timed)).greatest_ns
     assert greatest_ns <= max(late_ms) * 1e6
 
