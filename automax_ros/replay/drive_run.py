@@ -10,6 +10,7 @@ from automax_ros.bags.traces import Course, Line
 from automax_ros.bags.variables import Watched
 from automax_ros.core.types import DataType
 from automax_ros.drive.cml.reference import FULL
+from automax_ros.drive.errors import LARGEST
 from automax_ros.drive.scr import FORWARD, PARTNER
 from automax_ros.replay.drive_signals import ReportDrive, Signal
 from automax_ros.replay.drive_totals import CountTotals, PlantTotals, rpm_of
@@ -32,6 +33,8 @@ SUSPECT = "BAD_SCR_NUM"
 """The output with the number of a suspected SCR: that one or its anti-parallel partner (52.3.1)."""
 MOST_EVENTS = 2000
 """Most events of one drive that are kept; the first ones are (decision: a page that can still be read)."""
+LONGEST = 300
+"""Longest text of an event."""
 PERCENT_SPEED, PERCENT_CURRENT, DEGREES = "% of full speed", "% of rated current", "deg"
 
 
@@ -170,7 +173,10 @@ class DriveRun:
         return 360 * self._values["DELTA"] / period_us
 
     def take_plant(self, time_s: float, message: PlantState) -> None:
-        """Take a message of the plant."""
+        """Take a message of the plant; one with numbers that no drive has is passed over."""
+        numbers = (message.current_a, message.current_rms_a, message.speed_rpm, message.duration_s)
+        if not all(abs(number) <= LARGEST for number in numbers):
+            return
         self.plant.take(message)
         parameters = self.drive.parameters
         if parameters is None:
@@ -203,7 +209,7 @@ class DriveRun:
     def tell(self, time_s: float, kind: str, text: str) -> None:
         """Note an event."""
         if len(self.events) < MOST_EVENTS:
-            self.events.append(Event(time_s, kind, text))
+            self.events.append(Event(time_s, kind, text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."))
         else:
             self.untold += 1
 

@@ -267,6 +267,19 @@ def test_names_from_a_recording_cannot_become_markup(automax, bag):
     assert "\x1b" not in page
 
 
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e300, -1e300])
+@pytest.mark.parametrize("name", ["current_a", "current_rms_a", "speed_rpm", "duration_s"])
+def test_messages_with_impossible_numbers_are_passed_over(automax, bag, name, value):
+    with bag() as recording:
+        recording.plant(1.0)
+        recording.plant(2.0, current_rms_a=10.0, duration_s=1.0, **{name: value} if name == "speed_rpm" else {})
+        recording.plant(3.0, **{"current_rms_a": 20.0, "duration_s": 1.0, name: value})
+        recording.operation(4.0, "x" * 5000, "")
+    ((run, _),) = drive_report(automax.folder / "bag").drives
+    assert run.plant.rms_a == (0.0 if name == "speed_rpm" else 10.0)
+    assert max(len(event.text) for event in run.events) == 300
+
+
 def test_a_long_recording_keeps_its_peaks_and_the_page_its_size(automax, bag):
     with bag() as recording:
         recording.write(0.001, STATE_B=1)
