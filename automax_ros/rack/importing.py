@@ -10,7 +10,7 @@ from automax_ros.core.diagnostics import Diagnostic, Span
 from automax_ros.core.types import declaration_text
 from automax_ros.rack.configuration_task import Configuration, DefinedCommon, DefinedTask
 from automax_ros.rack.drafting import commented, rack_name
-from automax_ros.rack.modules.io_config import IoKind
+from automax_ros.rack.modules.io_config import HasTable
 from automax_ros.rack.modules.registry import KINDS
 from automax_ros.rack.task_config import MAX_TASKS
 
@@ -131,7 +131,7 @@ def _with_registers(highest: int) -> list[str]:
     return [
         number
         for kind in KINDS
-        if isinstance(kind, IoKind)
+        if isinstance(kind, HasTable)
         for number, model in kind.table.items()
-        if highest < model.registers.count
+        if highest < model.registers.count and highest not in model.registers.reserved
     ]

@@ -3,9 +3,10 @@
 rack.start()
 Pacer(rack.scheduler).run(10 * NS_PER_S)      # ten seconds of the wall clock
 
-Every event stands on an absolute deadline. One that the host made the loop miss is skipped and counted, and the next
-stays on the grid (``Scheduler.run_due``). How the time to the next deadline is spent is the caller's: a library sleeps,
-ROS nodes let their executor serve messages, so what comes from outside falls between two events.
+Every event stands on an absolute deadline. A periodic one that the host made the loop miss is skipped and counted, and
+the next stays on the grid (``Scheduler.run_due``); a drive's interrupts are all carried out, late ones in order. How
+the time to the next deadline is spent is the caller's: a library sleeps, ROS nodes let their executor serve messages,
+so what comes from outside falls between two events.
 """
 
 from __future__ import annotations

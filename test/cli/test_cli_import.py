@@ -86,3 +86,10 @@ def test_wrong_usage(plant, arguments, message):
     result = plant("import", *arguments)
     assert (result.code, message in result.err) == (2, True)
     assert (plant.folder / "there.yaml").read_text() == "precious"
+
+
+@pytest.mark.parametrize(("register", "models"), [(4136, "57C406"), (4135, "none that the emulator has")])
+def test_the_registers_of_a_drive_are_recognised(plant, register, models):
+    plant.write("LINE1.CNF", f"10 IODEF TLD%[SLOT=7, REGISTER={register}]\n" + CNF)
+    result = plant("import", "LINE1.CNF")
+    assert f"generic, registers up to {register}: {models}\n" in result.out

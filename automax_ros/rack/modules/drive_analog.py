@@ -9,12 +9,15 @@ the others.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from automax_ros.compile.cost import Model
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.numbers import round_count
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
+from automax_ros.rack.modules.io_config import IoModel
 from automax_ros.rack.modules.io_module import IoModule
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.scalars import integer_value
@@ -85,7 +88,8 @@ class DriveAnalogKind:
     """What a rack file may say of a 57C405."""
 
     word = "drive analog I/O"
-    models = {"57C405": "drive analog I/O module"}  # noqa: RUF012
+    table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _REGISTERS)})
+    models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
     options = ("drive",)
 
     def read(self, found: FoundModule) -> DriveAnalogConfig:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from automax_ros.compile.cost import Model
 from automax_ros.rack.modules.drive_controller import DEFAULTS, DriveControllerModule
+from automax_ros.rack.modules.io_config import IoModel
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.task_config import TaskConfig
 
@@ -64,7 +66,8 @@ class DriveControllerKind:
     """What a rack file may say of a 57C406."""
 
     word = "drive I/O controller"
-    models = {"57C406": "drive I/O controller module"}  # noqa: RUF012
+    table: Mapping[str, IoModel] = MappingProxyType({"57C406": IoModel("drive I/O controller module", _REGISTERS)})
+    models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
     options = ("plant",)
 
     def read(self, found: FoundModule) -> DriveConfig:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Protocol, runtime_checkable
 
 from automax_ros.compile.cost import Model
 from automax_ros.rack.modules.io_module import IoModule
@@ -49,6 +50,14 @@ class IoModel:
 
     title: str
     registers: Registers
+
+
+@runtime_checkable
+class HasTable(Protocol):
+    """A kind of module whose catalogue numbers each have registers of their own."""
+
+    @property
+    def table(self) -> Mapping[str, IoModel]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.rack.loader import load
-from automax_ros.rack.modules.drive_analog import DriveAnalogConfig
-from automax_ros.rack.modules.drive_config import DriveConfig
-from automax_ros.rack.modules.io_config import IoKind
+from automax_ros.rack.modules.io_config import HasTable
 from automax_ros.rack.modules.kind import Registers
 from automax_ros.rack.modules.registry import KINDS
 from automax_ros.rack.rack import Rack
@@ -18,9 +16,7 @@ from automax_ros.rack.tasks_check import check_tasks
 
 PAGE = (Path(__file__).parents[3] / "docs" / "modules.md").read_text(encoding="utf-8")
 MODELS = {
-    **{number: model.registers for kind in KINDS if isinstance(kind, IoKind) for number, model in kind.table.items()},
-    "57C405": DriveAnalogConfig(0, "57C405").registers,
-    "57C406": DriveConfig(0, "57C406").registers,
+    number: model.registers for kind in KINDS if isinstance(kind, HasTable) for number, model in kind.table.items()
 }
 
 
