@@ -5,6 +5,7 @@ from math import atan, cos, exp, pi, sin, sqrt
 
 import pytest
 
+from automax_ros.drive.cml.sequence import Phase
 from automax_ros.drive.cml.signals import FMCR, PERMISSIVE, RMCR
 from automax_ros.drive.nameplate import EXAMPLES, derive
 from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
@@ -97,7 +98,7 @@ def test_a_stop_waits_for_discontinuous_conduction():
     drive.run(0.3)
     assert drive["DC_TIME"] == 0
     stop_ns = drive.now_ns
-    drive.run(0.01, cml_run=False)
+    drive.run(0.007, cml_run=False)
     assert (drive["DC_CML_STATE"], drive.relay) == (True, True)
     while drive.relay:
         drive.scan()
@@ -138,8 +139,10 @@ def test_max_m_dropout_ends_a_stop_whose_current_lasts(dropout):
 def test_run_again_during_a_stop_is_no_start():
     drive = Drive(reference=2500).start()
     drive.run(0.3)
-    drive.run(0.006, cml_run=False)
-    assert drive["DC_CML_STATE"]
+    drive.run(0.001, cml_run=False)
+    while drive.loop.sequence.phase is Phase.RUN:
+        drive.scan()
+    assert drive.loop.sequence.phase is Phase.STOPPING
     drive.run(0.5, cml_run=True)
     assert (drive["DC_CML_STATE"], drive.relay) == (False, False)
 
