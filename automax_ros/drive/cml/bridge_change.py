@@ -2,7 +2,7 @@
 
 Ordinary: current must be seen to be zero over a whole scan, then the new bridge begins at DELTA 0 and searches: the
 more CEMF is against it and the smaller the reference, the longer that takes (decision). Fast (register 4146 bit 0):
-the new bridge begins as soon as the SCRs have recovered, at the DELTA that the CEMF asks for (decision).
+the new bridge begins as soon as the old one's SCRs have recovered, at the DELTA that the CEMF asks for (decision).
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ RECOVERY_US = 500
 """Time without current after which SCRs block, with a margin (decision)."""
 VD0 = 1.3505
 """Ideal mean voltage of a bridge over the line-to-line voltage: 3 sqrt(2) / pi."""
+PRESET = 0.6
+"""Largest part of a scan that a preset lets conduct, by the law of ``regulator`` (decision)."""
 HIGHEST_COS = 0.95
 """Alpha of a preset lies between the angles of this cosine (decision)."""
 
@@ -81,7 +83,7 @@ class BridgeChange(Stateful):
         if measured.tail_us <= 0:
             self.stage = Stage.BACK
             return False
-        if measured.tail_us < (RECOVERY_US if fast else int(scan_us)):
+        if not fast and measured.tail_us < int(scan_us):
             self.stage = Stage.OFF
             return False
         self.begin(3 - self.bridge)
@@ -104,5 +106,5 @@ def preset_us(measured: Measured, bridge: int, wanted: float, thresh: int, perio
     if bridge == 2:
         ratio = -ratio
     continuous = (1.0 - acos(max(-HIGHEST_COS, min(HIGHEST_COS, ratio))) / pi) * 0.5 * period_us
-    part = 1.0 if wanted >= thresh else (wanted / thresh) ** (1 / 3)
+    part = min(PRESET, float((wanted / max(thresh, 1)) ** (1 / 3)))
     return continuous - (1.0 - part) * BOUNDARY_WAY * period_us

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from automax_ros.drive.cml.bridge_change import FLOOR, QUIET, BridgeChange, Stage, preset_us
+from automax_ros.drive.cml.bridge_change import FLOOR, QUIET, RECOVERY_US, BridgeChange, Stage, preset_us
 from automax_ros.drive.cml.firing import Firing
 from automax_ros.drive.cml.reference import FULL, ReferenceChain
 from automax_ros.drive.cml.regulator import STEPS, Regulator
@@ -96,9 +96,12 @@ class CurrentControl(Stateful):
         wanted = self.chain.scan(reference, settings.ref_rate, settings.ref_lag, scan_us * 1e-6)
         fast = settings.fast_change
         self.block = False
+        guard_ns = 0
         if self.change.scan(measured, wanted, scan_us, fast=fast):
             bridge = self.change.bridge
             self._take(bridge, preset_us(measured, bridge, abs(wanted), settings.cc_thresh, period_us) if fast else 0.0)
+            self.block = True
+            guard_ns = max(0, RECOVERY_US - measured.tail_us) * 1000
         elif self.change.stage == Stage.BACK:
             back = QUIET if self.part < 1.0 else FLOOR
             self.regulator.begin(min(self.regulator.delta_us, back * period_us))
@@ -108,7 +111,7 @@ class CurrentControl(Stateful):
             self.regulator.begin(0.0)
             return self.off()
         self._regulate(wanted, settings, period_us)
-        return self._fire(pll, self.regulator.delta_us, self.bridge, reverse)
+        return self._fire(pll, self.regulator.delta_us, self.bridge, reverse, guard_ns)
 
     def _regulate(self, wanted: float, settings: Latched, period_us: float) -> None:
         """Find DELTA for the bridge in use."""
@@ -125,7 +128,9 @@ class CurrentControl(Stateful):
             elif wanted >= 1.0:
                 regulator.search(error, kp, wanted / FULL, period_us)
             return
-        self._fresh = 0
+        if self._fresh > 0:  # a part of the scan was the dead time's
+            self._fresh = 0
+            return
         gain = kp * settings.pi_w_lead * period_us / 6e6
         if part < 1.0:
             regulator.discontinuous(error, kp, gain, settings.ag_factor, settings.cc_thresh, part, period_us)
@@ -160,6 +165,6 @@ class CurrentControl(Stateful):
         self.block = False
         self._fresh = FRESH_SCANS if delta_us else 0
 
-    def _fire(self, pll: Pll, delta_us: float, bridge: int, reverse: bool) -> tuple[Pulse, ...]:
+    def _fire(self, pll: Pll, delta_us: float, bridge: int, reverse: bool, guard_ns: int = 0) -> tuple[Pulse, ...]:
         delta_ns = round(delta_us * 1000)
-        return self.firing.pulses(pll.position, pll.period_ns, pll.next_ns, delta_ns, bridge, reverse)
+        return self.firing.pulses(pll.position, pll.period_ns, pll.next_ns, delta_ns, bridge, reverse, guard_ns)

@@ -45,7 +45,14 @@ class Firing(Stateful):
         self.count += 1
 
     def pulses(
-        self, position: int, period_ns: int, next_ns: int, delta_ns: int, bridge: int, reverse: bool
+        self,
+        position: int,
+        period_ns: int,
+        next_ns: int,
+        delta_ns: int,
+        bridge: int,
+        reverse: bool,
+        earliest_ns: int = 0,
     ) -> tuple[Pulse, ...]:
         """Plan the time from an interrupt, at a position of the cycle, to the next.
 
@@ -56,6 +63,7 @@ class Firing(Stateful):
             delta_ns: DELTA, ns, 0 to half a period.
             bridge: 1 or 2.
             reverse: whether the line has the other rotation.
+            earliest_ns: no pulse begins sooner after the interrupt, ns.
         """
         self.count = count = self.count + 1
         sixth = period_ns // 6
@@ -69,9 +77,9 @@ class Firing(Stateful):
         planned = []
         while number <= newest:
             after = delay - (count - number) * sixth
-            if after >= 0:
+            if after >= earliest_ns:
                 planned.append(Pulse(after, sixth, words[(position - count + number) % 6]))
-            elif after + sixth > 0:
-                planned.append(Pulse(0, sixth + after, words[(position - count + number) % 6]))
+            elif after + sixth > earliest_ns:
+                planned.append(Pulse(earliest_ns, sixth + after - earliest_ns, words[(position - count + number) % 6]))
             number += 1
         return tuple(planned)

@@ -1,0 +1,175 @@
+"""The change of bridges: dead times, ordinary and fast, nothing fires across, and what goes wrong without voltage."""
+
+import random
+from itertools import pairwise
+
+import pytest
+
+from automax_ros.drive.cml.bridge_change import FLOOR, BridgeChange, Stage, preset_us
+from automax_ros.drive.cml.outputs import OUTPUTS
+from automax_ros.drive.cml.signals import OVERCURRENT, VOLTAGE, VOLTS, Measured, gate_numbers
+
+from .support import Bench
+
+EMF = {"10hp": 210.0, "150hp": 450.0, "800hp": 640.0}
+FAST = 1
+
+
+def running(size, hertz, emf, reference, *, fast=False, voltage=False):
+    bench = Bench(size, hertz)
+    bench.emf(emf)
+    bench.registers = (109, 4, 2, FAST if fast else 0)
+    if voltage:
+        bench.status |= VOLTAGE
+    bench.start()
+    bench.plant.circuit.take_events()
+    bench.set(reference=reference)
+    bench.run(0.4)
+    assert bench.plant.circuit.take_events() == []
+    return bench
+
+
+def dead_ms(scans, old, new):
+    """The time without current from the last current of the old sign to the first of the new."""
+    last = max(index for index, scan in enumerate(scans) if scan.measured.current * old > 0)
+    first = min(index for index, scan in enumerate(scans) if scan.measured.current * new > 0)
+    if first < last or not scans[last].measured.tail_us:
+        return scans[last].measured.zero_us / 1000
+    between = sum(scan.measured.zero_us for scan in scans[last + 1 : first + 1])
+    return (scans[last].measured.tail_us + between) / 1000
+
+
+def change(bench, old, new):
+    """Change the reference; return the scans and the dead time."""
+    bench.set(reference=new)
+    scans = bench.run(0.4)
+    for scan in scans:
+        for pulse in scan.command.pulses:
+            assert len({number > 10 for number in gate_numbers(pulse.gates)}) == 1
+    assert scans[-1].bridge == (2 if new < 0 else 1)
+    return scans, dead_ms(scans, old, new)
+
+
+@pytest.mark.parametrize(("size", "hertz"), [("10hp", 60), ("150hp", 60), ("150hp", 50), ("800hp", 50)])
+def test_ordinary_dead_time_is_3_to_70_ms_by_emf_and_reference(size, hertz):
+    found = {}
+    for part in (-1.0, -0.4, 0.0, 0.4, 1.0):
+        for amount in (60, 2047, 4095):
+            bench = running(size, hertz, part * EMF[size], amount)
+            scans, dead = change(bench, amount, -amount)
+            assert 3.0 <= dead <= 70.0
+            assert bench.plant.circuit.take_events() == []
+            assert not any(scan.measured.status & OVERCURRENT for scan in scans)
+            assert scans[-1].feedback == pytest.approx(-amount, abs=2)
+            found[part, amount] = dead
+    for amount in (60, 2047, 4095):
+        # Bridge 2 has to find the EMF that stands against it: -1 is a motor at full speed backwards.
+        times = [found[part, amount] for part in (-1.0, -0.4, 0.0, 0.4, 1.0)]
+        assert all(one > two for one, two in pairwise(times))
+    for part in (-1.0, 0.0):
+        assert found[part, 60] > found[part, 2047] > found[part, 4095]
+
+
+def test_the_other_way_round_is_as_long():
+    there = change(running("150hp", 60, 450.0, 2047), 2047, -2047)[1]
+    back = change(running("150hp", 60, -450.0, -2047), -2047, 2047)[1]
+    assert there == pytest.approx(back, abs=0.01)
+
+
+@pytest.mark.parametrize(("size", "hertz"), [("10hp", 60), ("150hp", 60), ("150hp", 50), ("800hp", 60)])
+def test_fast_change_takes_about_2_ms(size, hertz):
+    times = []
+    for part in (-1.0, -0.4, 0.0, 0.4, 1.0):
+        for amount in (400, 2047, 4095):
+            bench = running(size, hertz, part * EMF[size], amount, fast=True, voltage=True)
+            scans, dead = change(bench, amount, -amount)
+            assert bench.plant.circuit.take_events() == []
+            assert not any(scan.measured.status & OVERCURRENT for scan in scans)
+            assert scans[-1].feedback == pytest.approx(-amount, abs=2)
+            assert 0.5 <= dead <= 2 * 1000 / (6 * hertz) + 0.5
+            times.append(dead)
+    assert 1.5 < sum(times) / len(times) < 3.5
+
+
+@pytest.mark.parametrize("amount", [200, 2047, 4095])
+def test_fast_change_without_voltage_ends_in_an_ioc_fault_at_speed(amount):
+    bench = running("150hp", 60, 450.0, amount, fast=True)
+    bench.set(reference=-amount)
+    scans = bench.run(0.3)
+    assert any(scan.measured.status & OVERCURRENT for scan in scans)
+    outputs = dict(zip(OUTPUTS, bench.outputs, strict=True))
+    assert outputs["IOC_OUT"]
+    assert not outputs["DC_CML_STATE"]
+
+
+def test_fast_change_without_voltage_does_no_harm_at_standstill():
+    bench = running("150hp", 60, 0.0, 2047, fast=True)
+    scans, dead = change(bench, 2047, -2047)
+    assert dead < 6.0
+    assert not any(scan.measured.status & OVERCURRENT for scan in scans)
+
+
+def test_a_reference_that_turns_back_before_zero_current_changes_nothing():
+    bench = running("150hp", 60, 450.0, 4095)
+    bench.set(reference=-500)
+    while bench.loop.control.change.stage == Stage.NONE:
+        bench.scan()
+    bench.set(reference=4095)
+    scans = bench.run(0.4)
+    assert {scan.bridge for scan in scans} == {1}
+    assert scans[-1].feedback == pytest.approx(4095, abs=2)
+
+
+def test_a_reference_close_to_zero_does_not_change_bridges():
+    bench = running("150hp", 60, 200.0, 500)
+    for reference in (3, -3, 0, -3):
+        bench.set(reference=reference)
+        assert {scan.bridge for scan in bench.run(0.2)} == {1}
+
+
+def test_old_bridge_is_blocked_until_its_scrs_have_recovered():
+    change = BridgeChange()
+    scan_us = 2777.8
+    assert not change.scan(Measured(0, 1000), -100.0, scan_us, fast=False)
+    assert change.stage == Stage.BACK
+    assert not change.scan(Measured(0, 100, 300, 300), -100.0, scan_us, fast=False)
+    assert change.stage == Stage.OFF
+    assert change.scan(Measured(0, 0, 2778, 3078), -100.0, scan_us, fast=False)
+    assert (change.bridge, change.stage) == (2, Stage.NONE)
+
+
+def test_preset_lies_at_the_angle_of_the_emf():
+    period = 1e6 / 60
+    at_rest = preset_us(Measured(VOLTAGE), 1, 4095.0, 700, period)
+    # Alpha 90, less 40 % of the 30 degrees from first to continuous current.
+    assert at_rest == pytest.approx(period * (90 - 0.4 * 30) / 360, rel=1e-6)
+    half = round(0.5 * 1.3505 * VOLTS)
+    assert preset_us(Measured(VOLTAGE, voltage=half), 1, 4095.0, 700, period) - at_rest == pytest.approx(
+        period * 30 / 360, rel=1e-3
+    )
+    assert at_rest - preset_us(Measured(VOLTAGE, voltage=half), 2, 4095.0, 700, period) == pytest.approx(
+        period * 30 / 360, rel=1e-3
+    )
+    # Without a 57C405 the voltage counts for nothing; a small reference begins lower.
+    assert preset_us(Measured(0, voltage=half), 1, 4095.0, 700, period) == at_rest
+    assert preset_us(Measured(VOLTAGE), 1, 0.7, 700, period) == pytest.approx(period * (90 - 0.9 * 30) / 360, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", sorted(EMF))
+def test_no_commutation_fails_whatever_the_reference_does(size):
+    chance = random.Random(size)
+    bench = Bench(size, chance.choice((50, 60)))
+    bench.start()
+    bench.plant.circuit.take_events()
+    period_us = bench.loop.pll.period_us
+    emf = 0.0
+    for _ in range(150):
+        wanted = chance.uniform(-1.05, 1.05) * EMF[size]
+        bench.set(reference=chance.randint(-4095, 4095))
+        for _ in range(chance.choice((4, 20, 70))):
+            emf += max(-0.003 * EMF[size], min(0.003 * EMF[size], wanted - emf))
+            bench.emf(emf)
+            scan = bench.scan()
+            if not scan.measured.zero_us and scan.measured.current:
+                assert scan.delta_us >= FLOOR * period_us - 1
+    assert bench.plant.circuit.take_events() == []
