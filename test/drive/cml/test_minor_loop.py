@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from automax_ros.drive.cml import CurrentMinorLoop
 from automax_ros.drive.cml.minor_loop import NUMBERS
 from automax_ros.drive.cml.signals import EXTERNAL_TRIP, PERMISSIVE, RESET_SWITCH, SWITCH_A, SWITCH_B
+from automax_ros.drive.state import Stateful
 
 from ..support import repeatable
 from .protected import LOCKED_S, Drive, inputs
@@ -129,3 +130,33 @@ def test_taking_over_does_not_change_types():
     for mine, its in zip(drive.loop.outputs.row(), other.outputs.row(), strict=True):
         assert type(mine) is type(its)
     assert type(other.sequence.phase) is type(drive.loop.sequence.phase)
+
+
+def everything(thing):
+    """All attributes of a loop and its parts, by type and name, as deep as they go."""
+    found = {}
+    for name, value in vars(thing).items():
+        if isinstance(value, Stateful):
+            found |= everything(value)
+        elif not isinstance(value, tuple) or not any(isinstance(item, Stateful) for item in value):
+            found[type(thing).__name__, name] = value
+    return found
+
+
+@pytest.mark.parametrize("short", [None, 3])
+def test_nothing_that_a_scan_leaves_is_forgotten(short):
+    """At every scan of a start with its test, a run, a trip and a reset: a loop that took over is the same inside."""
+    drive = Drive(tests_scrs=True, kp=9.0, speed_fdbk=0, reference=1500)
+    drive.plant.motor.speed_rad_s = 100.0
+    drive.registers = (109, 4, 2, 3)
+    if short:
+        drive.plant.circuit.short_scr(short)
+    steps = [{}, {"cml_run": True}, {"kp": 0.3, "ref_rate": 0.3}, {"osv_fdbk": 1}, {"osv_fdbk": 0, "fault_reset": True}]
+    for step in steps:
+        drive.inputs = drive.inputs._replace(**step)
+        for _ in range(140):
+            drive.scan()
+            other = CurrentMinorLoop(tests_scrs=True)
+            other.take(drive.loop.numbers())
+            assert everything(other) == everything(drive.loop)
+    assert "AMX7113" in drive.codes
