@@ -12,11 +12,13 @@ from automax_ros.drive.cml.minor_loop import CurrentMinorLoop
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import Retention
+from automax_ros.rack.stepping.stepper import Stepper, Why
 from automax_ros.running.scan_record import Status
 from automax_ros.running.views import MemoryValueError
 
 from .drive_tasks import CML, SPEED, permit, rack_of, running
 
+MS = 1_000_000
 MODELED = "execution: modeled\n"
 
 
@@ -247,3 +249,21 @@ def test_kept_state_has_locals_and_log_and_no_loop(tmp_path):
     permit(again)
     again.run(0.6)
     assert again.value("LOCKED@") is True
+
+
+def test_loop_is_stepped_line_by_line_and_does_the_same(tmp_path):
+    rack = rack_of(tmp_path)
+    permit(rack)
+    rack.scheduler.run_until(30 * MS)
+    stepper = Stepper(rack.config)
+    stepper.start((("PERMIT@", True), ("SPEED%", 1000), ("SPEED_REF%", 3000)))
+    for line in (1000, 1010):
+        stepper.break_at("CML", line)
+    for scan in range(1, 12):
+        call, after = stepper.until(30 * MS), stepper.until(30 * MS)
+        assert [(halt.why, halt.task, halt.line) for halt in (call, after)] == [
+            (Why.LINE, "CML", 1000), (Why.LINE, "CML", 1010)
+        ]  # fmt: skip
+        assert stepper.value("CML.SCANS%") == scan - 1
+    assert stepper.until(30 * MS).why is Why.TIME
+    assert comparable(stepper.rack) == comparable(rack)
