@@ -36,6 +36,12 @@ _SCR_TEST = "BAD_SCR_OUT"
 _RECORDS = "DIAG_DATA"
 
 
+Under = tuple[int, int, Value]
+"""An input of the loop that a force holds: its place in ``Inputs``, its view, and what is under the force."""
+Sensed = tuple[int, Measured, Sequence[Under]]
+"""Rack time of a scan, what was measured, and what is under forces."""
+
+
 class CmlIo(TaskIo):
     """What a scan of a current minor loop task touches."""
 
@@ -44,6 +50,7 @@ class CmlIo(TaskIo):
         super().__init__(task, memory, hear)
         self._cml = task
         self._latched_ns = 0
+        self._command = Command(0)
         self._take_latch = self.latch
         self.latch = self._latch_at
 
@@ -53,11 +60,15 @@ class CmlIo(TaskIo):
         Returns the outputs but DIAG_DATA in their order, None where none is written.
         """
         task = self._cml
-        measured = Measured(*self._hear(task.measure))
-        now_ns = task.rack_ns(self._latched_ns)
-        outcome = task.loop.scan(now_ns, measured, Inputs(*self._true(inputs)))
-        self._note(now_ns, measured, outcome.command)
-        self._hear(lambda: task.command(outcome.command))
+        now_ns, measured, under = self._hear(self._sense)
+        if type(measured) is not Measured:
+            measured = Measured(*measured)
+        if under:
+            inputs = self._under_forces(inputs, under)
+        outcome = task.loop.scan(now_ns, measured, Inputs._make(inputs))
+        self._command = outcome.command
+        self._note(now_ns, measured)
+        self._hear(self._give)
         for code in outcome.problems:
             self.log(task.cml.line, code)
         if outcome.record is not None:
@@ -68,18 +79,19 @@ class CmlIo(TaskIo):
         self._latched_ns = self._memory.now_ns
         return self._take_latch()
 
-    def _true(self, inputs: tuple[Any, ...]) -> tuple[Any, ...]:
+    def _sense(self) -> Sensed:
+        return self._cml.sense(self._latched_ns)
+
+    def _give(self) -> None:
+        self._cml.port.command(self._command)
+
+    def _under_forces(self, inputs: tuple[Any, ...], under: Sequence[Under]) -> tuple[Any, ...]:
         """Return the inputs with what is under a force where that has no effect."""
-        for place, view in self._cml.true_inputs:
-            if self._memory.is_forced(view):
-                inputs = (*inputs[:place], self._under_force(view), *inputs[place + 1 :])
+        for place, _, value in under:
+            inputs = (*inputs[:place], value, *inputs[place + 1 :])
         return inputs
 
-    def _under_force(self, view: int) -> Value:
-        value: Value = self._hear(lambda: self._cml.memory.under_force(view))
-        return value
-
-    def _note(self, now_ns: int, measured: Measured, command: Command) -> None:
+    def _note(self, now_ns: int, measured: Measured) -> None:
         """Note nothing: the scan is not recorded."""
 
     def _keep(self, record: Record, records: list[Value] | None) -> None:
@@ -98,15 +110,15 @@ class CmlIo(TaskIo):
 class RecordingCmlIo(CmlIo, RecordingIo):
     """The same, noting everything, what was measured and commanded among the reads."""
 
-    def _under_force(self, view: int) -> Value:
-        value = super()._under_force(view)
-        self.record.reads.append((view, 0, value))
-        return value
+    def _under_forces(self, inputs: tuple[Any, ...], under: Sequence[Under]) -> tuple[Any, ...]:
+        self.record.reads += [(view, 0, value) for _, view, value in under]
+        return super()._under_forces(inputs, under)
 
-    def _note(self, now_ns: int, measured: Measured, command: Command) -> None:
-        self.record.reads += noted_measured(measured)
-        self.record.reads += noted_time(now_ns)
-        self.record.reads += noted_command(command)
+    def _note(self, now_ns: int, measured: Measured) -> None:
+        reads = self.record.reads
+        reads += noted_measured(measured)
+        reads += noted_time(now_ns)
+        reads += noted_command(self._command)
 
 
 class CmlTask(Task):
@@ -148,25 +160,27 @@ class CmlTask(Task):
         self.records = self._common(_RECORDS, compiled)
         views = ((INPUTS.index(name), self._common(name, compiled)) for name in _TRUE_INPUTS)
         self.true_inputs = tuple((place, view) for place, view in views if view is not None)
+        self._port: DrivePort | None = None
+        self._inputs_forced = self._any_forced()
         self.loop = CurrentMinorLoop(tests_scrs=_SCR_TEST in cml.arguments)
         super().install(compiled)
 
     @property
     def port(self) -> DrivePort:
         """The 57C406 that IO_CNTL_SLOT names."""
-        return self._drives.port(self._slots[0])
+        if self._port is None:
+            self._port = self._drives.port(self._slots[0])
+        return self._port
 
-    def rack_ns(self, now_ns: int) -> int:
-        """Return the rack time of an instant as the task's memory has it."""
-        return self._drives.rack_ns(now_ns)
-
-    def measure(self) -> tuple[int, ...]:
-        """Return what the 57C406 has measured."""
-        return self.port.measure(self._slots[1])
-
-    def command(self, command: Command) -> None:
-        """Let the 57C406 carry out a command."""
-        self.port.command(command)
+    def sense(self, latched_ns: int) -> Sensed:
+        """Return rack time, what the 57C406 has measured, and what is under forces that have no effect on the loop."""
+        measured = self.port.measure(self._slots[1])
+        under: tuple[Under, ...] = ()
+        if self._inputs_forced:
+            memory = self.memory
+            forced = [(place, view) for place, view in self.true_inputs if memory.is_forced(view)]
+            under = tuple((place, view, memory.under_force(view)) for place, view in forced)
+        return self._drives.rack_ns(latched_ns), measured, under
 
     def run(self, now_ns: int = 0) -> ScanRecord | None:
         """Put the task into RUN: the loop starts again, and its 57C406's registers get their defaults (52.7)."""
@@ -232,6 +246,13 @@ class CmlTask(Task):
         except (ValueError, OverflowError):
             self.loop.take(before)
             raise
+
+    def _look_at_forces(self) -> None:
+        super()._look_at_forces()
+        self._inputs_forced = self._any_forced()
+
+    def _any_forced(self) -> bool:
+        return any(self.memory.is_forced(view) for _, view in self.true_inputs)
 
     def _follow_end(self) -> None:
         """Without its task a drive stops at once."""

@@ -53,7 +53,7 @@ def test_drive_runs_again_without_its_plant(bag):
     report = replayed(bag)
     assert report.identical, report.text()
     loop = next(task for task in report.tasks if task.name == "CML")
-    assert loop.scans == 721
+    assert loop.scans == len(scans_of(bag)) > 720
     assert loop.states >= 1
     errors = [error.code for scan in scans_of(bag) for error in scan.errors]
     assert 7113 in errors, "the recording has a fault that runs again"
