@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.text import near_or_listed, printable, quoted
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.plant_faults import values_of, work_on
 from automax_ros.rack.modules.kind import Operable
@@ -36,7 +36,7 @@ class Controls:
         modules = {str(module.config.slot): module for module in self._rack.modules}
         module = modules.get(slot)
         if module is None:
-            self._refuse("module", told, f"the rack has no module in slot {slot}")
+            self._refuse("module", told, f"the rack has no module in slot {printable(slot)}")
         if not isinstance(module, Operable) or control not in module.controls:
             has = near_or_listed(control, module.controls) if isinstance(module, Operable) else "it has no controls"
             self._refuse("module", told, f"the {module.config.model} in slot {slot} has no {quoted(control)}: {has}")
@@ -79,7 +79,8 @@ class Controls:
             raise OperationRefused(str(error)) from error
 
     def _tell(self, what: str, detail: str, *, reason: str = "", ok: bool = True) -> None:
-        self._rack.observers.operated(Operation(self._rack.now_ns, what, "", ok, reason, detail))
+        told = Operation(self._rack.now_ns, what, "", ok, reason, printable(detail))
+        self._rack.observers.operated(told)
 
     def _refuse(self, what: str, detail: str, reason: str) -> NoReturn:
         self._tell(what, detail, reason=reason, ok=False)

@@ -75,6 +75,7 @@ def test_switch_is_moved_to_a_position_in_any_case(rack: Rack, told: Told) -> No
     [
         ("7", "test_switch", "A", "the rack has no module in slot 7"),
         ("x" * 9, "test_switch", "A", "the rack has no module in slot xxxxxxxxx"),
+        ("7\x1b[2J", "test_switch", "A", "the rack has no module in slot 7\ufffd[2J"),
         ("0", "test_switch", "A", "the 57C435 in slot 0 has no 'test_switch': it has no controls"),
         ("5", "test_swich", "A", "the 57C419 in slot 5 has no 'test_swich': did you mean test_switch?"),
         ("5", "test_switch", "C", "test_switch cannot be 'C': it takes A, B, centre"),
@@ -85,6 +86,6 @@ def test_what_cannot_be_moved_is_refused_and_told(rack: Rack, told: Told, slot, 
     with pytest.raises(OperationRefused) as refused:
         Controls(rack).module(slot, control, value)
     assert str(refused.value) == reason
-    detail = f"{slot} {control} {value}"
+    detail = f"{slot} {control} {value}".replace("\x1b", "\ufffd")
     assert told.operations == [Operation(20_000_000, "module", "", ok=False, reason=reason, detail=detail)]
     assert not hasattr(rack.modules[1], "moved")
