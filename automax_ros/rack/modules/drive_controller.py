@@ -165,15 +165,16 @@ class DriveControllerModule:
     def _rest_from(self, first_ns: int) -> None:
         if self._plant is not None:
             self._end_rest()
-            self._rest = self._parts.scheduler.every(REST_NS, first_ns, self._rest_key, self._look)
+            self._rest = self._parts.scheduler.at(first_ns, self._rest_key, self._look)
 
     def _end_rest(self) -> None:
         if self._rest is not None:
             self._rest.cancel()
             self._rest = None
 
-    def _look(self, now_ns: int, _: int) -> None:
-        """Let the plant's time pass while nobody drives it."""
+    def _look(self, now_ns: int) -> None:
+        """Let the plant's time pass while nobody drives it; no look is left out where the host is late."""
+        self._rest_from(now_ns + REST_NS)
         plant = self._plant
         if plant is not None:
             plant.advance(now_ns)
