@@ -189,6 +189,8 @@ class CurrentMinorLoop(Stateful):
                 return self.scr_test.fire(pll.position, pll.period_ns, reverse=reverse)
             return none
         stopping = phase is not _RUN
+        if stopping:
+            self.control.chain.begin()
         if latched.cml_test:
             delta_us = 0.0 if stopping else (180 - latched.test_alpha) * pll.period_ns / 360_000
             pulses = self.control.open_loop(delta_us, 2 if latched.test_brpol else 1, pll, reverse=reverse)

@@ -24,7 +24,8 @@ class Phase(enum.IntEnum):
     """Gates are fired one by one: the shorted SCR test."""
     RUN = 3
     STOPPING = 4
-    """The current is brought to zero, then the contactor opens."""
+    """The current is brought to zero, then the contactor opens: neither rate limit nor lag of the reference hold it up
+    (decision)."""
 
 
 _RUN = int(Phase.RUN)

@@ -93,18 +93,20 @@ def test_a_start_that_is_taken_back_opens_the_contactor():
     assert not any(row["DC_CML_STATE"] for _, row in drive.rows)
 
 
-def test_a_stop_waits_for_discontinuous_conduction():
-    drive = Drive(reference=2500).start()
-    drive.run(0.3)
-    assert drive["DC_TIME"] == 0
+@pytest.mark.parametrize(("rate", "lag"), [(0.0, 400.0), (10.0, 1.0)])
+def test_a_stop_waits_for_discontinuous_conduction(rate, lag):
+    drive = Drive(reference=2500, ref_lag=lag).start()
+    drive.run(5.0 if lag == 1.0 else 0.3)
+    assert (drive["DC_TIME"], drive["I_FDBK"] > 2400) == (0, True)
+    drive.run(0.02, ref_rate=rate)
     stop_ns = drive.now_ns
-    drive.run(0.007, cml_run=False)
-    assert (drive["DC_CML_STATE"], drive.relay) == (True, True)
+    drive.inputs = drive.inputs._replace(cml_run=False)
     while drive.relay:
+        assert drive["DC_CML_STATE"]
         drive.scan()
-    stopped_s = (drive.now_ns - stop_ns) / 1e9
-    assert 0.005 < stopped_s < 0.1
-    # No arc: the current had ended before the contacts opened.
+    assert drive.loop.control.discontinuous
+    assert 0.0055 < (drive.now_ns - stop_ns) / 1e9 < 0.1
+    # No arc: the current has ended before the contacts open.
     while closed(drive):
         drive.scan()
         assert drive.plant.bridge.wiring.armature_arc_v == 0.0
@@ -137,13 +139,13 @@ def test_max_m_dropout_ends_a_stop_whose_current_lasts(dropout):
 
 
 def test_run_again_during_a_stop_is_no_start():
-    drive = Drive(reference=2500).start()
-    drive.run(0.3)
-    drive.run(0.001, cml_run=False)
-    while drive.loop.sequence.phase is Phase.RUN:
-        drive.scan()
-    assert drive.loop.sequence.phase is Phase.STOPPING
-    drive.run(0.5, cml_run=True)
+    drive = slow_drive().start()
+    drive.run(2.0)
+    drive.run(0.02, cml_run=False)
+    assert (drive["DC_CML_STATE"], drive.loop.sequence.phase) == (True, Phase.STOPPING)
+    drive.run(0.05, cml_run=True)
+    assert drive.loop.sequence.phase == Phase.STOPPING
+    drive.run(0.5)
     assert (drive["DC_CML_STATE"], drive.relay) == (False, False)
 
 
