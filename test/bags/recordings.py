@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 
 from automax_ros.bags.writer import BagWriter
 from automax_ros.core.kinds import Direction, WriteKind, WriterKind
@@ -92,6 +95,27 @@ def sample_recording(folder: Path, seconds: float = 2.5) -> Path:
             writer.write(backplane, stamp, encode(write))
             writer.write(value, stamp, encode(Int16(index % 30000)))
     return folder
+
+
+def without_checksums(file: Path, plain: Path) -> bytes:
+    """Write a recording's file again without checksums and compression, and return it."""
+    with file.open("rb") as source, plain.open("wb") as target:
+        reader = make_reader(source)
+        writer = McapWriter(target, enable_crcs=False, enable_data_crcs=False, compression=CompressionType.NONE)
+        writer.start(profile="ros2", library="test")
+        schemas: dict[str, int] = {}
+        channels: dict[str, int] = {}
+        for item in reader.iter_attachments():
+            writer.add_attachment(0, 0, item.name, item.media_type, item.data)
+        for schema, channel, message in reader.iter_messages():
+            assert schema is not None
+            if schema.name not in schemas:
+                schemas[schema.name] = writer.register_schema(schema.name, schema.encoding, schema.data)
+            if channel.topic not in channels:
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", schemas[schema.name])
+            writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.finish()
+    return plain.read_bytes()
 
 
 _RANGES = {

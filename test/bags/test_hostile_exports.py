@@ -11,9 +11,6 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mcap.reader import make_reader
-from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
 
 from automax_ros.bags import series
 from automax_ros.bags.errors import BagError
@@ -28,7 +25,7 @@ from automax_ros.cli.bag_info import as_data
 from automax_ros.cli.bag_info_text import lines_of
 from automax_ros.cli.plot_figure import Layout, figure_of
 
-from .recordings import sample_recording
+from .recordings import sample_recording, without_checksums
 
 
 @pytest.fixture(scope="module")
@@ -36,23 +33,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A small recording without checksums and compression."""
     folder = tmp_path_factory.mktemp("plain")
     bag = sample_recording(folder / "bag", seconds=0.06)
-    with (bag / "scans_0.mcap").open("rb") as source, (folder / "plain.mcap").open("wb") as target:
-        reader = make_reader(source)
-        writer = McapWriter(target, enable_crcs=False, enable_data_crcs=False, compression=CompressionType.NONE)
-        writer.start(profile="ros2", library="test")
-        schemas: dict[str, int] = {}
-        channels: dict[str, int] = {}
-        for item in reader.iter_attachments():
-            writer.add_attachment(0, 0, item.name, item.media_type, item.data)
-        for schema, channel, message in reader.iter_messages():
-            assert schema is not None
-            if schema.name not in schemas:
-                schemas[schema.name] = writer.register_schema(schema.name, schema.encoding, schema.data)
-            if channel.topic not in channels:
-                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", schemas[schema.name])
-            writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
-        writer.finish()
-    return (folder / "plain.mcap").read_bytes()
+    return without_checksums(bag / "scans_0.mcap", folder / "plain.mcap")
 
 
 def use(file: Path, folder: Path) -> None:
