@@ -91,18 +91,22 @@ class DriveRun:
         self.counts = CountTotals(self.drive.parameters)
 
     def take(self, time_s: float, changed: Mapping[str, float]) -> None:
-        """Take the new values of signals, by keyword, at an instant; a fault is told before what follows from it."""
+        """Take the new values of signals, by keyword, at an instant; a fault is told before what follows from it.
+
+        Numbers that no drive has are passed over.
+        """
         self._pass_to(time_s)
         seen = {
             keyword: float(not value) if self.drive.signals[keyword].inverted else float(value)
             for keyword, value in changed.items()
+            if abs(value) <= LARGEST
         }
         for keyword, value in sorted(seen.items(), key=_cause_first):
             signal = self.drive.signals[keyword]
             before = self._values.get(keyword)
             self._values[keyword] = value
             self._note(time_s, signal, before, value)
-        for keyword in changed:
+        for keyword in seen:
             self._draw(time_s, self.drive.signals[keyword])
 
     def _pass_to(self, time_s: float) -> None:
