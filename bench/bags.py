@@ -16,7 +16,20 @@ from automax_ros.core.types import DataType
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.wire.cdr import Message, decoder, encoder
-from automax_ros.wire.messages import NAMES, Bool, CommonWrite, Int16, Scan, ScanError, Values, Variable, VariableTable
+from automax_ros.wire.messages import (
+    NAMES,
+    Bool,
+    CommonWrite,
+    Header,
+    Int16,
+    JointState,
+    PlantState,
+    Scan,
+    ScanError,
+    Values,
+    Variable,
+    VariableTable,
+)
 from automax_ros.wire.qos import LATCHED, SCAN
 from automax_ros.wire.stream import RackStream
 
@@ -35,6 +48,8 @@ def samples() -> list[Message]:
         Bool(True),
         CommonWrite(STEP, 1, 3, 1, 1, 17, CHANGES),
         Scan(STEP, 1, "SPEED", 12, latched=latched, committed=CHANGES, errors=(ScanError(1030, 7001),)),
+        PlantState(STEP, "UNWIND", 7, "", *[0.5] * 9, 1, True, 60.0, 460.0, ("lose_tach",), *[1e3] * 4),
+        JointState(Header(STEP), ("UNWIND",), (0.5,), (183.0,), (610.0,)),
     ]
 
 

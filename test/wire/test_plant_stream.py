@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 from bags.live_racks import build
+from rack.drive_tasks import permit
+from rack.drive_tasks import rack_of as drive_rack
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.drive.firing import ConstantAlpha
@@ -180,3 +182,33 @@ def test_late_looks_follow_in_order(tmp_path: Path) -> None:
         heard.rack.scheduler.run_due(wall_ns)
     stamps = [stamp for stamp, _ in heard.messages["/line1/joint_states WINDER"]]
     assert stamps == [number * 10_000_000 for number in range(6)]
+
+
+def test_drive_that_runs_is_seen_as_its_loop_measures_it(tmp_path: Path) -> None:
+    rack = drive_rack(tmp_path)
+    stream = RackStream(rack, 77)
+    states: list[Any] = []
+    currents: list[int] = []
+    stream.add_sink(
+        lambda topic: (
+            (lambda _, data: states.append(decode(topic.type_name, data))) if topic.name.endswith("/UNWIND") else None
+        )
+    )
+    stream.begin()
+    permit(rack)
+    rack.run(0.6)
+    rack.write("START@", True)
+    rack.run(0.7)
+    for _ in range(360 * 2 // 5):  # 0.4 s: the mean of each scan, as it is told
+        rack.run(1 / 360)
+        currents.append(int(rack.value("CURRENT%")))
+    seen = [state for state in states if state.stamp >= 1_300_000_000]
+    mean_a = sum(state.current_a for state in seen) / len(seen)
+    told_a = sum(currents) / len(currents) / 4095 * 1.5 * rack.plants["UNWIND"].rated_amps
+    assert told_a > 50.0
+    assert mean_a == pytest.approx(told_a, rel=0.01)
+    assert {state.contactor for state in seen} == {True}
+    assert {state.bridge for state in seen} <= {0, 1}
+    last = seen[-1]
+    assert last.line_j == pytest.approx(last.loss_j + last.stored_j + last.shaft_j, rel=1e-3)
+    assert last.torque_nm > 0.0
