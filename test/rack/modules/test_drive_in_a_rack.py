@@ -14,6 +14,7 @@ from automax_ros.rack.modules.drive_interrupts import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.reader import read_for_rack
+from automax_ros.running.task import Status
 from rack.modules.cml_racks import ALONE, CML, COMMONS, NEAR, built, started
 
 
@@ -139,6 +140,15 @@ def test_only_what_a_lower_priority_writes_later_takes_effect(tmp_path):
     lower.operations.run("CML")
     lower.run(0.1)
     assert registers(lower) == [109, 4, 2, False]
+
+
+def test_a_basic_task_sets_the_registers_once_as_the_manual_advises(tmp_path):
+    """52.7: it writes and ends; the drive runs with what it wrote."""
+    (tmp_path / "WORK.BAS").write_text("10 COMMON TLD%, PHASE%, STEP%, FAST@\n20 TLD% = 120\n30 FAST@ = TRUE\n40 END\n")
+    slots = ALONE.replace("WORK: {priority: 8}", "WORK: {priority: 8, file: WORK.BAS}")
+    rack = started(tmp_path, slots=slots)
+    assert [rack.value(name) for name in ("TLD%", "PHASE%", "STEP%", "FAST@")] == [120, 4, 2, True]
+    assert rack.task("WORK").status is Status.ENDED
 
 
 @pytest.mark.parametrize(("name", "value"), [("PHASE%", 0), ("STEP%", 0), ("PHASE%", -4), ("STEP%", -1)])
