@@ -1,7 +1,8 @@
 """Checks the hardware events of a rack's tasks against its modules: whose interrupts they are, how many, how often.
 
 The backplane has four interrupt lines (J-3675 p. C-1). A Processor with hardware events takes one, which serves four of
-them; so a rack of at most four Processors always has one free for each.
+them; so a rack of at most four Processors has one for each, as long as no current minor loop needs one
+(``modules/drive_rules``).
 """
 
 from __future__ import annotations

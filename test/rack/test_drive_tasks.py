@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -10,13 +11,14 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.drive.cml.minor_loop import CurrentMinorLoop
 from automax_ros.rack.installation import RackError
+from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import Retention
 from automax_ros.rack.stepping.stepper import Stepper, Why
 from automax_ros.running.scan_record import Status
 from automax_ros.running.views import MemoryValueError
 
-from .drive_tasks import CML, SPEED, permit, rack_of, running
+from .drive_tasks import CML, SPEED, YAML, edited, folder_of, permit, rack_of, running
 
 MS = 1_000_000
 MODELED = "execution: modeled\n"
@@ -267,3 +269,69 @@ def test_loop_is_stepped_line_by_line_and_does_the_same(tmp_path):
         assert stepper.value("CML.SCANS%") == scan - 1
     assert stepper.until(30 * MS).why is Why.TIME
     assert comparable(stepper.rack) == comparable(rack)
+
+
+TWO = """\
+rack: PM1
+slots:
+  0: {module: 57C413}
+  1: {module: 57C435, tasks: {CML: {priority: 4}}}
+  2: {module: 57C435, tasks: {CML2: {priority: 4}}}
+  7: {module: 57C406, plant: UNWIND}
+  8: {module: 57C408}
+  9: {module: 57C406, plant: WINDER}
+  10: {module: 57C408}
+plants:
+  UNWIND: {motor: dc_150hp_500v, inertia: 100.0}
+  WINDER: {motor: dc_10hp_240v, inertia: 100.0, line: {hz: 50}}
+common:
+  PERMIT@: {slot: 8, register: 0, bit: 0, ros: in}
+  FMCR@: {slot: 8, register: 1, bit: 0}
+  PERMIT2@: {slot: 10, register: 0, bit: 0, ros: in}
+  FMCR2@: {slot: 10, register: 1, bit: 0}
+"""
+NAMES = ("REF", "RUN", "RESET", "SPEED", "OSV", "STATE", "LOCKED", "PERIOD", "CURRENT", "DELTA", "TACH")
+
+
+def second(text):
+    """The same task for the other drive: its commons end with 2, its line has 50 Hz."""
+    for name in (*NAMES, "DIAG"):
+        text = re.sub(rf"\b{name}(?=[%@])", f"{name}2", text)
+    return text.replace("SLOT=7", "SLOT=9").replace("SLOT=8", "SLOT=10, AC_LINE_FREQ=50")
+
+
+def two_drives(folder):
+    kinds = {name: "%" if name in ("REF", "SPEED", "OSV", "PERIOD", "CURRENT", "DELTA") else "@" for name in NAMES}
+    commons = "".join(f"  {name}{number}{kind}: {{}}\n" for number in ("", "2") for name, kind in kinds.items())
+    path = folder_of(folder, yaml=f"{TWO}{commons}  DIAG%(37,1): {{}}\n  DIAG2%(37,1): {{}}\n")
+    (folder / "CML2.BLK").write_text(second(CML))
+    found = load(path)
+    assert found.config is not None, found.diagnostics
+    return Rack(found.config)
+
+
+def test_two_drives_run_each_on_its_own_line(tmp_path):
+    rack = two_drives(tmp_path)
+    rack.start((("PERMIT@", True), ("PERMIT2@", True), ("REF%", 1500), ("SPEED%", 1000), ("SPEED2%", 1000)))
+    rack.run(0.599)
+    assert (rack.value("PERIOD%"), rack.value("PERIOD2%")) == (16667, 20000)
+    assert (rack.statistics["CML"].scans, rack.statistics["CML2"].scans) == (216, 180)
+    rack.write("RUN@", True)
+    rack.run(0.5)
+    assert (rack.value("STATE@"), rack.value("FMCR@")) == (True, True)
+    assert (rack.value("STATE2@"), rack.value("FMCR2@")) == (False, False)
+    rack.write("RUN2@", True)
+    rack.run(0.5)
+    assert rack.value("STATE2@") is True
+    rack.operations.stop("CML")
+    rack.run(0.2)
+    assert (rack.value("FMCR@"), rack.value("FMCR2@"), rack.value("STATE2@")) == (False, True, True)
+
+
+def test_rack_without_a_plant_has_no_line(tmp_path):
+    rack = rack_of(tmp_path, yaml=edited(YAML, ("57C406, plant: UNWIND", "57C406")))
+    permit(rack)
+    rack.run(1.0)
+    assert rack.value("LOCKED@") is False
+    assert rack.statistics["CML"].scans > 300
+    assert rack.stop_reason is None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from rack.drive_tasks import CML, SPEED, rack_of
 
+from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.core.ticks import NS_PER_S
@@ -13,7 +14,7 @@ from automax_ros.running.drive_record import COMMAND_VIEW, MEASURED_VIEW
 from automax_ros.wire.messages import Scan
 from automax_ros.wire.stream import RackStream
 
-from .replays import edited, record, replayed
+from .replays import edited, record, replayed, rewritten
 
 SECONDS = 2.0
 HAPPENS = {
@@ -194,3 +195,34 @@ def test_local_diagnostic_data_is_state(tmp_path):
     report = replayed(bag)
     assert report.identical, report.text()
     assert all(not scan.written.variable for scan in scans_of(bag))
+
+
+def with_number(scan, element, number):
+    """A scan that has measured another number."""
+    place = next(
+        index
+        for index, (view, at) in enumerate(zip(scan.read.variable, scan.read.element, strict=True))
+        if (view, at) == (MEASURED_VIEW, element)
+    )
+    values = [*scan.read.value[:place], number, *scan.read.value[place + 1 :]]
+    return scan._replace(read=scan.read._replace(value=values))
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), 0.5, 2.0**31, 1e300])
+def test_measurement_that_is_none_is_refused(bag, tmp_path, number):
+    def change(message):
+        wrong = isinstance(message, Scan) and message.task == "CML" and message.scan == 300
+        return with_number(message, 0, number) if wrong else message
+
+    with pytest.raises(BagError) as caught:
+        replayed(rewritten(bag, tmp_path / "bag", change))
+    assert caught.value.code == "AMX6813"
+
+
+def test_another_measurement_makes_a_difference(bag, tmp_path):
+    def change(message):
+        other = isinstance(message, Scan) and message.task == "CML" and message.scan == 400
+        return with_number(message, 1, 250_001.0) if other else message
+
+    report = replayed(rewritten(bag, tmp_path / "bag", change))
+    assert (report.first.task, report.first.scan) == ("CML", 400)
