@@ -1,4 +1,4 @@
-"""Simulated seconds per wall second of line, bridge and motor with a trivial controller, and of a fixed-step RK4."""
+"""Simulated seconds per wall second of line, bridge and motor: with a trivial controller, with the CML, by RK4."""
 
 from __future__ import annotations
 
@@ -9,8 +9,14 @@ from math import pi, sin, sqrt
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.circuit import Circuit
+from automax_ros.drive.cml import proposals
+from automax_ros.drive.cml.inputs import Inputs
+from automax_ros.drive.cml.minor_loop import CurrentMinorLoop
+from automax_ros.drive.cml.signals import PERMISSIVE
+from automax_ros.drive.controller import DriveController
 from automax_ros.drive.motor import Motor, MotorData
 from automax_ros.drive.nameplate import EXAMPLES, derive
+from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
 
 PARAMETERS = derive(EXAMPLES["150hp"])
 TORQUE = PARAMETERS.values["shaft_torque_n_m"].value
@@ -22,6 +28,10 @@ STEP_S = 20e-6
 SOURCE_OHM = 0.003
 CASES = (("rated torque, continuous current", 1.0, 1.0), ("5 % torque, discontinuous current", 0.05, 0.05))
 """What is run: load torque and current reference over rated."""
+LOOP_CASES = (("60 % of LIM_BAR, continuous current", 2457), ("8 % of LIM_BAR, discontinuous current", 328))
+"""What the current minor loop is asked for: the reference in counts, at a held speed."""
+LIM_BAR = 150
+HELD_RPM = 900.0
 
 
 class Controller:
@@ -60,6 +70,45 @@ def drive(load: float, reference: float, seconds: float) -> tuple[float, list[in
     wall = (clock() - began) * 1e-9
     gc.enable()
     return wall, taken, motor.speed_rad_s
+
+
+def inputs_of(reference: int) -> Inputs:
+    """Return inputs with the proposed gains."""
+    circuit = proposals.circuit_of(PARAMETERS, LIM_BAR)
+    return Inputs(
+        io_cntl_slot=7, dig_io_slot=8, ac_line_freq=60, reference=reference, ref_rate=0.5, ref_lag=400.0,
+        kp=proposals.kp(circuit), pi_w_lead=float(proposals.pi_w_lead(circuit)),
+        ag_factor=proposals.ag_factor(circuit), cc_thresh=proposals.cc_thresh(circuit), cml_run=False,
+        cml_coast_stop=False, mcr_select=False, max_m_dropout=0.1, cml_test=False, test_brpol=False, test_alpha=180,
+        ioc_thresh=250, lim_bar=LIM_BAR, digital_tach=True, speed_fdbk=2000, tach_loss_stop=True, osv_fdbk=2000,
+        osv_thresh=4505, nonstand_phrot=False, auto_phrot=False, fault_reset=False,
+    )  # fmt: skip
+
+
+def loop(reference: int, seconds: float) -> tuple[float, int, int]:
+    """Run plant, 57C406 and current minor loop; return wall seconds, I_FDBK at the end, and scans."""
+    plant = DrivePlant(PlantData(PARAMETERS, load=LoadData(held_rpm=HELD_RPM)))
+    hardware, minor = DriveController(plant), CurrentMinorLoop()
+    inputs = inputs_of(reference)
+    now_ns = scans = 0
+    began, clock = 0.0, time.perf_counter
+    gc.collect()
+    gc.disable()
+    start_ns = 1_500_000_000
+    end_ns = start_ns + round(seconds * 1e9)
+    while now_ns < end_ns:
+        outcome = minor.scan(now_ns, hardware.measure(now_ns, PERMISSIVE), inputs)
+        hardware.command(outcome.command, now_ns)
+        now_ns += outcome.command.next_ns
+        if began:
+            scans += 1
+        elif now_ns > start_ns:
+            began = clock()
+        elif now_ns > start_ns // 3 and not inputs.cml_run:
+            inputs = inputs._replace(cml_run=True)
+    wall = clock() - began
+    gc.enable()
+    return wall, minor.control.i_fdbk, scans
 
 
 def runge_kutta(load: float, reference: float, seconds: float) -> tuple[float, float]:
@@ -129,6 +178,12 @@ def main() -> None:
         slow = [runge_kutta(load, reference, SECONDS) for _ in range(2)]
         rate, error = SECONDS / min(run[0] for run in slow), slow[0][1] / speed - 1
         print(f"  RK4 at 20 us: {rate:.0f} simulated s per wall s, speed at the end off by {100 * error:+.3f} %")
+
+    for title, reference in LOOP_CASES:
+        found = [loop(reference, SECONDS) for _ in range(REPEATS)]
+        wall = min(run[0] for run in found)
+        print(f"plant and CML, {title}: {SECONDS / wall:.0f} simulated s per wall s; wanted: at least 100")
+        print(f"  a scan: {wall / found[0][2] * 1e6:.1f} us; I_FDBK at the end {found[0][1]}, wanted {reference}")
 
 
 def _quantiles(ordered: list[int]) -> str:
