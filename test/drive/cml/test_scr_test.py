@@ -1,5 +1,7 @@
 """The shorted SCR diagnostic (52.3.1) on simulated plants: every SCR, what it costs, what it says at speed."""
 
+from dataclasses import replace
+
 import pytest
 
 from automax_ros.core.problems import PROBLEMS
@@ -55,6 +57,17 @@ def test_the_other_rotation_makes_no_difference(scr):
     plant.circuit.short_scr(scr)
     after_start(drive)
     assert (drive.faults, drive["BAD_SCR_NUM"]) == ({"BAD_SCR_OUT"}, PAIR[scr])
+
+
+@pytest.mark.parametrize("hertz", [48, 50, 62])
+@pytest.mark.parametrize("scr", [None, *PAIR])
+def test_neither_does_the_frequency(scr, hertz):
+    plant = DrivePlant(PlantData(derive(replace(EXAMPLES["150hp"], line_hz=hertz))))
+    drive = Drive(plant=plant, tests_scrs=True, ac_line_freq=hertz)
+    if scr:
+        plant.circuit.short_scr(scr)
+    after_start(drive)
+    assert (drive["BAD_SCR_NUM"], drive["DC_CML_STATE"]) == (PAIR.get(scr, 0), scr is None)
 
 
 @pytest.mark.parametrize("emf", [120.0, 300.0, 470.0, -120.0, -300.0, -480.0])
