@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from automax_ros.blocks.cml_limits import ioc_is_possible
 from automax_ros.drive.drive_case import DriveCase, Finding, Verdict
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.limits import (
     DEFAULT_THRESHOLD_DEG,
     LARGEST_THRESHOLD_DEG,
+    LB_FT_PER_N_M,
     LEAST_JBAR_S,
     OVERCURRENT_RATIO,
     TABLE_3_MH_A,
@@ -16,6 +18,7 @@ from automax_ros.drive.limits import (
     ripple_amps,
     table_3_line_v,
 )
+from automax_ros.drive.nameplate import KG_M2_PER_LB_FT2
 
 PMI_TRIP_POINTS, PMI_MOST_TRIP = 75, 225
 """By how much a PMI trips above the largest current, and its highest trip, % of rated current (S-3006 p. 109)."""
@@ -101,8 +104,8 @@ def inertia_time(case: DriveCase) -> Finding:
     if jbar is None:
         result = f"LIM_BAR is {case.text('LIM_BAR')}: the largest torque is not known"
         return Finding("JBAR", Verdict.ATTENTION, result, formula)
-    wr2 = case.parameters.motor.inertia_kg_m2 * case.inertia / 0.04214
-    torque = case.rated_n_m * (case.value("LIM_BAR") or 0.0) / 100 / 1.3558179483
+    wr2 = case.parameters.motor.inertia_kg_m2 * case.inertia / KG_M2_PER_LB_FT2
+    torque = case.rated_n_m * (case.value("LIM_BAR") or 0.0) / 100 * LB_FT_PER_N_M
     enough = jbar >= LEAST_JBAR_S
     result = (
         f"{jbar:.3g} s: the tach loss threshold may be raised"
@@ -157,7 +160,7 @@ def overcurrent(case: DriveCase) -> Finding:
         return Finding("IOC_THRESH", Verdict.ATTENTION, f"{programmed}: give both to compare them", formula)
     most = OVERCURRENT_RATIO * lim_bar
     peak = lim_bar + _ripple_percent(case)
-    if level >= most:
+    if not ioc_is_possible(int(level), int(lim_bar)):
         verdict, why = Verdict.WRONG, "IOC calculation error at task initialization: the drive will not run"
     elif level <= peak:
         verdict, why = Verdict.ATTENTION, f"at LIM_BAR the ripple's peaks reach {peak:.4g} %: it will trip"

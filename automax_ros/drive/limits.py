@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from math import acos, degrees, pi, sqrt, tan
 
+from automax_ros.drive.cml.faults import TACH_HIGHEST_DEG
+from automax_ros.drive.cml.signals import Measured
 from automax_ros.drive.errors import LARGEST, SMALLEST, ParameterError, require
 from automax_ros.drive.nameplate import KG_M2_PER_LB_FT2
 
-DEFAULT_THRESHOLD_DEG, LARGEST_THRESHOLD_DEG = 109, 127
+DEFAULT_THRESHOLD_DEG, LARGEST_THRESHOLD_DEG = Measured(0).tach_threshold, TACH_HIGHEST_DEG
 """Register 4136 after initialisation, and the largest value that the tach loss function uses (52.4.1)."""
 LEAST_JBAR_S = 0.2
 """JBAR from which on the threshold may be raised, s (52.4.1, equation 2)."""

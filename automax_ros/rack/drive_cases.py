@@ -9,15 +9,12 @@ from typing import Protocol, runtime_checkable
 from automax_ros.core.types import Value
 from automax_ros.drive.drive_case import DriveCase, Given, Unjudged
 from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.limits import DEFAULT_THRESHOLD_DEG
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.rack.config import Point, RackConfig
 from automax_ros.rack.drives import RackDrive, given_inputs, rack_drives, written_constants
+from automax_ros.rack.modules.drive_controller import DEFAULTS, OPTIONS, TACH_THRESHOLD
 from automax_ros.rack.register_writes import numbered_writes
-
-TACH_THRESHOLD, OPTIONS = 4136, 4146
-"""The registers of a 57C406 that the formulas are about (52.7)."""
 
 
 @runtime_checkable
@@ -53,7 +50,7 @@ def _case(
         source_ohm=data.resistance_ohm,
         task=drive.program.name if drive.program is not None else "",
         inputs=inputs,
-        threshold=registers.given(TACH_THRESHOLD, DEFAULT_THRESHOLD_DEG),
+        threshold=registers.given(TACH_THRESHOLD),
         fast_change=registers.bit_0(OPTIONS),
         voltage=any(_is_wired(module, drive.slot) for module in config.modules),
         registers=not drive.letter,
@@ -75,25 +72,27 @@ class _Registers:
     slot: int
     programs: Sequence[Program]
 
-    def given(self, register: int, default: int) -> Given:
+    def given(self, register: int) -> Given:
         """Return a register's value."""
-        return _of(self._words(register, default), default)
+        return _of(self._words(register), DEFAULTS[register])
 
     def bit_0(self, register: int) -> Given:
         """Return whether bit 0 of a register is on."""
-        words = [None if word is None else word & 1 for word in self._words(register, 0)]
-        return _of([*words, *self._points(register, 0, 0)], 0)
+        words = [None if word is None else word & 1 for word in self._words(register)]
+        return _of([*words, *self._points(register, 0)], DEFAULTS[register] & 1)
 
-    def _words(self, register: int, default: int) -> list[int | None]:
+    def _words(self, register: int) -> list[int | None]:
         numbered = numbered_writes(self.programs).get((self.slot, register), [])
-        return [*self._points(register, None, default), *numbered]
+        return [*self._points(register, None), *numbered]
 
-    def _points(self, register: int, bit: int | None, default: int) -> list[int | None]:
+    def _points(self, register: int, bit: int | None) -> list[int | None]:
         """Return what tasks write to the points of a register, or of one of its bits."""
         place = Point(self.slot, register, bit)
         names = {variable.name for variable in self.config.declared if variable.point == place}
         written = (
-            item for program in self.programs for item in written_constants(program, Scope.COMMON, default).items()
+            item
+            for program in self.programs
+            for item in written_constants(program, Scope.COMMON, DEFAULTS[register]).items()
         )
         return [None if value is None else int(value) for name, value in written if name in names]
 

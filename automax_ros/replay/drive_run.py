@@ -9,6 +9,7 @@ from math import isfinite
 from automax_ros.bags.traces import Course, Line
 from automax_ros.bags.variables import Watched
 from automax_ros.core.types import DataType
+from automax_ros.drive.cml.faults import KINDS
 from automax_ros.drive.cml.reference import FULL
 from automax_ros.drive.errors import LARGEST
 from automax_ros.drive.scr import FORWARD, PARTNER
@@ -16,7 +17,7 @@ from automax_ros.replay.drive_signals import ReportDrive, Signal
 from automax_ros.replay.drive_totals import CountTotals, PlantTotals, rpm_of
 from automax_ros.wire.messages import PlantState
 
-FAULTS = ("IOC_OUT", "SYNC_LOSS_OUT", "TACH_LOSS_OUT", "OSV_OUT", "EXT_IET_OUT", "PHROT_FLT_OUT", "BAD_SCR_OUT")
+FAULTS = tuple(kind.output.upper() for kind in KINDS)
 """The fault outputs of DC_DRIVE_CML (52.2.2)."""
 STATES = {
     "CML_RUN": ("start is requested", "stop is requested"),

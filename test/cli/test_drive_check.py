@@ -109,6 +109,12 @@ def test_variables_count_as_what_the_one_assignment_gives_them(judged):
     assert twice["verdict"] == "attention"
 
 
+@pytest.mark.parametrize(("level", "verdict", "code"), [(269, "fine", 0), (270, "wrong", 1), (400, "wrong", 1)])
+def test_1_8_lim_bar_itself_is_too_much(judged, level, verdict, code):
+    found = judged(task=loop_task(f"LEVEL% = {level}", IOC_THRESH="LEVEL%"), code=code)
+    assert found["IOC_THRESH"]["verdict"] == verdict
+
+
 def test_set_and_presets_are_values_of_commons(judged):
     task = loop_task(LIM_BAR="SPD%", SPEED_FDBK=None)
     assert "SPD% (not known)" in judged(task=task)["JBAR"]["result"]
