@@ -18,7 +18,7 @@ RACK_FILE = "rack.yaml"
 class TaskFacts:
     """A task as the rack file and its source have it; None where the source is missing or has errors.
 
-    ``ticks`` is None too for a task that does not scan every so many ticks, ``period_ns`` without a scan period.
+    ``ticks`` is None too for a task without TICKS, ``period_ns`` for one without a scan period.
     """
 
     slot: int

@@ -44,7 +44,7 @@ def checked_array(context: Context, parameter: Output, argument: Argument) -> Ex
 
 
 def _whole_array(context: Context, parameter: Input | Output, argument: Argument) -> tuple[Reference, Symbol] | None:
-    """Report what is no name of an INTEGER variable without subscripts; return it with its declaration."""
+    """Report anything but the name of an INTEGER variable without subscripts; return it with its declaration."""
     value = argument.value
     if literal_of(value) is not None:
         context.report("AMX4075", f"{parameter.name} takes an array, no constant", value.span)
