@@ -84,7 +84,7 @@ class Drive:
     @property
     def faults(self):
         """The fault outputs that are TRUE."""
-        return {name for name, value in self.rows[-1][1].items() if name in FAULTS and value}
+        return {name for name, value in self.rows[-1][1].items() if name in CODES and value}
 
     @property
     def relay(self):
@@ -92,4 +92,36 @@ class Drive:
         return self.loop.sequence.relays != 0
 
 
-FAULTS = {"IOC_OUT", "SYNC_LOSS_OUT", "TACH_LOSS_OUT", "OSV_OUT", "EXT_IET_OUT", "PHROT_FLT_OUT", "BAD_SCR_OUT"}
+CODES = {
+    "IOC_OUT": "AMX7110", "SYNC_LOSS_OUT": "AMX7111", "TACH_LOSS_OUT": "AMX7112", "OSV_OUT": "AMX7113",
+    "EXT_IET_OUT": "AMX7114", "PHROT_FLT_OUT": "AMX7115", "BAD_SCR_OUT": "AMX7116",
+}  # fmt: skip
+"""The outputs of the drive faults, and what each is logged as."""
+
+
+def tripped(drive, output):
+    """Whether one fault is there alone, logged once, and the drive coasts."""
+    return (
+        drive.faults == {output}
+        and drive.codes == [CODES[output]]
+        and not drive["DC_CML_STATE"]
+        and not drive.relay
+        and drive.loop.sequence.phase == 0
+    )
+
+
+def resets(drive):
+    """Whether FAULT_RESET takes the faults away."""
+    drive.run(0.03, fault_reset=True)
+    gone = not drive.faults
+    drive.run(0.03, fault_reset=False)
+    return gone
+
+
+def starts_again(drive):
+    """Whether the drive starts with an edge, and not before."""
+    drive.run(0.5)
+    waited = not drive.relay
+    drive.run(0.02, cml_run=False)
+    drive.run(0.2, cml_run=True)
+    return waited and drive["DC_CML_STATE"]

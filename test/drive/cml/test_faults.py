@@ -7,40 +7,7 @@ from automax_ros.drive.cml.signals import EXTERNAL_TRIP, PERMISSIVE
 from automax_ros.drive.nameplate import EXAMPLES, derive
 from automax_ros.drive.plant import DrivePlant, PlantData
 
-from .protected import CLOSED_S, LOCKED_S, Drive
-
-KINDS = {
-    "IOC_OUT": "AMX7110", "SYNC_LOSS_OUT": "AMX7111", "TACH_LOSS_OUT": "AMX7112", "OSV_OUT": "AMX7113",
-    "EXT_IET_OUT": "AMX7114", "PHROT_FLT_OUT": "AMX7115", "BAD_SCR_OUT": "AMX7116",
-}  # fmt: skip
-
-
-def tripped(drive, output):
-    """Whether one fault is there alone, logged once, and the drive coasts."""
-    return (
-        drive.faults == {output}
-        and drive.codes == [KINDS[output]]
-        and not drive["DC_CML_STATE"]
-        and not drive.relay
-        and drive.loop.sequence.phase == 0
-    )
-
-
-def resets(drive):
-    """Whether FAULT_RESET takes the faults away."""
-    drive.run(0.03, fault_reset=True)
-    gone = not drive.faults
-    drive.run(0.03, fault_reset=False)
-    return gone
-
-
-def starts_again(drive):
-    """Whether the drive starts with an edge, and not before."""
-    drive.run(0.5)
-    waited = not drive.relay
-    drive.run(0.02, cml_run=False)
-    drive.run(0.2, cml_run=True)
-    return waited and drive["DC_CML_STATE"]
+from .protected import CLOSED_S, CODES, LOCKED_S, Drive, resets, starts_again, tripped
 
 
 def running(speed_rad_s=60.0, **changes):
@@ -90,7 +57,7 @@ def test_a_trip_latches_stops_and_waits_for_its_reset(output, state):
     assert tripped(drive, output)
     assert resets(drive)
     assert starts_again(drive)
-    assert drive.codes == [KINDS[output]]
+    assert drive.codes == [CODES[output]]
 
 
 def test_a_fault_is_logged_each_time_it_comes():
@@ -259,108 +226,6 @@ def test_no_line_is_a_sync_loss_after_a_second():
     assert (drive.faults, drive.codes) == ({"SYNC_LOSS_OUT"}, ["AMX7111"])
 
 
-# Tach loss
-
-
-def mean_delta_deg(drive, scans=16):
-    """The mean of DELTA over the next scans, degrees, from what the loop fires."""
-    total = 0.0
-    for _ in range(scans):
-        drive.scan()
-        total += drive.loop.outputs.delta * 360 / drive.loop.pll.period_us
-    return total / scans
-
-
-@pytest.mark.parametrize("speed_fdbk", [0, 204, -204, 205, -205, 4095])
-def test_tach_loss_needs_a_speed_below_5_percent(speed_fdbk):
-    drive = Drive(reference=1500, speed_fdbk=speed_fdbk)
-    drive.plant.motor.speed_rad_s = 130.0
-    drive.start()
-    drive.run(0.4)
-    if abs(speed_fdbk) < 205:
-        assert tripped(drive, "TACH_LOSS_OUT")
-    else:
-        assert (drive.faults, drive["DC_CML_STATE"]) == (set(), True)
-        assert mean_delta_deg(drive) > 115
-
-
-def test_without_speed_fdbk_there_is_no_tach_loss():
-    drive = Drive(reference=1500)
-    drive.plant.motor.speed_rad_s = 130.0
-    drive.start()
-    drive.run(0.4)
-    assert (drive.faults, mean_delta_deg(drive) > 115) == (set(), True)
-
-
-@pytest.mark.parametrize(
-    ("register", "alpha", "trips"),
-    [
-        (109, 72, False), (109, 71, False), (109, 70, True), (100, 79, True), (100, 81, False), (127, 54, False),
-        (127, 52, True), (500, 54, False), (500, 52, True), (0, 179, True), (-7, 179, True), (-7, 180, False),
-    ],
-)  # fmt: skip
-def test_the_mean_delta_is_compared_with_register_4136_limited(register, alpha, trips):
-    """Test mode holds DELTA still: 180 - alpha degrees; the motor turns so that no current flows."""
-    drive = Drive(cml_test=True, test_alpha=alpha, speed_fdbk=0)
-    drive.plant.motor.speed_rad_s = 660.0 / drive.plant.data.parameters.motor.k_v_s
-    drive.scan()
-    drive.registers = (register, 4, 2, 0)
-    drive.start()
-    drive.run(0.1)
-    assert drive.faults == ({"TACH_LOSS_OUT"} if trips else set())
-
-
-def test_it_takes_the_mean_of_16_scans():
-    drive = Drive(cml_test=True, test_alpha=180, speed_fdbk=0)
-    drive.plant.motor.speed_rad_s = 660.0 / drive.plant.data.parameters.motor.k_v_s
-    drive.start()
-    drive.run(0.2)
-    drive.inputs = drive.inputs._replace(test_alpha=60)
-    deltas = []
-    while not drive.codes:
-        drive.scan()
-        deltas.append(drive.loop.outputs.delta)
-    # DELTA 120 in n of 16 scans is above 109 from n = 15 on; the scan after it sees it.
-    assert [delta > 0 for delta in deltas].count(True) == 16
-    assert drive.codes == ["AMX7112"]
-
-
-@pytest.mark.parametrize("stop", [True, False])
-def test_tach_loss_stop_chooses_between_stop_and_indication(stop):
-    drive = Drive(reference=1500, speed_fdbk=3000, tach_loss_stop=stop)
-    drive.plant.motor.speed_rad_s = 130.0
-    drive.start()
-    drive.run(0.4)
-    drive.run(0.3, speed_fdbk=0)
-    assert (drive.faults, drive.codes) == ({"TACH_LOSS_OUT"}, ["AMX7112"])
-    assert (drive["DC_CML_STATE"], drive.relay) == (not stop, not stop)
-    drive.run(0.3, speed_fdbk=3000)
-    assert drive.faults == {"TACH_LOSS_OUT"}
-    drive.run(0.2, cml_run=False)
-    drive.run(0.2, cml_run=True)
-    assert not drive.relay
-    assert resets(drive)
-    assert starts_again(drive)
-
-
-def test_a_new_run_does_not_remember_the_delta_of_the_last():
-    drive = Drive(reference=1500, speed_fdbk=0)
-    drive.plant.motor.speed_rad_s = 130.0
-    drive.start()
-    drive.run(0.4)
-    assert tripped(drive, "TACH_LOSS_OUT")
-    drive.plant.motor.speed_rad_s = 0.0
-    assert resets(drive)
-    assert starts_again(drive)
-    assert drive.codes == ["AMX7112"]
-
-
-def test_a_standing_motor_with_current_is_no_tach_loss():
-    drive = Drive(reference=3000, speed_fdbk=0).start()
-    drive.run(1.0)
-    assert (drive.faults, drive["DC_CML_STATE"]) == (set(), True)
-
-
 # Overspeed, overvoltage
 
 
@@ -423,7 +288,7 @@ def test_faults_that_come_at_once_are_all_logged():
 
 
 def test_one_fault_of_the_table_has_the_hardwares_code():
-    assert {code for code in KINDS.values() if PROBLEMS[code].hardware} == {"AMX7116"}
+    assert {code for code in CODES.values() if PROBLEMS[code].hardware} == {"AMX7116"}
 
 
 def test_a_restart_of_the_task_forgets_faults_but_not_their_causes():
