@@ -54,7 +54,9 @@ def _cc_thresh(circuit: Circuit) -> tuple[float, str]:
 
 
 def _ag_factor(circuit: Circuit) -> tuple[float, str]:
-    return ag_factor(circuit), ""
+    factor, continuous = ag_factor(circuit), kp(circuit) * pi_w_lead(circuit) / (6 * circuit.line_hz)
+    each_scan = f"{kp(circuit):.4g} x {pi_w_lead(circuit)} / (6 x {circuit.line_hz:g} Hz) = {continuous:.4g}"
+    return factor, f"{factor * continuous:.3g} us per count and scan / ({each_scan})"
 
 
 _PROPOSALS: dict[str, tuple[Callable[[Circuit], tuple[float, str]], str]] = {
