@@ -64,8 +64,9 @@ def check_scan_loop(context: Context, call: Call) -> None:
     """Check the CALL that begins the scan and keep its TICKS, on which the limits of coefficients depend."""
     check_call(context, call)
     block = context.catalogue.get(call.block)
-    if block is not None and block.line_scan is not None and context.tick_ns != block.line_scan.tick_ns:
-        message = f"{block.name} needs a Processor with the tick of {block.line_scan.tick_ns / NS_PER_MS:g} ms"
+    follows = block.line_scan if block is not None and context.target in block.runs_on else None
+    if block is not None and follows is not None and context.tick_ns != follows.tick_ns:
+        message = f"{block.name} needs a Processor with the tick of {follows.tick_ns / NS_PER_MS:g} ms"
         hint = f"here the tick is {context.tick_ns / NS_PER_MS:g} ms (52.0)"
         context.report("AMX4181", message, context.place_of(call.block, call.span), hint)
     ticks = next((item.value for item in call.arguments if item.keyword == "TICKS"), None)
