@@ -50,7 +50,7 @@ def figure_of(traces: Traces, layout: Layout) -> Any:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise UsageError("plot needs matplotlib", "pip install matplotlib, or `make setup`") from error
+        raise UsageError("a picture needs matplotlib", "pip install matplotlib, or `make setup`") from error
     analog = _lanes([line for line in traces.lines if line.variable.kind is not DataType.BOOLEAN], layout.separate)
     logic = [line for line in traces.lines if line.variable.kind is DataType.BOOLEAN]
     tasks = list(dict.fromkeys(mark.task for mark in traces.errors))

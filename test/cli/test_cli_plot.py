@@ -208,7 +208,7 @@ def test_without_matplotlib_it_says_so(automax, bag, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     result = automax("plot", bag, "REF%", "-o", "OUT.png")
     assert (result.code, result.out) == (2, "")
-    assert "plot needs matplotlib" in result.err
+    assert "a picture needs matplotlib" in result.err
 
 
 def test_recording_is_never_written_over(automax, bag):

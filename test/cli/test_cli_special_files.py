@@ -17,6 +17,7 @@ COMMANDS = {
     "replay": ["replay", "bag"],
     "export": ["export", "bag", "-o", "out.csv"],
     "plot": ["plot", "bag", "SPEED_FDBK%", "-o", "out.png"],
+    "report": ["report", "bag", "-o", "out.html"],
 }
 
 

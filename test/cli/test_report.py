@@ -1,6 +1,7 @@
 """`automax report`: sums against a computation by hand, what the page says, and what it does not let through."""
 
 import html
+import os
 import re
 import struct
 import zlib
@@ -426,3 +427,12 @@ def test_a_run_of_a_simulated_rack(automax):
     assert run.plant.energy_j("line_j") == pytest.approx(
         sum(run.plant.energy_j(name) for name in ("loss_j", "stored_j", "shaft_j")), rel=1e-3
     )
+
+
+def test_pipes_take_the_page_and_the_picture(automax, bag):
+    with bag() as recording:
+        run_of(recording)
+    assert automax("report", "bag", "--output", "/dev/stdout").code == 0
+    os.mkfifo(automax.folder / "F")
+    result = automax("report", "bag", "--output", "F")
+    assert (result.code, "nobody reads it" in result.err) == (2, True)
