@@ -181,7 +181,9 @@ class Circuit(Conduction):
     def line_a(self) -> float:
         """The greatest of the line's phase currents, A, without sign."""
         net = self._net
-        return max(map(abs, self.phase_currents())) if net.active or net.modes else 0.0
+        if net.modes:
+            return max(map(abs, self.phase_currents()))
+        return max(map(abs, net.share)) * abs(self.current_a) if net.active else 0.0
 
     # What can break
 

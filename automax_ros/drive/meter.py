@@ -7,7 +7,7 @@ from math import inf, sqrt
 from typing import TYPE_CHECKING
 
 from automax_ros.drive.state import Stateful
-from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave
+from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave, bound
 
 if TYPE_CHECKING:
     from automax_ros.drive.ac_line import AcLine
@@ -69,7 +69,9 @@ class Sample:
         # No pulse of a bridge is steeper than a triangle by more than this: most samples need no search.
         if conducting_s <= 0.0 or abs(self.charge_c) * _STEEPEST < level_a * conducting_s:
             return False
-        return any(max(map(abs, Piece(*piece).extremes())) > level_a for piece in self._pieces)
+        return any(
+            bound(piece) > level_a and max(map(abs, Piece(*piece).extremes())) > level_a for piece in self._pieces
+        )
 
     @property
     def rms_current_a(self) -> float:

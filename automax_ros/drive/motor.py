@@ -261,8 +261,9 @@ class Motor(Stateful):
         else:
             self.step_ns = max(SHORTEST_NS, int(1e9 * sqrt(HELD_V_S / slope)))
         self.time_s += duration_s
-        if self.field is not None:
-            self.field.advance(duration_s)
+        field = self.field
+        if field is not None and field.current != field.voltage:
+            field.advance(duration_s)
 
     def state(self) -> SavedState:
         """Return speed, angle, field and energies, and the load torque where it is a number (None where a function)."""

@@ -179,6 +179,18 @@ class Piece(NamedTuple):
 
 RawPiece = tuple[float, float, float, float, float, float, float, float]
 """A Piece's fields, in a form that is quick to make."""
+
+
+def bound(piece: RawPiece) -> float:
+    """Return what the magnitude of a piece's current (A) cannot pass: its ends, and what its bend allows between."""
+    duration, theta, omega, c, d, k, a, decay = piece
+    end = theta + omega * duration
+    first = abs(c * cos(theta) + d * sin(theta) + k + a)
+    last = abs(c * cos(end) + d * sin(end) + k + a * exp(-decay * duration))
+    bend = omega * omega * hypot(c, d) + decay * decay * abs(a)
+    return (first if first > last else last) + 0.125 * bend * duration * duration
+
+
 Wave = tuple[float, float, float, float, float]
 """The factors c, d, k, a, b of a wave."""
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from automax_ros.drive.waves import Moments, Piece, first_zero
+from automax_ros.drive.waves import Moments, Piece, bound, first_zero
 
 from .support import repeatable
 
@@ -110,3 +110,18 @@ def test_piece_knows_its_values():
     assert piece.value(t) == pytest.approx(
         3 * cos(0.5 + OMEGA * t) + 4 * sin(0.5 + OMEGA * t) + 5 + 6 * exp(-70 * t), rel=1e-12
     )
+
+
+@repeatable
+@given(
+    st.floats(1e-7, 4e-3), st.floats(0.0, 7.0), st.floats(300.0, 390.0), st.floats(-1e4, 1e4), st.floats(-1e4, 1e4),
+    st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.01, 2000.0),
+)  # fmt: skip
+def test_bound_is_never_below_the_extremes(duration, theta, omega, c, d, k, a, decay):
+    piece = (duration, theta, omega, c, d, k, a, decay)
+    times = [duration * index / 200 for index in range(201)]
+    largest = max(abs(Piece(*piece).value(t)) for t in times)
+    assert bound(piece) >= largest * (1 - 1e-12)
+    # It is a bound that says something: in short pieces hardly more than the ends.
+    if duration < 1e-6:
+        assert bound(piece) <= largest + 1e-2

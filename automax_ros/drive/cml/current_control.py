@@ -102,21 +102,25 @@ class CurrentControl(Stateful):
             self._take(bridge, preset_us(measured, bridge, abs(wanted), settings.cc_thresh, period_us) if fast else 0.0)
             self.block = True
             guard_ns = max(0, RECOVERY_US - measured.tail_us) * 1000
-        elif self.change.stage == Stage.BACK:
-            back = QUIET if self.part < 1.0 else FLOOR
-            self.regulator.begin(min(self.regulator.delta_us, back * period_us))
-            return self._fire(pll, self.regulator.delta_us, self.bridge, reverse)
-        elif self.change.stage == Stage.OFF:
+        elif self.change.stage:
+            return self._phase_back(pll, reverse)
+        self._regulate(wanted, settings, period_us)
+        return self._fire(pll, self.regulator.delta_us, self.change.bridge, reverse, guard_ns)
+
+    def _phase_back(self, pll: Pll, reverse: bool) -> tuple[Pulse, ...]:
+        """Bring the current of the bridge in use to zero, then take its gates away."""
+        if self.change.stage == Stage.OFF:
             self.block = True
             self.regulator.begin(0.0)
             return self.off()
-        self._regulate(wanted, settings, period_us)
-        return self._fire(pll, self.regulator.delta_us, self.bridge, reverse, guard_ns)
+        back = QUIET if self.part < 1.0 else FLOOR
+        self.regulator.begin(min(self.regulator.delta_us, back * pll.period_ns * 1e-3))
+        return self._fire(pll, self.regulator.delta_us, self.change.bridge, reverse)
 
     def _regulate(self, wanted: float, settings: Latched, period_us: float) -> None:
         """Find DELTA for the bridge in use."""
         regulator, part = self.regulator, self.part
-        if self.bridge == 2:
+        if self.change.bridge == 2:
             error = self.i_fdbk - wanted if wanted < 0.0 else self.i_fdbk
             wanted = -wanted
         else:
@@ -166,5 +170,5 @@ class CurrentControl(Stateful):
         self._fresh = FRESH_SCANS if delta_us else 0
 
     def _fire(self, pll: Pll, delta_us: float, bridge: int, reverse: bool, guard_ns: int = 0) -> tuple[Pulse, ...]:
-        delta_ns = round(delta_us * 1000)
+        delta_ns = int(delta_us * 1000.0 + 0.5)
         return self.firing.pulses(pll.position, pll.period_ns, pll.next_ns, delta_ns, bridge, reverse, guard_ns)

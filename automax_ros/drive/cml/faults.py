@@ -125,9 +125,11 @@ class Faults(Stateful):
 
     def show(self, outputs: Outputs) -> None:
         """Write the fault outputs of a system clock tick."""
-        active = self._shown = self.active
-        for bit, output, _ in KINDS:
-            setattr(outputs, output, bool(active & bit))
+        active = self.active
+        if active != self._shown:
+            self._shown = active
+            for bit, output, _ in KINDS:
+                setattr(outputs, output, bool(active & bit))
         outputs.bad_scr_num = self.bad_scr_num
 
     def _sync_lost(self, measured: Measured, pll: Pll) -> bool:

@@ -74,6 +74,9 @@ class Firing(Stateful):
             return ()
         self.last = newest
         words = _GATES[bridge, reverse]
+        after = delay - (count - newest) * sixth
+        if number == newest and after >= earliest_ns:
+            return (Pulse(after, sixth, words[(position - count + number) % 6]),)
         planned = []
         while number <= newest:
             after = delay - (count - number) * sixth

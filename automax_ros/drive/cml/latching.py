@@ -72,6 +72,8 @@ class Latched(Stateful):
                 setattr(self, name, value)
             else:
                 problems.append(BAD_FIXED)
+        # Steps of 1 rad/s (52.1.2).
+        self.ref_lag, self.pi_w_lead = float(round(self.ref_lag)), float(round(self.pi_w_lead))
         for name in _SWITCHES:
             setattr(self, name, getattr(inputs, name))
         if not problems and not ioc_is_possible(self.ioc_thresh, self.lim_bar):

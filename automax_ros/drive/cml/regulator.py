@@ -128,7 +128,16 @@ class Regulator(Stateful):
 
     def _move(self, gain: float, move_us: float, lowest_us: float, highest_us: float) -> None:
         """Move the integrator, and find DELTA between two bounds."""
-        self.integral_gain = min(LARGEST_GAIN, int(gain * STEPS + 0.5))
-        self.integral_us = integral = min(max(self.integral_us + move_us, lowest_us), highest_us)
+        shown = int(gain * STEPS + 0.5)
+        self.integral_gain = shown if shown < LARGEST_GAIN else LARGEST_GAIN
+        integral = self.integral_us + move_us
+        if integral < lowest_us:  # noqa: PLR1730 - max() costs a call
+            integral = lowest_us
+        if integral > highest_us:  # noqa: PLR1730
+            integral = highest_us
+        self.integral_us = integral
         self.before_us = self.delta_us
-        self.delta_us = min(max(integral + self.push_us, lowest_us), highest_us)
+        delta = integral + self.push_us
+        if delta < lowest_us:  # noqa: PLR1730
+            delta = lowest_us
+        self.delta_us = delta if delta < highest_us else highest_us

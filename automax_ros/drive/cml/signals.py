@@ -6,6 +6,7 @@ before, and takes a ``Command`` for the time up to the next (decision: nothing i
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 LINE = 1 << 0
@@ -108,6 +109,7 @@ def gate_bits(*numbers: int) -> int:
     return word
 
 
+@lru_cache(maxsize=4096)
 def gate_numbers(word: int) -> tuple[int, ...]:
     """Return the SCRs of gate bits, ascending."""
     low = [bit + 1 for bit in range(6) if word >> bit & 1]
