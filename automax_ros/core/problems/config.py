@@ -80,6 +80,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6478", "coupling of two plants"),
     Problem("AMX6479", "feed of a plant"),
     Problem("AMX6500", "common that a plant feeds and a task writes"),
+    Problem("AMX6501", "too many plants"),
     Problem("AMX6520", "drive of a 57C405"),
     Problem("AMX6521", "armature voltage of a drive wired twice"),
     Problem("AMX6522", "plant of a 57C406 without a motor"),

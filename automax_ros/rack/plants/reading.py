@@ -21,6 +21,8 @@ from automax_ros.rack.plants.keys import read_inertia, read_load, read_supply
 from automax_ros.rack.scalars import integer_value, number_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 
+MOST_PLANTS = 32
+"""Most plants of a rack (decision: two for each of 16 slots)."""
 MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
 """Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
 _SIMULATED = ("line", "load", "inertia", "couple", "feeds")
@@ -70,7 +72,12 @@ def read_plants(node: Node | None, findings: Findings) -> Plants:
     if node is None:
         return plants
     places: dict[str, Span] = {}
-    for key, value in entries_of(node, "plants", findings) or ():
+    entries = entries_of(node, "plants", findings) or ()
+    if len(entries) > MOST_PLANTS:
+        message = f"the rack file has {len(entries)} plants; at most {MOST_PLANTS} are simulated"
+        findings.add("AMX6501", message, entries[MOST_PLANTS][0].span)
+        plants.complete = False
+    for key, value in entries[:MOST_PLANTS]:
         name = findings.upper_case(key.text, key.span)
         if not _NAME.match(name):
             message = f"{quoted(key.text)}: a plant's name has 1 to 16 letters, digits and underscores, a letter first"
