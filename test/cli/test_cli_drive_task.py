@@ -87,7 +87,7 @@ def test_new_names_a_slot_that_two_want(plant):
     assert "# A wants a 57C406 in slot 1: choose another" in text
     assert "# B wants a 57C408 in slot 7: choose another" in text
     assert result.code == 1
-    assert "error[AMX6486]: IO_CNTL_SLOT must name a 57C406; in slot 1 is the 57C435" in result.err
+    assert "error[AMX6486]: IO_CNTL_SLOT must name a 57C406; slot 1 holds the 57C435" in result.err
 
 
 def test_new_without_a_drive_says_nothing_of_plants(plant):
