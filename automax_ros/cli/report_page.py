@@ -9,7 +9,7 @@ from html import escape
 from automax_ros.core.text import count_of, printable
 from automax_ros.drive.nameplate import DriveParameters
 from automax_ros.replay.drive_report import DriveReport
-from automax_ros.replay.drive_run import DriveRun, FaultSpan
+from automax_ros.replay.drive_run import DriveRun
 from automax_ros.replay.drive_totals import J_PER_KWH, CountTotals, PlantTotals, rpm_of
 
 MOST_ROWS = 500
@@ -62,7 +62,7 @@ def _drive(run: DriveRun, errors: int, picture: bytes | None) -> list[str]:
     else:
         parts.append('<p class="note">The recording holds no course of this drive.</p>')
     parts += ["<h3>Totals</h3>", *_rows(("", ""), totals(run, errors), numbers=())]
-    parts += [*_faults(run.faults), *_events(run), *_notes(run), "</section>"]
+    parts += [*_faults(run), *_events(run), *_notes(run), "</section>"]
     return parts
 
 
@@ -77,7 +77,7 @@ def totals(run: DriveRun, errors: int) -> list[tuple[str, str]]:
         rows.append(("in run", f"{run.counts.run_s:.3f} s, {count_of(run.starts, 'start')}"))
     if "BRIDGE_POL" in run.drive.signals:
         rows.append(("bridge", count_of(run.changes, "change") + " while it ran"))
-    rows.append(("faults", f"{len(run.faults)}, {errors} in the task's error log"))
+    rows.append(("faults", f"{run.fault_count}, {errors} in the task's error log"))
     if run.plant.messages:
         rows += _of_plant(run.plant, run.drive.parameters)
     if run.counts.time_s > 0:
@@ -127,15 +127,16 @@ def _energy(joule: float) -> str:
     return f"{joule / 1000:.3f} kJ ({joule / J_PER_KWH * 1000:.3f} Wh)"
 
 
-def _faults(faults: Sequence[FaultSpan]) -> list[str]:
-    if not faults:
+def _faults(run: DriveRun) -> list[str]:
+    if not run.faults:
         return ["<h3>Faults</h3>", "<p>None.</p>"]
     rows = [
         (f"{item.begin_s:.4f}", "still on" if item.end_s is None else f"{item.end_s:.4f}", item.text, item.keyword,
          item.variable)
-        for item in faults
+        for item in run.faults
     ]  # fmt: skip
-    return ["<h3>Faults</h3>", *_rows(("from, s", "to, s", "fault", "output", "variable"), rows, numbers=(0, 1))]
+    head = ("from, s", "to, s", "fault", "output", "variable")
+    return ["<h3>Faults</h3>", *_rows(head, rows, numbers=(0, 1), untold=run.fault_count - len(run.faults))]
 
 
 def _events(run: DriveRun) -> list[str]:

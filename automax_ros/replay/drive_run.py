@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
@@ -33,7 +34,9 @@ DRAWN_STATES = ("CML_RUN", "DC_CML_STATE", "BRIDGE_POL")
 SUSPECT = "BAD_SCR_NUM"
 """The output with the number of a suspected SCR: that one or its anti-parallel partner (52.3.1)."""
 MOST_EVENTS = 2000
-"""Most events of one drive that are kept; the first ones are (decision: a page that can still be read)."""
+"""Most events of a kind, and faults, of one drive that are kept; the first ones are (decision: a bound on memory)."""
+MOST_BROKEN = 40
+"""Most things that are broken in one plant."""
 LONGEST = 300
 """Longest text of an event."""
 PERCENT_SPEED, PERCENT_CURRENT, DEGREES = "% of full speed", "% of rated current", "deg"
@@ -67,8 +70,8 @@ class DriveRun:
         drive: which drive.
         counts: totals from its commons.
         plant: totals from its plant's messages.
-        faults: fault outputs that were on and are off again; ``finish`` adds the others.
-        events: what happened, at most ``MOST_EVENTS``; ``untold`` counts the rest.
+        faults: fault outputs that were on and are off again; ``finish`` adds the others. ``fault_count`` is how many.
+        events: what happened, at most ``MOST_EVENTS`` of a kind; ``untold`` counts the rest.
         starts, changes: how often it began to run, and how often the bridge changed while it ran.
     """
 
@@ -77,6 +80,7 @@ class DriveRun:
     plant: PlantTotals = field(default_factory=PlantTotals)
     faults: list[FaultSpan] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    fault_count: int = 0
     untold: int = 0
     starts: int = 0
     changes: int = 0
@@ -86,6 +90,7 @@ class DriveRun:
     _time_s: float | None = None
     _broken: tuple[str, ...] = ()
     _contactor: bool | None = None
+    _told: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
         """Begin with nothing known."""
@@ -150,9 +155,12 @@ class DriveRun:
         what = signal.text.removeprefix("fault: ").partition(";")[0]
         if on and keyword not in self._begun:
             self._begun[keyword] = time_s
+            self.fault_count += 1
             self.tell(time_s, "fault", f"fault: {what} ({keyword} {signal.variable})")
         elif not on and keyword in self._begun:
-            self.faults.append(FaultSpan(keyword, signal.variable, what, self._begun.pop(keyword), time_s))
+            span = FaultSpan(keyword, signal.variable, what, self._begun.pop(keyword), time_s)
+            if len(self.faults) < MOST_EVENTS:
+                self.faults.append(span)
             self.tell(time_s, "fault", f"no fault any more: {what} ({keyword} {signal.variable})")
 
     def _draw(self, time_s: float, signal: Signal) -> None:
@@ -202,7 +210,7 @@ class DriveRun:
         if self._contactor is not None and message.contactor != self._contactor:
             self.tell(time_s, "plant", "the contactor is closed" if message.contactor else "the contactor is open")
         self._contactor = message.contactor
-        broken = tuple(message.faults)
+        broken = tuple(message.faults[:MOST_BROKEN])
         for name in broken:
             if name not in self._broken:
                 self.tell(time_s, "plant", f"the plant has {name}")
@@ -213,7 +221,8 @@ class DriveRun:
 
     def tell(self, time_s: float, kind: str, text: str) -> None:
         """Note an event."""
-        if len(self.events) < MOST_EVENTS:
+        self._told[kind] += 1
+        if self._told[kind] <= MOST_EVENTS:
             self.events.append(Event(time_s, kind, text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."))
         else:
             self.untold += 1

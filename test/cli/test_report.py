@@ -306,6 +306,16 @@ def test_many_events_are_cut(automax, bag):
     assert "And 2100 more." in page
 
 
+def test_what_comes_later_is_not_lost_to_what_comes_often(automax, bag):
+    with bag() as recording:
+        for step in range(1, 5001):
+            recording.write(step * 0.01, IOC_B=step % 2, RUN_B=step % 2)
+        recording.operation(60.0, "stop_all", "")
+    ((run, _),) = drive_report(automax.folder / "bag").drives
+    assert run.events[-1].text == "stop_all"
+    assert (run.fault_count, len(run.faults), run.untold) == (2500, 2000, 6000)
+
+
 def two_drives(bag):
     commons = COMMONS
     rack = rack_file(slots="  9: {module: 57C406, plant: WIND}\n  10: {module: 57C408}\n", tasks="")
@@ -383,6 +393,15 @@ def test_a_recording_without_a_drive_is_refused(automax, bag):
     assert result.code == 2
     assert "AMX6860" in result.err
     assert "hint: a drive is a 57C406" in result.err
+
+
+def test_a_rack_file_with_errors_inside_is_refused(automax, bag):
+    with bag(rack=rack_file().replace("57C406", "57C999")):
+        pass
+    result = automax("report", "bag")
+    assert result.code == 2
+    assert "57C999" in result.err
+    assert "the rack file stored inside has errors" in result.err
 
 
 def test_a_task_without_a_loop_is_refused(automax, bag):
