@@ -21,6 +21,8 @@ from automax_ros.drive.cml.signals import (
 from automax_ros.drive.plant import DrivePlant
 
 LARGEST = (1 << 31) - 1
+LEAST_SYNC = 0.25
+"""Part of the nominal line voltage below which there is no sync voltage (decision)."""
 
 
 class DriveController:
@@ -45,7 +47,7 @@ class DriveController:
         plant.advance(now_ns)
         circuit, line = plant.circuit, plant.line
         sample = plant.sample()
-        if 0 not in line.missing:
+        if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.data.parameters.line_v:
             status |= LINE
         if line.rotation.value < 0:
             status |= ROTATION_ABC
