@@ -125,3 +125,66 @@ def test_a_rack_that_is_cut_goes_on_bit_for_bit(tmp_path, cut_us):
                     Controls(rack).plant("UNWIND", moves[until_us], value)
     assert whole.state() == later.state()
     assert whole.value("STATE@")
+
+
+TWO = """\
+rack: LINE1
+slots:
+  0: {module: 57C413}
+  1: {module: 57C435, tasks: {LINE: {priority: 4}}}
+  2: {module: 57C435, tasks: {DRAW: {priority: 4}}}
+  7: {module: 57C406, plant: UNWIND}
+  8: {module: 57C408}
+  9: {module: 57C406, plant: WINDER}
+  10: {module: 57C408}
+plants:
+  UNWIND: {motor: dc_150hp_500v, inertia: 3.0, couple: {to: WINDER, stiffness_nm_per_rad: 4000}}
+  WINDER: {motor: dc_150hp_500v, inertia: 3.0, line: {rotation: ABC}}
+common:
+  PERM_A@: {slot: 8, register: 0, bit: 0, ros: in, preset: true}
+  PERM_B@: {slot: 10, register: 0, bit: 0, ros: in, preset: true}
+  RUN@: {}
+  REF_A%: {}
+  REF_B%: {}
+  STATE_A@: {}
+  STATE_B@: {}
+"""
+PART = """\
+10 COMMON RUN@, REF_{drive}%, STATE_{drive}@
+20 LOCAL RESET@
+1000 CALL DC_DRIVE_CML( IO_CNTL_SLOT={slot}, DIG_IO_SLOT={digital}, REFERENCE=REF_{drive}%, KP=0.2, PI_W_LEAD=50.0, &
+     AG_FACTOR=20, CC_THRESH=680, CML_RUN=RUN@, IOC_THRESH=250, LIM_BAR=150, FAULT_RESET=RESET@, AUTO_PHROT=TRUE, &
+     DC_CML_STATE=STATE_{drive}@ )
+1010 END
+"""
+
+
+def test_two_drives_pull_on_one_web(tmp_path):
+    """One pulls with 30 % of LIM_BAR, the other brakes with 20 %: the difference turns both inertias."""
+    (tmp_path / "LINE.BLK").write_text(PART.format(drive="A", slot=7, digital=8))
+    (tmp_path / "DRAW.BLK").write_text(PART.format(drive="B", slot=9, digital=10))
+    (tmp_path / "rack.yaml").write_text(TWO)
+    config = load(tmp_path / "rack.yaml").config
+    assert config is not None
+    rack = started(Rack(config))
+    rack.run(0.4)
+    assert (rack.value("STATE_A@"), rack.value("STATE_B@")) == (True, True)
+    rack.write("REF_A%", 1229)
+    rack.write("REF_B%", -819)
+    rack.run(0.5)
+    unwind, winder = rack.plants["UNWIND"], rack.plants["WINDER"]
+    begun = unwind.motor.speed_rad_s + winder.motor.speed_rad_s
+    for plant in (unwind, winder):
+        plant.begin_metering()
+    rack.run(1.0)
+    inertia = unwind.motor.inertia_kg_m2 + winder.motor.inertia_kg_m2
+    driving, braking = unwind.meter.look().current_a, winder.meter.look().current_a
+    assert driving == pytest.approx(1229 / 4095 * 1.5 * unwind.rated_amps, rel=0.1)
+    assert braking == pytest.approx(-819 / 4095 * 1.5 * unwind.rated_amps, rel=0.1)
+    ended = unwind.motor.speed_rad_s + winder.motor.speed_rad_s
+    drag = unwind.motor.data.viscous_n_m_s * (begun + ended) / 2
+    torque = unwind.motor.k_v_s * (driving + braking) - drag
+    assert (ended - begun) / 2 == pytest.approx(torque / inertia, rel=2e-3)
+    assert winder.motor.speed_rad_s == pytest.approx(unwind.motor.speed_rad_s, rel=0.02)
+    assert unwind.circuit.current_a > 0.0 > winder.circuit.current_a
+    assert unwind.now_ns == winder.now_ns
