@@ -2,12 +2,15 @@
 
 import json
 from math import pi
+from pathlib import Path
 
 import pytest
 
 from automax_ros.drive.limits import boundary_amps
 
 from .drive_racks import loop_task, rack_file, write_rack
+
+ROOT = Path(__file__).parent.parent.parent
 
 
 @pytest.fixture
@@ -38,6 +41,16 @@ def test_a_sound_drive_is_fine_and_every_formula_is_printed_with_its_numbers(aut
         assert text in result.out
     assert "attention   IOC" not in result.out
     assert "wrong" not in result.out
+
+
+def test_the_page_shows_what_is_printed(automax):
+    """docs/drive_tools.md: each line of its example is one of the output."""
+    page = (ROOT / "docs" / "drive_tools.md").read_text(encoding="utf-8")
+    example = page.partition("$ automax drive-check rack.yaml\n")[2].partition("\n```")[0].splitlines()
+    write_rack(automax.folder, rack_file().replace("LOOP", "CML"), CML=loop_task())
+    printed = automax("drive-check", "rack.yaml").out.splitlines()
+    assert len(example) == 7
+    assert [line for line in example if line != "  ..." and line not in printed] == []
 
 
 @pytest.mark.parametrize(
