@@ -223,8 +223,9 @@ class Motor(Stateful):
     def emf(self, duration_s: float) -> float:
         """Return the EMF (V) expected in the middle of the next ``duration_s``."""
         half = 0.5 * duration_s
-        if self.field is not None:
-            self.k_v_s = self.data.k_v_s * self.field.flux(half)
+        field = self.field
+        if field is not None and field.current != field.voltage:
+            self.k_v_s = self.data.k_v_s * field.flux(half)
         self._emf = self.k_v_s * (self.speed_rad_s + self.acceleration * half)
         self._emf += self._owed_v_s / max(duration_s, REPAID_S)
         return self._emf
