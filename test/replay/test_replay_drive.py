@@ -76,7 +76,7 @@ def done(scan):
 
 
 def test_edited_gain_shows_at_the_first_scan_that_does_otherwise(bag, tmp_path):
-    """Up to the first difference open and closed loop are the same: a rack with the edited task tells where it is."""
+    """Up to the first difference open and closed loop are the same: a rack with the edited task shows it."""
     text = edited(CML, ("KP=0.2", "KP=0.25"))
     pairs = zip(scans_of(bag), scans_of(recording(tmp_path, cml=text)), strict=False)
     expected = next(one.scan for one, other in pairs if done(one) != done(other))
