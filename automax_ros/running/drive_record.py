@@ -1,7 +1,7 @@
 """What a record keeps of a drive: what its 57C406 has measured at an interrupt, and what the loop has commanded.
 
 Both stand among the reads of the scan's record, under views that no rack has, one whole number an element; a number
-that is the usual one is left out (decision: a drive at rest then takes three or four numbers a scan).
+that is the usual one is left out (decision: a drive at rest then takes some five numbers per scan).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from automax_ros.drive.cml.signals import Command, Measured, Pulse
 MEASURED_VIEW = 0xFFF0
 """The view of what was measured; the element is the place in ``Measured``. After it comes the rack time: s, then ns."""
 COMMAND_VIEW = 0xFFEF
-"""The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers a pulse."""
+"""The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers per pulse."""
 MEASURED_NAMES = (*Measured._fields, "time s", "time ns")
 COMMAND_NAMES = tuple(name for name in Command._fields if name != "pulses")
 MOST_PULSES = 16

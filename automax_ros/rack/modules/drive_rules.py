@@ -96,7 +96,7 @@ class _Loops:
                     yield loop.found("AMX6488", message, "each drive has modules of its own", keyword)
 
     def counts(self) -> Iterator[_Found]:
-        """One loop a Processor (decision), two a rack."""
+        """One loop per Processor (decision), two per rack."""
         first: dict[int, _Loop] = {}
         for loop in self.all:
             other = first.setdefault(loop.module.slot, loop)
