@@ -37,7 +37,7 @@ class Firing(Stateful):
         self.last = -6
 
     def begin(self) -> None:
-        """Begin anew: any SCR may be fired next."""
+        """Begin again: any SCR may be fired next."""
         self.last = self.count - 6
 
     def idle(self) -> None:

@@ -2,7 +2,7 @@
 
 An interrupt comes at each sixth of a line cycle, where phase T1 is at its maximum and each 60 degrees after it: the
 instants of natural commutation (decision). At first, and after a loss, two maxima of T1 give period and phase
-(decision). From then on, once a cycle, at position 0, the loop sees how far T1's maximum lies from where it was
+(decision). From then on, once per cycle, at position 0, the loop sees how far T1's maximum lies from where it was
 expected, and moves the phase by all of it and the period by half of it, at most by the registers 4137 and 4138. So a
 phase step above the largest error, 2000 us, changes nothing (52.5.1), and the phase needs twice the period's step
 (decision). Registers of another ratio are used as they are (decision).

@@ -106,7 +106,7 @@ def test_the_same_step_is_followed_with_80_and_40():
 
 @pytest.mark.parametrize(("rate", "lost"), [(0.4, False), (0.6, True)])
 def test_drift_is_followed_as_far_as_the_steps_go(rate, lost):
-    # 2 us a cycle are 0.432 Hz/s at 60 Hz.
+    # 2 us per cycle are 0.432 Hz/s at 60 Hz.
     follower = Follower()
     follower.run(1.0)
     follower.line.drift_frequency(follower.now_ns, 58.0, rate)
