@@ -23,6 +23,13 @@ from automax_ros.drive.plant import DrivePlant
 LARGEST = (1 << 31) - 1
 LEAST_SYNC = 0.25
 """Part of the nominal line voltage below which there is no sync voltage (decision)."""
+TURN = 2 * pi
+
+
+def _word(value: float) -> int:
+    """Return a value as a double integer, limited to it."""
+    number = round(value)
+    return number if -LARGEST <= number <= LARGEST else LARGEST if number > 0 else -LARGEST
 
 
 class DriveController:
@@ -56,19 +63,22 @@ class DriveController:
         if line_a > level_a or sample.exceeds(level_a):
             status |= OVERCURRENT
         idle_us = int(circuit.idle_s * 1e6)
-        volts = 0.0
+        voltage = since_ns = 0
         if status & VOLTAGE:
             volts = circuit.emf_v if idle_us else sample.mean_voltage_v
-        turn = fmod(line.angle(now_ns), 2 * pi)
+            voltage = _word(volts * VOLTS / plant.data.parameters.line_v)
+        if status & LINE:
+            turn = fmod(line.angle(now_ns), TURN)
+            since_ns = round((turn if turn >= 0.0 else turn + TURN) / line.omega * 1e9)
         return Measured(
             status,
-            max(-LARGEST, min(LARGEST, round(amps / plant.rated_amps * RATED))),
+            _word(amps / plant.rated_amps * RATED),
             round(sample.zero_current_s * 1e6),
             idle_us,
-            round((turn if turn >= 0 else turn + 2 * pi) / line.omega * 1e9) if status & LINE else 0,
-            max(-LARGEST, min(LARGEST, round(volts * VOLTS / plant.data.parameters.line_v))),
+            since_ns,
+            voltage,
             *registers,
-            min(LARGEST, round(line_a / plant.rated_amps * RATED)),
+            _word(line_a / plant.rated_amps * RATED),
         )
 
     def command(self, command: Command, interrupt_ns: int, now_ns: int = 0) -> None:
