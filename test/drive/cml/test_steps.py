@@ -1,6 +1,11 @@
 """Steps of the current with the gains that are proposed: rise, overshoot, settled mean; three motors, both bridges."""
 
+from dataclasses import replace
+
 import pytest
+
+from automax_ros.drive.controller import DriveController
+from automax_ros.drive.plant import DrivePlant
 
 from .support import Bench
 
@@ -80,3 +85,21 @@ def test_first_pulse_of_a_small_reference_is_small():
     bench.set(reference=41)
     scans = bench.run(0.4)
     assert 41 <= max(scan.feedback for scan in scans) < 41 + 0.03 * FULL
+
+
+@pytest.mark.parametrize("hertz", [48, 55, 62])
+@pytest.mark.parametrize("standard", [True, False])
+def test_any_line_and_either_rotation_carries_current_of_both_signs(hertz, standard):
+    bench = Bench("150hp", hertz, auto_phrot=True)
+    data = replace(bench.plant.data, standard_rotation=standard)
+    bench.plant = DrivePlant(data)
+    bench.hardware = DriveController(bench.plant)
+    bench.emf(150.0)
+    bench.start()
+    bench.plant.circuit.take_events()
+    for wanted in (2000, -2000, 300, -300):
+        bench.set(reference=wanted)
+        tail = bench.run(0.6)[-40:]
+        assert sum(scan.feedback for scan in tail) / len(tail) == pytest.approx(wanted, rel=0.01)
+        assert {scan.bridge for scan in tail} == {1 if wanted > 0 else 2}
+    assert bench.plant.circuit.take_events() == []
