@@ -8,6 +8,9 @@ rows are all there are).
 
 from __future__ import annotations
 
+from automax_ros.drive.cml.signals import Pulse
+from automax_ros.drive.state import Stateful
+
 RECORDS = 12
 """Records of a page (52.3.2)."""
 ROWS, PAGES = 38, 2
@@ -43,3 +46,40 @@ def writes(page: int, next_entry: int, record: Record) -> tuple[tuple[int, int],
     first = (3 * number - 1) * PAGES + page
     words = tuple((first + PAGES * place, word) for place, word in enumerate(record))
     return (*words, (next_entry_index(page), number % RECORDS + 1))
+
+
+class Feeding(Stateful):
+    """Which gates make the feedback of the next scan: those whose SCRs carry current for most of it (decision).
+
+    A pair is fired up to a scan after the interrupt; where that is late in the scan, the pair before it still makes
+    most of the current that the next interrupt measures.
+    """
+
+    _kept = ("word", "began_ns")
+
+    def __init__(self) -> None:
+        """Begin with nothing fired."""
+        self.word = 0
+        self.began_ns = 0
+
+    def begin(self) -> None:
+        """Begin a run: nothing is fired."""
+        self.word = self.began_ns = 0
+
+    def follow(self, pulses: tuple[Pulse, ...], next_ns: int, flow_ns: int) -> int:
+        """Return the gates that make the feedback of the scan from an interrupt to the next.
+
+        Args:
+            pulses: the gate windows of that time.
+            next_ns: how long it is, ns.
+            flow_ns: for how long a pair conducts, ns; not longer than to the next.
+        """
+        word, most = (pulses[0].gates, 0) if pulses else (self.word, 0)
+        for after_ns, _, gates in (*pulses, (next_ns, 0, 0)):
+            carries_ns = min(after_ns, self.began_ns + flow_ns) - max(self.began_ns, 0)
+            if carries_ns > most:
+                word, most = self.word, carries_ns
+            if gates:
+                self.word, self.began_ns = gates, after_ns
+        self.began_ns -= next_ns
+        return word

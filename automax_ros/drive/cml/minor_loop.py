@@ -10,6 +10,7 @@ from collections.abc import Sequence as Numbers
 from typing import NamedTuple
 
 from automax_ros.drive.cml.current_control import CurrentControl
+from automax_ros.drive.cml.diagnostics import Feeding
 from automax_ros.drive.cml.faults import Faults
 from automax_ros.drive.cml.inputs import Inputs
 from automax_ros.drive.cml.latching import TICK_NS, Latched
@@ -79,8 +80,10 @@ class CurrentMinorLoop(Stateful):
         self.sequence = Sequence()
         self.faults = Faults()
         self.scr_test = ScrTest()
+        self.feeding = Feeding()
         self._parts = (
-            self.outputs, self.latched, self.pll, self.sequence, self.faults, self.scr_test, *self.control.parts
+            self.outputs, self.latched, self.pll, self.sequence, self.faults, self.scr_test, self.feeding,
+            *self.control.parts,
         )  # fmt: skip
 
     def scan(self, now_ns: int, measured: Measured, inputs: Inputs) -> Outcome:
@@ -174,6 +177,7 @@ class CurrentMinorLoop(Stateful):
         self.sequence.run(now_ns)
         self.control.begin()
         self.faults.begin_run()
+        self.feeding.begin()
         problems = self.latched.run(inputs, self.pll.period_ns)
         if self.latched.cml_coast_stop:
             self.sequence.coast()
@@ -216,9 +220,8 @@ class CurrentMinorLoop(Stateful):
         """Return the record of a scan for DIAG_DATA: only while the loop regulates (52.3.2)."""
         if not self.sequence.running or self.latched.cml_test:
             return None
-        gates = 0
-        for pulse in pulses:
-            gates |= pulse.gates
+        next_ns = self.pll.next_ns
+        gates = self.feeding.follow(pulses, next_ns, int(self.control.part * next_ns))
         return self.outputs.i_fdbk, self.outputs.ref_lag_out, gates
 
     # What is kept
