@@ -6,7 +6,7 @@
 
 SHELL := /bin/bash
 BIN := .venv/bin
-CONFIG ?= config/section_drive/rack.yaml
+CONFIG ?= config/dc_drive/rack.yaml
 # A file of tests is one worker's; more than four would only hold up the tests of live racks.
 PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile
 
