@@ -103,3 +103,15 @@ def test_any_line_and_either_rotation_carries_current_of_both_signs(hertz, stand
         assert sum(scan.feedback for scan in tail) / len(tail) == pytest.approx(wanted, rel=0.01)
         assert {scan.bridge for scan in tail} == {1 if wanted > 0 else 2}
     assert bench.plant.circuit.take_events() == []
+
+
+def test_the_same_run_repeats_bit_for_bit():
+    runs = []
+    for _ in range(2):
+        bench = Bench("10hp", inertia=2.0)
+        bench.start()
+        for wanted in (1500, -2500, 90):
+            bench.set(reference=wanted)
+            bench.run(0.1)
+        runs.append((bench.scans, bench.loop.numbers(), bench.plant.state()))
+    assert runs[0] == runs[1]
