@@ -34,6 +34,9 @@ _TRUE_INPUTS = ("SPEED_FDBK", "OSV_FDBK")
 _SCR_TEST = "BAD_SCR_OUT"
 """The output whose programming enables the shorted SCR test (52.3.1)."""
 _RECORDS = "DIAG_DATA"
+_FRESH = CurrentMinorLoop().numbers()
+_NOTHING = [0.0] * NUMBERS
+"""What a snapshot has of a loop that has not scanned, as every block state of an installation is 0 (decision)."""
 
 
 Under = tuple[int, int, Value]
@@ -229,7 +232,7 @@ class CmlTask(Task):
         """Return state, loop and error log as flat values, in the order of ``layout``."""
         values = super().snapshot()
         numbers = self.loop.numbers() if self._before is None else self._before
-        return [*values[:-LOG_NUMBERS], *numbers, *values[-LOG_NUMBERS:]]
+        return [*values[:-LOG_NUMBERS], *(_NOTHING if numbers == _FRESH else numbers), *values[-LOG_NUMBERS:]]
 
     def restore(self, values: list[Value]) -> None:
         """Take a snapshot over.
@@ -241,7 +244,7 @@ class CmlTask(Task):
         numbers = values[len(state) : -LOG_NUMBERS]
         before = self.loop.numbers()
         try:
-            self.loop.take([float(number) for number in numbers])
+            self.loop.take([float(number) for number in numbers] if any(numbers) else _FRESH)
             super().restore([*state, *log])
         except (ValueError, OverflowError):
             self.loop.take(before)

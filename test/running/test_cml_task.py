@@ -129,6 +129,16 @@ def test_snapshot_that_no_loop_has_is_refused_and_changes_nothing(spoilt):
     assert task.snapshot() == before
 
 
+def test_loop_that_has_not_scanned_is_as_installed():
+    task, *_ = cml_task()
+    installed = task.layout.flatten(task.layout.fresh())
+    assert task.snapshot() == installed
+    other, *_ = started(700 * MS)
+    assert other.snapshot() != installed
+    other.restore(installed)
+    assert other.loop.numbers() == CurrentMinorLoop().numbers()
+
+
 def test_record_has_what_was_measured_and_commanded():
     task, memory, port = started(900 * MS)
     task.record_scans()
