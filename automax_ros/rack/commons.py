@@ -61,6 +61,9 @@ class CommonReader:
         variable = CommonVariable(declared.name, declared.type, declared.dimensions, declared.length)
         preset = section.get("preset")
         direction = self._direction(section, variable, key)
+        point = self._points.read(section, declared, key.span)
+        if direction is Direction.IN and point is not None:
+            self._points.check_input(point, declared, section.key_span("ros"))
         return CommonVariable(
             name=declared.name,
             type=declared.type,
@@ -73,7 +76,7 @@ class CommonReader:
             unit=self._text(section, "unit", declared.name, UNIT_LIMIT),
             description=self._text(section, "description", declared.name, DESCRIPTION_LIMIT),
             line=key.span.line,
-            point=self._points.read(section, declared, key.span),
+            point=point,
             scale=self._scale(section, declared, direction),
         )
 

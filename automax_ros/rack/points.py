@@ -54,6 +54,13 @@ class PointReader:
         point = Point(slot, register, bit)
         return point if self._is_free(point, declared, span) else None
 
+    def check_input(self, point: Point, declared: VariableName, span: Span) -> None:
+        """Report a point that the process shall write and its module alone does."""
+        module = self._modules[point.slot]
+        if point.register in module.registers.shown:
+            message = f"{declared.name} cannot be ros: in: the {module.model} writes register {point.register} itself"
+            self._findings.add("AMX6550", message, span, "leave out ros, or write ros: out")
+
     def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
         """Report two registers of which a task may write only one, and a REAL where none can stand."""
         message, place = "", section.key_span("register")

@@ -84,6 +84,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6520", "drive of a 57C405"),
     Problem("AMX6521", "armature voltage of a drive wired twice"),
     Problem("AMX6522", "plant of a 57C406 without a motor"),
+    Problem("AMX6550", "point that its module alone writes"),
     Problem("AMX6480", "UDC task with a common outside of its dual port"),
     Problem("AMX6481", "UDC task too large"),
     Problem("AMX6482", "UDC tasks with unequal TICKS", hardware="95"),

@@ -60,7 +60,7 @@ class Registers:
     are those on which REAL variables may stand. ``copies`` are pairs of a register and the input that shows the same;
     ``clock_status`` pairs of an input and the bits that are set while there is a common
     clock; ``counters`` are the first of two registers that count 24 bits. ``by_itself``: the module writes registers
-    without an interrupt too.
+    without an interrupt too. ``shown`` are inputs that the module alone writes: neither ROS 2 nor a feed may.
     """
 
     count: int = 0
@@ -73,6 +73,7 @@ class Registers:
     clock_status: tuple[tuple[int, int], ...] = ()
     counters: tuple[int, ...] = ()
     by_itself: bool = False
+    shown: Collection[int] = range(0)
 
     @property
     def writes(self) -> bool:

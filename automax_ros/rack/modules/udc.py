@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from automax_ros.core.kinds import WriteKind
 from automax_ros.rack.modules.kind import ModuleConfig, ModuleState, Parts
 from automax_ros.rack.modules.udc_copies import Copied, Copies, copies_of
+from automax_ros.rack.modules.udc_pmi import UdcPmis
 from automax_ros.rack.modules.udc_registers import (
     APPLICATION,
     ISCR,
@@ -77,6 +78,7 @@ class UdcModule:
             parts.install(item, execution, memory=self._memory, trigger=self._trigger, then=self._has_run)
             for item in config.tasks
         ]
+        self._pmis = UdcPmis(config, parts, bank.view, self._commands)
         parts.clock.add_enable(config.name, bank.view, ISCR)
         parts.clock.watch(self.follow)
 
@@ -91,7 +93,8 @@ class UdcModule:
         return None if self._event is None else self._parts.scheduler.due_ns(self._event)
 
     def power_on(self) -> None:
-        """Nothing begins: the common clock is off."""
+        """Let the PMIs follow their lines; the common clock is off, so no scan begins."""
+        self._pmis.begin()
 
     def power_off(self) -> None:
         """Stop the tasks; locals and application registers are lost, tunables and error logs stay (2.4.5)."""
@@ -109,6 +112,7 @@ class UdcModule:
 
     def follow(self) -> None:
         """Scan while the common clock runs and a task takes part, every TICKS of its intervals."""
+        self._pmis.follow()
         clock, running = self._parts.clock, self._taking_part()
         if not clock.runs or not running:
             self._cancel()
@@ -135,6 +139,7 @@ class UdcModule:
             "scanning": self._scanning,
             "current": None if self._current is None else self._current.name,
             "rest": [item.name for item in self._rest],
+            "pmis": self._pmis.state(),
         }
 
     def load(self, state: ModuleState) -> None:
@@ -157,8 +162,15 @@ class UdcModule:
         self._cancel()
         if state["scan_ns"] is not None:
             self._scan_from(state["scan_ns"])
+        self._pmis.load(state["pmis"])
         if self._scanning and self._current is None:
             self._go_on_soon()
+
+    def _commands(self, drive: str) -> bool:
+        """Return whether a task scans that commands a drive: its own; for a drive without one any (decision)."""
+        running = {item.name for item in self._taking_part()}
+        own = {item.name for item in self.config.tasks if item.drive == drive}
+        return bool(running & own if own else running)
 
     def _trigger(self, task: Task) -> _Trigger:
         """Make the trigger of a task as it is installed; what is copied depends on its source."""
@@ -202,6 +214,7 @@ class UdcModule:
         Scans that a late host leaves out count too: the next one takes the place of an Nth one among them (decision).
         """
         self._parts.memory.now_ns = now_ns
+        self._pmis.exchange(now_ns)
         every = self._scans_per_interrupt
         before = min(self._count, max(every - 1, 0))
         present = before + skipped + 1

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from automax_ros.compile.cost import Model
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import UDC_TICK_NS
 from automax_ros.core.yaml_text import Node
+from automax_ros.drive.pmi_table import DRIVE_B, WRITTEN
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.modules.udc import UdcModule
@@ -40,13 +42,19 @@ class UdcConfig:
     times = Model.UDC
     has_battery = False
     keeps_locals = False
-    registers: Registers = UDC_REGISTERS
     common_registers = 0
 
     @property
     def name(self) -> str:
         """The module's name in the rack, as that of its node."""
         return f"udc_{self.slot}"
+
+    @cached_property
+    def registers(self) -> Registers:
+        """Its registers: of a drive with a PMI the module writes feedback and communication status itself."""
+        bases = [DRIVE_B if drive == "B" else 0 for drive, plant in self.plants.items() if plant.motor is not None]
+        shown = frozenset(base + number for base in bases for number in WRITTEN)
+        return replace(UDC_REGISTERS, shown=shown) if shown else UDC_REGISTERS
 
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""

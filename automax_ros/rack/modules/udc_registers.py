@@ -12,6 +12,8 @@ from automax_ros.rack.modules.kind import Interrupt, Registers
 COUNT = 2048
 RAIL = range(24)
 """Rail and Flex I/O ports of the PMI: 0 to 11 of drive A, 12 to 23 of drive B."""
+RAIL_COUNTERS = {"A": (5, 11), "B": (17, 23)}
+"""The check-bit fault counters of each drive's rail ports (SB3000 p. 3-8)."""
 STATUS = (*range(80, 90), *range(1080, 1090))
 """UDC-PMI communication status of the drives A and B."""
 COMMAND = (*range(100, 200), *range(1100, 1200))

@@ -117,6 +117,8 @@ class _FeedReader:
         point = variable.point
         if point is not None and self._registers[point.slot].direction(point.register) == "output":
             return "stands on an output: only tasks write it"
+        if point is not None and point.register in self._registers[point.slot].shown:
+            return "is written by its module itself"
         return ""
 
     def _scale(self, section: Section, variable: CommonVariable, where: str, span: Span) -> Scale | None:

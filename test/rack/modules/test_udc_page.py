@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from automax_ros.drive.pmi_table import COMMAND_REGISTERS, DRIVE_B, FEEDBACK_REGISTERS, LINK_REGISTERS
 from automax_ros.rack.loader import load
 from automax_ros.rack.modules.udc_registers import RETAINED, UDC_REGISTERS
 from automax_ros.rack.rack import Rack
@@ -54,3 +55,16 @@ def test_the_example_runs(tmp_path):
     assert rack.value("SHOWN%") == 1000
     # Of its 500 scans the 10th, the 21st ... are followed by an interrupt.
     assert rack.task("LINE").scan_number == len(range(10, 501, 11)) == 45
+
+
+def table_of(registers):
+    """The rows of the page for registers of a PMI."""
+    for item in registers:
+        yield f"| {item.number}, {item.number + DRIVE_B} | | {item.meaning} |"
+        yield from (f"| | {bit} | {meaning} |" for bit, meaning in item.bits)
+
+
+def test_the_table_of_the_pmi_is_that_of_the_program():
+    rows = list(table_of((*COMMAND_REGISTERS, *FEEDBACK_REGISTERS, *LINK_REGISTERS)))
+    first = PAGE.index(rows[0])
+    assert PAGE[first:].split("\n\n")[0].splitlines() == rows

@@ -1,0 +1,278 @@
+"""A UDC's drive with a PMI: it turns its motor by registers, protects it, stops with the rack, goes on bit for bit."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from automax_ros.drive import pmi_table as table
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.rack_state import RackState
+
+from .pmi_racks import CURRENT, SPEED_LOOP, breaks, built, rpm, started, winder
+
+BASE_RPM = 1750
+RATED_A = 245.8
+
+
+def word(rack: Rack, name: str) -> int:
+    """A register's 16 bits."""
+    return int(rack.value(name)) & 0xFFFF
+
+
+def test_it_runs_to_the_speed_of_a_speed_loop(tmp_path):
+    rack = started(tmp_path, reference=2000)
+    rack.run(4.0)
+    assert rpm(rack) == pytest.approx(2000 / 4095 * BASE_RPM, rel=0.01)
+    assert rack.value("SPEED%") == pytest.approx(rpm(rack) / BASE_RPM * 4095, abs=2)
+    assert word(rack, "STATUS%") & (table.RUNNING | table.LOCKED | table.FORWARD_ON) == 0b1011
+    assert (word(rack, "FAULTS%"), rack.value("WARN%"), rack.value("LINK%")) == (0, 0, 0)
+    assert rack.value("PERIOD%") == 16667
+    emf_v = winder(rack).circuit.emf_v
+    assert rack.value("ARM_V%") == pytest.approx(emf_v, abs=6)
+    assert rack.value("ARM_C%") == pytest.approx(emf_v / 500 * 3000, abs=36)
+
+
+def test_the_current_follows_its_reference_and_is_told_in_counts_of_the_overload_ratio(tmp_path):
+    rack = started(tmp_path, CURRENT, plant="load: {speed_rpm: 0}", reference=2730)
+    rack.run(0.5)
+    told, amps = [], []
+    for _ in range(100):
+        rack.run(1 / 360)
+        told.append(rack.value("CURRENT%"))
+        amps.append(winder(rack).circuit.current_a)
+    assert sum(told) / 100 == pytest.approx(2730, rel=0.01)
+    assert winder(rack).motor.torque_n_m == pytest.approx(2.606 * RATED_A, rel=0.05)  # 2730 of 4095 at 150 %: rated
+    rack.write("SREF%", -1365)
+    rack.run(0.5)
+    assert rack.value("CURRENT%") == pytest.approx(-1365, rel=0.05)
+    assert word(rack, "STATUS%") & table.ON_BRIDGE_2
+
+
+def test_a_lost_tachometer_is_found_by_the_block_and_the_task_stops_the_drive(tmp_path):
+    rack = started(tmp_path, reference=2000)
+    rack.run(2.0)
+    before, position = rpm(rack), rack.value("POS%")
+    breaks(rack, "lose_tach", "true")
+    rack.run(0.004)
+    assert rack.value("SPEED%") == 0
+    assert rack.value("TACHLOSS@")
+    position = rack.value("POS%")
+    rack.run(0.2)
+    assert not rack.value("RUNNING@")
+    assert rpm(rack) == pytest.approx(before, rel=0.03)
+    assert rack.value("POS%") == position
+    assert word(rack, "FAULTS%") == 0
+
+
+def test_the_numbers_of_thermal_overload_with_a_held_shaft(tmp_path):
+    """LIM_BAR 150: at 150 % of the rated current a cold motor trips after 189 s (36)."""
+    rack = started(tmp_path, CURRENT, plant="load: {speed_rpm: 0}", reference=4095)
+    rack.run(20.0)
+    # RISE goes to 2250 with 1/219 s: after 20 s it is 2250 (1 - exp(-20 x 0.004567)) = 197.
+    assert rack.value("RISE%") == pytest.approx(196, abs=4)
+    assert not rack.value("OVERLOAD@")
+
+
+def test_without_permissive_nothing_starts_and_a_lost_one_coasts_without_a_fault(tmp_path):
+    rack = built(tmp_path)
+    rack.start()
+    rack.write("PERMIT@", False)
+    rack.run(0.4)
+    assert not word(rack, "STATUS%") & table.READY
+    rack.write("WANT@", True)
+    rack.run(0.4)
+    assert not rack.value("RUNNING@")
+    assert rack.value("WARN%") == table.NOT_PERMITTED
+    assert word(rack, "STATUS%") & table.WARNING
+    rack.write("WANT@", False)
+    rack.write("PERMIT@", True)
+    rack.run(0.1)
+    rack.write("WANT@", True)
+    rack.run(0.4)
+    assert rack.value("RUNNING@")
+    rack.write("PERMIT@", False)
+    rack.run(0.01)
+    assert not rack.value("RUNNING@")
+    assert word(rack, "FAULTS%") == 0
+
+
+@pytest.mark.parametrize(
+    ("cause", "bit"),
+    [
+        (lambda rack: rack.write("IET@", True), table.EXTERNAL_TRIP),
+        (lambda rack: breaks(rack, "lose_phase", "T1"), table.SYNC_LOSS),
+        (lambda rack: breaks(rack, "short_scr", "1"), table.OVERCURRENT),
+    ],
+    ids=["external trip", "sync loss", "overcurrent"],
+)
+def test_a_fault_stops_the_drive_until_it_is_reset(tmp_path, cause, bit):
+    rack = started(tmp_path, reference=1500)
+    rack.run(0.8)
+    cause(rack)
+    rack.run(0.3)
+    assert word(rack, "FAULTS%") == bit
+    assert not rack.value("RUNNING@")
+    assert word(rack, "STATUS%") & table.FAULT
+    assert bool(rack.value("WARN%") & table.REFUSED) == rack.value("RUN@")
+    assert not winder(rack).is_closed
+    rack.write("FRESET@", True)
+    rack.run(0.02)
+    assert word(rack, "FAULTS%") & bit or bit == table.OVERCURRENT  # the cause is still there
+    rack.write("FRESET@", False)
+    breaks(rack, "repair", "all")
+    rack.write("IET@", False)
+    rack.write("WANT@", False)
+    rack.run(0.5)
+    rack.write("FRESET@", True)
+    rack.run(0.02)
+    rack.write("FRESET@", False)
+    assert word(rack, "FAULTS%") == 0
+    rack.write("WANT@", True)
+    rack.run(0.5)
+    assert rack.value("RUNNING@")
+
+
+def test_a_shorted_scr_is_found_before_the_start(tmp_path):
+    rack = built(tmp_path)
+    rack.start()
+    breaks(rack, "short_scr", "13")
+    rack.run(0.4)
+    rack.write("WANT@", True)
+    rack.run(0.4)
+    assert word(rack, "FAULTS%") & table.BAD_SCR
+    assert rack.value("PAIR%") == 6
+    assert not rack.value("RUNNING@")
+
+
+def test_a_line_of_the_other_rotation_is_a_fault_unless_the_drive_may_take_either(tmp_path):
+    rack = built(tmp_path, plant="line: {rotation: ABC}")
+    rack.start()
+    rack.run(0.4)
+    assert word(rack, "FAULTS%") == table.ROTATION
+    either = SPEED_LOOP.replace("130 CCLK@", "125 COMMON ANY@\n130 ANY@ = TRUE\n132 CCLK@")
+    folder = tmp_path / "either"
+    folder.mkdir()
+    yaml = (tmp_path / "rack.yaml").read_text()
+    assert "ANY@" not in yaml
+    rack = built(folder, either, plant="line: {rotation: ABC}", points="  ANY@: {slot: 10, register: 100, bit: 6}\n")
+    rack.start()
+    rack.run(0.4)
+    rack.write("FRESET@", True)
+    rack.run(0.02)
+    rack.write("FRESET@", False)
+    rack.write("WANT@", True)
+    rack.run(0.4)
+    rack.write("SREF%", 800)
+    rack.run(1.0)
+    assert rpm(rack) > 200
+
+
+def test_stop_all_stops_the_drive_and_leaves_feedback_and_status(tmp_path):
+    rack = started(tmp_path, reference=2000)
+    rack.run(0.5)
+    shown = {name: rack.value(name) for name in ("STATUS%", "SPEED%", "CURRENT%", "LINK%", "COUNT%", "POS%")}
+    assert winder(rack).circuit.current_a > 100
+    rack.operations.stop_all("for a test")
+    assert (rack.value("CONTROL%"), rack.value("CREF%")) == (0, 0)
+    rack.run(0.1)
+    assert winder(rack).circuit.current_a == 0
+    assert not winder(rack).is_closed
+    assert {name: rack.value(name) for name in shown} == shown
+    rack.operations.run("WIND_A")
+    rack.run(0.01)
+    assert word(rack, "FAULTS%") == table.COMMUNICATION
+    assert not rack.value("RUNNING@")
+    rack.write("FRESET@", True)
+    rack.run(0.02)
+    rack.write("FRESET@", False)
+    assert word(rack, "FAULTS%") == 0
+    rack.write("WANT@", True)
+    rack.run(0.4)
+    assert rack.value("RUNNING@")
+
+
+def test_a_power_cycle_stops_the_drive_which_stays_locked_to_its_line(tmp_path):
+    rack = started(tmp_path, reference=2000)
+    rack.run(0.5)
+    rack.operations.power_off()
+    rack.run(0.1)
+    assert not winder(rack).is_closed
+    rack.operations.power_on(auto_run=True)
+    rack.run(0.01)
+    assert word(rack, "FAULTS%") == table.COMMUNICATION
+    assert word(rack, "STATUS%") & table.LOCKED
+
+
+def test_a_task_that_is_stopped_stops_its_drive(tmp_path):
+    rack = started(tmp_path, reference=2000)
+    rack.run(0.5)
+    rack.operations.stop("WIND_A")
+    rack.run(0.1)
+    assert not winder(rack).is_closed
+    rack.operations.run("WIND_A")
+    rack.run(0.01)
+    assert word(rack, "FAULTS%") == table.UDC_RUN
+
+
+def test_without_the_common_clock_the_status_says_so_and_nothing_comes(tmp_path):
+    rack = built(tmp_path, SPEED_LOOP.replace("130 CCLK@ = TRUE\n", ""))
+    rack.start()
+    rack.run(0.4)
+    assert rack.value("LINK%") == table.NO_CLOCK
+    assert (rack.value("COUNT%"), rack.value("STATUS%")) == (0, 0)
+    rack.write("CCLK@", True)
+    rack.run(0.0201)
+    assert rack.value("LINK%") == 0
+    assert rack.value("COUNT%") == 10
+    rack.write("WANT@", True)
+    rack.run(0.4)
+    assert rack.value("RUNNING@")
+    rack.write("CCLK@", False)
+    rack.run(0.05)
+    assert rack.value("LINK%") == table.NO_CLOCK
+    assert not winder(rack).is_closed
+
+
+def test_messages_are_counted_to_32000_and_counters_of_rails_reset(tmp_path):
+    rack = built(tmp_path)
+    rack.start()
+    rack.write("BADBITS%", 12)
+    rack.run(0.05)
+    assert (rack.value("COUNT%"), rack.value("BADBITS%")) == (25, 12)
+    rack.write("COUNT%", 31_999)
+    rack.write("CLEAR@", True)
+    rack.run(0.002)
+    assert (rack.value("COUNT%"), rack.value("BADBITS%")) == (32_000, 0)
+    rack.run(0.002)
+    assert rack.value("COUNT%") == 0
+
+
+def test_a_rack_goes_on_from_any_instant_bit_for_bit(tmp_path):
+    def end(rack: Rack) -> object:
+        return rack.now_ns, tuple(rack.memory.image()), rack.plants.state(), rack.state().modules
+
+    whole = started(tmp_path, reference=2000)
+    cuts: list[RackState] = []
+    for seconds in (0.0, 0.0413, 0.1, 0.25):
+        whole.run(seconds)
+        cuts.append(whole.state())
+    breaks(whole, "lose_tach", "true")
+    cuts.append(whole.state())
+    whole.run(0.0029)
+    cuts.append(whole.state())
+    whole.run(0.2)
+    for cut in cuts[-2:]:
+        rack = built(tmp_path)
+        rack.load(cut)
+        rack.run((whole.now_ns - cut.now_ns) / 1e9)
+        assert end(rack) == end(whole)
+    for cut in cuts[:-2]:
+        rack = built(tmp_path)
+        rack.load(cut)
+        rack.run((cuts[-2].now_ns - cut.now_ns) / 1e9)
+        breaks(rack, "lose_tach", "true")
+        rack.run((whole.now_ns - rack.now_ns) / 1e9)
+        assert end(rack) == end(whole)
+    json.dumps([module["pmis"] for slot, module in whole.state().modules.items() if slot == 10])
