@@ -154,7 +154,7 @@ def test_an_emergency_stop_lets_it_coast_and_needs_a_new_start():
     assert rack.value("CML_STATE@") is True
     run_to(rack, 12.0)
     assert abs(rack.value("RPM") - TURN_RPM) < 2
-    assert rack.value("FAULT@") is False, "a start on a turning motor is no overcurrent"
+    assert rack.value("FAULT@") is False, "a start on a turning motor trips nothing"
 
 
 @pytest.mark.timeout(300)
