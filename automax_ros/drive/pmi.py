@@ -1,10 +1,11 @@
 """The PMI of an SD3000 drive: it regulates the current of a plant as a UDC commands (S-3006, S-3056 p. 4-8, 4-10).
 
 It runs the current minor loop of section 52 on a raster of its own, six times per line cycle, not synchronized with the
-scans of the UDC (decision, by analogy: S-3056 p. 4-10 says so of the AC drives). Its parameters follow from the motor:
-gains by ``cml/proposals``, LIM_BAR is the Motor Overload Ratio, and it trips at that ratio + 75 points of the rated
-current (S-3006 p. 109), at most at 400 % (decision). Each start tests the SCRs (decision). It has power of its own and
-follows its line whatever becomes of the rack (decision); a drive that the UDC does not command any more stops.
+scans of the UDC (decision: it is so with AC drives). Its gains are those of ``cml/proposals`` for its motor (decision).
+LIM_BAR is the Motor Overload Ratio, and it trips at that ratio + 75 points of the rated current (S-3006, page 109).
+Each start tests the SCRs (decision). It has power of its own and follows its line whatever becomes of the rack
+(decision); a drive that the UDC does not command any more stops. Faults stand in its register and are not logged
+(decision).
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from automax_ros.core.diagnostics import Diagnostic, Note
 from automax_ros.core.kinds import Direction
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.core.types import DataType
+from automax_ros.drive.pmi import USUAL_RATIO
 from automax_ros.language.program import BoundCall, Program
 from automax_ros.language.syntax.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Scope
 from automax_ros.language.written import Place, places_that_write
@@ -19,6 +20,8 @@ from automax_ros.rack.modules.udc_registers import APPLICATION, ISCR, SCANS_PER_
 from automax_ros.rack.modules.udc_size import MAX_BYTES, estimated_bytes
 from automax_ros.rack.register_writes import constant_writes
 
+_USUAL = {"motor_overload_ratio": USUAL_RATIO}
+"""Parameters that the PMI of a drive has where the rack file has none."""
 _Found = tuple[str, Diagnostic]
 
 
@@ -145,6 +148,8 @@ class _Udc:
             for bound in program.calls.values():
                 for name, key, value in _drive_constants(bound):
                     wanted = getattr(plant, key)
+                    if wanted is None and plant.motor is not None:
+                        wanted = _USUAL[key]
                     if wanted is not None and value != wanted:
                         message = f"{name} of {bound.block.name} is {value}; {key} of plant {plant.name} is {wanted}"
                         notes = (

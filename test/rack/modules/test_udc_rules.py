@@ -142,12 +142,15 @@ def test_a_register_is_an_output_of_the_udc_or_of_a_processor(tmp_path, statemen
         (200, ", LIM_BAR=200", False),
         (150, ", LIM_BAR=200", True),
         (200, ", LIM_BAR=LIM%", False),
+        (None, "", False),
+        (None, ", LIM_BAR=200", True),
     ],
 )
 def test_lim_bar_is_the_motor_overload_ratio_of_the_drive(tmp_path, ratio, lim, wrong):
     source = task(lim=lim, more="20 LOCAL LIM%\n")
     path = written(tmp_path, POINTS, tasks="WIND_A: {drive: A}", more=", plants: {A: WINDER}", WIND_A=source)
-    text = path.read_text() + f"plants:\n  WINDER: {{motor: dc_150hp_500v, motor_overload_ratio: {ratio}}}\n"
+    text = path.read_text() + "plants:\n  WINDER: {motor: dc_150hp_500v"
+    text += "}\n" if ratio is None else f", motor_overload_ratio: {ratio}}}\n"
     path.write_text(text)
     (checked,) = (item for item in check_tasks(load(path).config) if item.task.name == "WIND_A")
     found = [(item.code, item.statement) for item in checked.result.diagnostics]
