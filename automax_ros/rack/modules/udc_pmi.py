@@ -1,9 +1,9 @@
 """The PMIs of a UDC in a running rack: when they scan, and what passes between them and the dual port.
 
-A PMI scans at interrupts of its own and then sees the command registers as they are (decision). The UDC writes the feedback at the
-start of each of its scans, so that its tasks have it fresh (S-3056 p. 4-8), and counts the message. Without the common
-clock nothing is exchanged, and the communication status says so as long as a task is in RUN; STOP ALL and a power cycle
-leave feedback and status as they were (2.4.5).
+A PMI scans at interrupts of its own and then sees the command registers as they are (decision). The UDC writes the
+feedback at the start of each of its scans, so that its tasks have it fresh (S-3056 p. 4-8), and counts the message.
+Without the common clock nothing is exchanged, and the communication status says so as long as a task is in RUN;
+STOP ALL and a power cycle leave feedback and status as they were (2.4.5).
 """
 
 from __future__ import annotations
