@@ -116,6 +116,6 @@ def rpm(rack: Rack) -> float:
     return winder(rack).motor.speed_rad_s / RAD_S_PER_RPM
 
 
-def breaks(rack: Rack, verb: str, text: str) -> None:
-    """Work on the plant."""
-    Controls(rack).plant("WINDER", verb, text)
+def breaks(rack: Rack, verb: str, text: str, plant: str = "WINDER") -> None:
+    """Work on a plant."""
+    Controls(rack).plant(plant, verb, text)

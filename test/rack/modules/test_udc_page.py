@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from math import pi
 from pathlib import Path
+
+import pytest
 
 from automax_ros.drive.pmi_table import COMMAND_REGISTERS, DRIVE_B, FEEDBACK_REGISTERS, LINK_REGISTERS
 from automax_ros.rack.loader import load
@@ -39,7 +42,7 @@ def test_the_table_has_every_register_that_is_not_the_modules_own():
 
 
 def test_the_example_runs(tmp_path):
-    udc, line = re.findall(r"```basic\n(.*?)```", PAGE, re.S)
+    udc, line, _ = re.findall(r"```basic\n(.*?)```", PAGE, re.S)
     (tmp_path / "WIND_A.BLK").write_text(udc)
     (tmp_path / "LINE.BLK").write_text(line)
     (tmp_path / "rack.yaml").write_text(re.search(r"```yaml\n(.*?)```", PAGE, re.S)[1])
@@ -55,6 +58,24 @@ def test_the_example_runs(tmp_path):
     assert rack.value("SHOWN%") == 1000
     # Of its 500 scans the 10th, the 21st ... are followed by an interrupt.
     assert rack.task("LINE").scan_number == len(range(10, 501, 11)) == 45
+
+
+def test_the_example_with_a_plant_turns_its_motor(tmp_path):
+    (tmp_path / "WIND_A.BLK").write_text(re.findall(r"```basic\n(.*?)```", PAGE, re.S)[2])
+    (tmp_path / "rack.yaml").write_text(re.findall(r"```yaml\n(.*?)```", PAGE, re.S)[1])
+    config = load(tmp_path / "rack.yaml").config
+    assert config is not None
+    assert [item.result.diagnostics for item in check_tasks(config)] == [[]]
+    rack = Rack(config)
+    rack.start()
+    rack.run(0.4)
+    rack.write("RUN@", True)
+    rack.run(0.4)
+    rack.write("SPD_REF%", 2000)
+    rack.run(4.0)
+    assert rack.operations.stopped is None
+    assert rack.value("FAULTS%") == 0
+    assert rack.plants["WINDER"].motor.speed_rad_s * 30 / pi == pytest.approx(2000 / 4095 * 1750, rel=0.01)
 
 
 def table_of(registers):

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from math import log
 
 import pytest
 
 from automax_ros.drive import pmi_table as table
+from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.rack_state import RackState
 
-from .pmi_racks import CURRENT, SPEED_LOOP, breaks, built, rpm, started, winder
+from .pmi_racks import CURRENT, IDLE, SPEED_LOOP, breaks, built, rpm, started, winder
 
 BASE_RPM = 1750
 RATED_A = 245.8
+RUN_UNLESS_OVERLOAD = "RUN@ = WANT@ AND NOT OVERLOAD@"
 
 
 def word(rack: Rack, name: str) -> int:
@@ -66,12 +69,24 @@ def test_a_lost_tachometer_is_found_by_the_block_and_the_task_stops_the_drive(tm
     assert word(rack, "FAULTS%") == 0
 
 
-def test_the_numbers_of_thermal_overload_with_a_held_shaft(tmp_path):
-    """LIM_BAR 150: at 150 % of the rated current a cold motor trips after 189 s (36)."""
-    rack = started(tmp_path, CURRENT, plant="load: {speed_rpm: 0}", reference=4095)
-    rack.run(20.0)
-    # RISE goes to 2250 with 1/219 s: after 20 s it is 2250 (1 - exp(-20 x 0.004567)) = 197.
-    assert rack.value("RISE%") == pytest.approx(196, abs=4)
+def test_a_held_shaft_trips_thermal_overload_in_its_time_and_the_task_stops_the_drive(tmp_path):
+    """LIM_BAR 150, TRIP_TIME 10 (36): cold at 150 %, RISE goes to 2250 with w and trips at 1299.6; it ends at 1000."""
+    source = CURRENT.replace("LIM_BAR=150,", "LIM_BAR=150, TRIP_TIME=10,").replace("RUN@ = WANT@", RUN_UNLESS_OVERLOAD)
+    rack = started(tmp_path, source, plant="load: {speed_rpm: 0}", reference=4095)
+    began_s = rack.now_ns / 1e9
+    w = log((150**2 - 100**2) / (150**2 - 114**2)) / 10
+    expected_s = log(2250 / (2250 - 1299.6)) / w
+    rack.run(expected_s - 0.3)
+    assert rack.value("CURRENT%") == pytest.approx(4095, rel=0.01)
+    assert not rack.value("OVERLOAD@")
+    while not rack.value("OVERLOAD@"):
+        rack.run(0.01)
+    assert rack.now_ns / 1e9 - began_s == pytest.approx(expected_s, rel=0.01)
+    rack.run(0.1)
+    assert not rack.value("RUNNING@")
+    rack.run(log(1299.6 / 1000) / w - 0.5)
+    assert rack.value("OVERLOAD@")
+    rack.run(0.7)
     assert not rack.value("OVERLOAD@")
 
 
@@ -276,3 +291,57 @@ def test_a_rack_goes_on_from_any_instant_bit_for_bit(tmp_path):
         rack.run((whole.now_ns - rack.now_ns) / 1e9)
         assert end(rack) == end(whole)
     json.dumps([module["pmis"] for slot, module in whole.state().modules.items() if slot == 10])
+
+
+BOTH = """\
+rack: PM1
+slots:
+  0: {module: 57C435, tick_ms: 5.5, tasks: {IDLE: {priority: 5}}}
+  10: {module: 57552, tasks: {WIND_A: {drive: A}}, plants: {A: WINDER, B: REEL}}
+plants:
+  WINDER: {motor: dc_150hp_500v, load: {speed_rpm: 0}}
+  REEL: {motor: dc_10hp_240v, motor_overload_ratio: 200, load: {speed_rpm: 0}}
+common:
+  CCLK@: {slot: 10, register: 2000, bit: 6}
+  RUN_A@: {slot: 10, register: 100, bit: 0}
+  REF_A%: {slot: 10, register: 101}
+  RUN_B@: {slot: 10, register: 1100, bit: 0}
+  REF_B%: {slot: 10, register: 1101}
+  PERMIT_A@: {slot: 10, register: 201, bit: 0, ros: in, preset: true}
+  PERMIT_B@: {slot: 10, register: 1201, bit: 0, ros: in, preset: true}
+  AMPS_A%: {slot: 10, register: 207}
+  AMPS_B%: {slot: 10, register: 1207}
+  FAULTS_A%: {slot: 10, register: 202}
+  FAULTS_B%: {slot: 10, register: 1202}
+  COUNT_B%: {slot: 10, register: 1081}
+"""
+ONE_TASK = "10 COMMON CCLK@\n20 CCLK@ = TRUE\n100 CALL SCAN_LOOP(TICKS=4)\n900 END\n"
+
+
+def test_both_drives_have_registers_and_currents_of_their_own(tmp_path):
+    """Drive B has no task of its own: that of A commands it, or here somebody from outside while A's scans."""
+    (tmp_path / "IDLE.BLK").write_text(IDLE)
+    (tmp_path / "WIND_A.BLK").write_text(ONE_TASK)
+    (tmp_path / "rack.yaml").write_text(BOTH)
+    config = load(tmp_path / "rack.yaml").config
+    assert config is not None
+    rack = Rack(config)
+    rack.start()
+    rack.run(0.4)
+    rack.write("RUN_A@", True)
+    rack.write("RUN_B@", True)
+    rack.write("REF_A%", 2730)
+    rack.write("REF_B%", -2048)
+    rack.run(0.8)
+    assert rack.value("AMPS_A%") == pytest.approx(2730, rel=0.02)
+    assert rack.value("AMPS_B%") == pytest.approx(-2048, rel=0.05)
+    assert rack.plants["WINDER"].motor.torque_n_m == pytest.approx(2.606 * RATED_A, rel=0.08)  # 100 %
+    assert rack.plants["REEL"].motor.torque_n_m == pytest.approx(-1.205 * 36.1, rel=0.2)  # 100 %, with ripple
+    assert rack.value("COUNT_B%") == 600
+    breaks(rack, "lose_phase", "T1", plant="REEL")
+    rack.run(0.1)
+    assert (word(rack, "FAULTS_A%"), word(rack, "FAULTS_B%")) == (0, table.SYNC_LOSS)
+    assert rack.value("AMPS_A%") == pytest.approx(2730, rel=0.02)
+    rack.operations.stop("WIND_A")
+    rack.run(0.1)
+    assert not rack.plants["WINDER"].is_closed
