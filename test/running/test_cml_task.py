@@ -52,7 +52,7 @@ def test_scans_run_from_the_call_to_end_and_what_stands_before_runs_once():
     task, _, port = cml_task()
     task.run(0)
     list(scans(task, port, 99 * MS))
-    # Six scans a cycle of 60 Hz, the first at 0; the task counts in an INTEGER that its first line has set to 0.
+    # Six scans per cycle of 60 Hz, the first at 0; the task counts in an INTEGER that its first line has set to 0.
     assert task.value("SCANS%") == task.scan_number == len(port.commands) == 36
     assert task.period_ns == 2_777_777
 
