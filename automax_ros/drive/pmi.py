@@ -36,6 +36,9 @@ HIGHEST_TRIP = 400
 """Greatest level of the overcurrent trip, % (decision: that of IOC_THRESH)."""
 DROPOUT_S = 0.1
 """Longest time from a stop to the opening of the contactor, s (decision: the default of MAX_M_DROPOUT)."""
+VOLTAGE_LAG_NS = 20_000_000
+"""Time constant of the armature voltage that the PMI tells, ns (decision: TACHLOSS_OVERSPEED has no filter, and at
+standstill a change of the current needs more voltage than its limit of tach loss for some scans)."""
 _WORD = 32767
 _BITS = {
     IOC: table.OVERCURRENT,
@@ -73,7 +76,8 @@ class Pmi(Stateful):
         link_faults: bits of the fault register for what has happened to the UDC.
         warnings: the warning register.
         ready: whether a start would be accepted.
-        current, voltage: as ``Measured`` has them, at the last interrupt.
+        current: as ``Measured`` has it, at the last interrupt.
+        voltage: the same, after its lag.
         position: the count of the resolver.
     """
 
@@ -93,7 +97,8 @@ class Pmi(Stateful):
         self.loop = CurrentMinorLoop(tests_scrs=True)
         self.link_faults = self.warnings = 0
         self.ready = False
-        self.current = self.voltage = self.position = 0
+        self.current = self.position = 0
+        self.voltage = 0.0
 
     @property
     def faults(self) -> int:
@@ -110,7 +115,7 @@ class Pmi(Stateful):
         if permitted and commands.linked and commands.fed and not self.link_faults:
             status |= PERMISSIVE
         measured = self._controller.measure(now_ns, status, (109, 4, 2, 1 if control & table.FAST_CHANGE else 0))
-        self.current, self.voltage = measured.current, measured.voltage
+        self.current = measured.current
         limited = max(-table.FULL, min(table.FULL, commands.reference))
         inputs = self._inputs._replace(
             reference=limited,
@@ -125,6 +130,8 @@ class Pmi(Stateful):
         )
         outcome = self.loop.scan(now_ns, measured, inputs)
         self._controller.command(outcome.command, now_ns)
+        scan_ns = outcome.command.next_ns
+        self.voltage += (measured.voltage - self.voltage) * scan_ns / (scan_ns + VOLTAGE_LAG_NS)
         standby = self.loop.sequence.phase is Phase.STANDBY
         if standby and control & table.FAULT_RESET:
             self.link_faults = 0
@@ -135,13 +142,14 @@ class Pmi(Stateful):
             | (table.REFUSED if wanted and self.faults else 0)
             | (table.REFERENCE_LIMITED if limited != commands.reference else 0)
         )
-        return outcome.command.next_ns
+        return scan_ns
 
     def feedback(self, now_ns: int) -> dict[int, int]:
         """Return the feedback registers at an instant, by their numbers for drive A; the plant comes to it.
 
-        Speed and position are those of the instant, current and voltage the means between the last two interrupts of
-        the PMI (decision: the ripple is not to be seen). A lost tachometer shows 0, and the position stays (decision).
+        Speed and position are those of the instant, the current is the mean between the last two interrupts of the
+        PMI, the voltage such means after a lag (decision: the ripple is not to be seen). A lost tachometer shows 0,
+        and the position stays (decision).
         """
         plant, loop = self.plant, self.loop
         plant.advance(now_ns)

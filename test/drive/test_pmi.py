@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import exp
+
 import pytest
 
 from automax_ros.drive import pmi_table as table
@@ -111,6 +113,28 @@ def test_speed_and_position_are_those_of_the_instant_of_the_scan():
     first = bench.pmi.feedback(bench.now_ns + 250_000)[table.POSITION]
     second = bench.pmi.feedback(bench.now_ns + 1_250_000)[table.POSITION]
     assert (second - first) % 4096 == pytest.approx(4.096, abs=1)  # a turn per second
+
+
+def test_a_reversal_of_the_current_at_standstill_looks_like_no_lost_tachometer():
+    """TACHLOSS_OVERSPEED finds one where speed is below 205 and voltage above 1200, in a single scan (35)."""
+    bench = Bench(plant(held_rpm=0.0)).run(0.4).run(0.6, table.RUN, reference=4095)
+    shown, real = 0, 0.0
+    for _ in range(40):
+        bench.run(0.002, table.RUN, reference=-4095)
+        shown = max(shown, abs(bench[table.VOLTAGE]))
+        real = max(real, abs(bench.plant.circuit.armature_v))
+    assert real > 400
+    assert shown < 1200
+
+
+def test_the_voltage_follows_with_a_lag_of_20_ms():
+    bench = Bench(plant(held_rpm=0.0)).run(0.4, table.TEST, alpha=90)
+    bench.run(0.6, table.TEST | table.RUN, alpha=90)
+    bench.pmi.voltage = 1e4
+    steady = bench[table.VOLTS]
+    bench.run(0.02, table.TEST | table.RUN, alpha=90)
+    assert steady == 460
+    assert bench[table.VOLTS] == pytest.approx(460 * exp(-1), rel=0.15)
 
 
 def test_dc_time_is_the_time_without_current():
