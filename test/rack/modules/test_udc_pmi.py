@@ -7,6 +7,7 @@ from math import log
 
 import pytest
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.drive import pmi_table as table
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
@@ -345,3 +346,26 @@ def test_both_drives_have_registers_and_currents_of_their_own(tmp_path):
     rack.operations.stop("WIND_A")
     rack.run(0.1)
     assert not rack.plants["WINDER"].is_closed
+
+
+def test_a_reload_of_its_task_leaves_the_drive_running(tmp_path):
+    rack = started(tmp_path, CURRENT, reference=800)
+    rack.run(0.2)
+    edited = CURRENT.replace("CREF% = SREF%", "CREF% = SREF% + 100")
+    rack.operations.reload("WIND_A", SourceText("WIND_A.BLK", edited), keep_state=True)
+    rack.run(0.3)
+    assert rack.value("RUNNING@")
+    assert word(rack, "FAULTS%") == 0
+    assert rack.value("CURRENT%") == pytest.approx(900, rel=0.05)
+
+
+def test_a_force_holds_against_what_the_pmi_sends_and_ends_with_it(tmp_path):
+    rack = started(tmp_path, CURRENT, reference=800)
+    rack.run(0.3)
+    rack.force("CURRENT%", 4095)
+    rack.run(0.1)
+    assert rack.value("CURRENT%") == 4095
+    assert rack.value("SPEED%") > 0
+    rack.unforce("CURRENT%")
+    rack.run(0.01)
+    assert rack.value("CURRENT%") == pytest.approx(800, rel=0.1)
