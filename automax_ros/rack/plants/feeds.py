@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from automax_ros.core.diagnostics import Diagnostic, Note, Span
 from automax_ros.core.names import Element, NameFault
 from automax_ros.core.names import element as element_named
-from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.text import near_or_listed, printable, quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.drive.plant_signals import SIGNALS
@@ -58,7 +58,7 @@ class _FeedReader:
     def read(self, plant: str, key: Scalar, node: Node) -> FeedConfig | None:
         """Return one feed, None where there was something to report."""
         findings = self._findings
-        where = f"feed {key.text} of plant {plant}"
+        where = f"feed {printable(key.text)} of plant {plant}"
         entries = entries_of(node, where, findings)
         if entries is None:
             return None

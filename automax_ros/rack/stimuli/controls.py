@@ -53,6 +53,8 @@ class _Given:
 
 def _controls(node: Node, what: str, known: Mapping[str, tuple[str, ...]], findings: Findings) -> list[_Given]:
     entries = entries_of(node, what, findings)
+    if entries == ():
+        findings.add("AMX6008", f"{what}: no control is named", node.span)
     found = (_control(entry, what, known, findings) for entry in entries or ())
     return [item for item in found if item is not None]
 

@@ -44,9 +44,12 @@ def _text(verb: Scalar, node: Node, where: str, findings: Findings) -> str | Non
         message = f"{where} has no control {quoted(verb.text)}"
         findings.add("AMX6742", message, verb.span, near_or_listed(verb.text, VERBS))
         return None
-    text = _joined(known, node, f"{verb.text} of {where}", findings) if isinstance(node, Mapping) else _plain(node)
-    if isinstance(node, Mapping) and not text:
-        return None
+    if isinstance(node, Mapping) and known.keys:
+        text = _joined(known, node, f"{verb.text} of {where}", findings)
+        if not text:
+            return None
+    else:
+        text = _plain(node)
     try:
         values_of(verb.text, text)
     except ParameterError:

@@ -168,6 +168,12 @@ def test_a_fault_is_told_with_its_line(tmp_path, feeds, codes):
     assert [(item.code, item.span.line) for item in result.diagnostics] == [(code, line) for code in codes]
 
 
+def test_a_hostile_name_cannot_drive_a_terminal(tmp_path):
+    found = loaded(tmp_path, text(r'"\u001b[31m": {signal: speed_rpm}')).diagnostics
+    assert [item.code for item in found] == ["AMX6479"]
+    assert "\x1b" not in found[0].message
+
+
 def test_feeds_need_a_motor(tmp_path):
     found = loaded(tmp_path, text("RPM: {signal: speed_rpm}", "motor_overload_ratio: 150")).diagnostics
     assert [item.code for item in found] == ["AMX6009"]
