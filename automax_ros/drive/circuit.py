@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import cos, sin
+from math import cos, inf, sin
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.bridge import Bridge
@@ -131,7 +131,8 @@ class Circuit(Conduction):
         """Return the integrals since the last sample, which goes on; its list of intervals is the circuit's own."""
         volt_s = self._volt_s + self._z.r * self._charge + self._z.l * (self.current_a - self._current_before)
         duration_s = (self.now_ns - self._sample_ns) * 1e-9
-        return Sample(duration_s, self._charge, volt_s, self._zero_s, self._overlap_s, self._square, self._pieces)
+        times = duration_s, self._charge, volt_s, self._zero_s, self._overlap_s
+        return Sample(*times, self._square, self._pieces, self._highest)
 
     def pieces(self) -> list[Piece]:
         """Return the armature current since the last sample, interval by interval, without those where none flowed."""
@@ -274,6 +275,7 @@ class Circuit(Conduction):
         if (state["energy"] is None) != (self.energy is None):
             raise ParameterError("the state is that of a circuit with another choice of energy=")
         super().restore({name: state[name] for name in self._kept})
+        self._highest = inf
         self.line.restore(state["line"])
         self.bridge.restore(state["bridge"])
         self.machine.restore(state["machine"])

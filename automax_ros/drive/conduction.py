@@ -64,7 +64,7 @@ class Conduction(Stateful):
     def _begin_sample(self) -> None:
         self._sample_ns = self.now_ns
         self._current_before = self.current_a
-        self._charge = self._volt_s = self._zero_s = self._overlap_s = self._square = 0.0
+        self._charge = self._volt_s = self._zero_s = self._overlap_s = self._square = self._highest = 0.0
         self._pieces: list[RawPiece] = []
 
     def _run(self, stop_ns: int) -> None:
@@ -84,11 +84,12 @@ class Conduction(Stateful):
             if left <= 0.0:
                 break
             out = on = 0
-            k = a = 0.0
+            c = d = k = a = 0.0
             decay = net.decay
             if net.active:
+                c, d = net.c, net.d
                 k = (net.constant - emf) / net.resistance
-                a = current - net.c * cosine - net.d * sine - k
+                a = current - c * cosine - d * sine - k
             if (bridge.gated | bridge.recovering) & ~net.mask:
                 now_ns = start_ns + t * 1e9
                 wanted = bridge.candidates(now_ns, net.mask)
@@ -103,30 +104,37 @@ class Conduction(Stateful):
                         continue
                     if when < first:
                         first, on = when, mask
-            ahead = None
-            if net.guards:
-                when, mask, ahead = next_ending(net, omega, (theta, sine, cosine, k, a), modes, first)
+            end = theta + omega * first
+            end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
+            after = c * end_cosine + d * end_sine + k + a * fall
+            # How far a current can leave the straight line from one end to the other.
+            sag = 0.125 * (net.bend + decay * decay * (a if a >= 0.0 else -a)) * first * first
+            sign = net.sign
+            if net.guards and (sign * current <= sag or sign * after <= sag):
+                state = theta, sine, cosine, k, a, end_sine, end_cosine, fall
+                when, mask = next_ending(net, omega, state, modes, first)
                 if mask:
                     first, out, on = when, mask, 0
+                    end = theta + omega * first
+                    end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
+                    after = c * end_cosine + d * end_sine + k + a * fall
             if first > 0.0:
-                before_sine, before_cosine, before = sine, cosine, theta
-                theta += omega * first
-                if ahead is not None and not out:
-                    sine, cosine, fall = ahead
-                else:
-                    sine, cosine, fall = sin(theta), cos(theta), exp(-decay * first)
                 if net.active:
-                    current = net.c * cosine + net.d * sine + k + a * fall
                     charge += (
-                        (net.c * (sine - before_sine) - net.d * (cosine - before_cosine)) / omega
+                        (c * (end_sine - sine) - d * (end_cosine - cosine)) / omega
                         + k * first
                         + a * (1.0 - fall) / decay
                     )
-                    self._pieces.append((first, before, omega, net.c, net.d, k, a, decay))
+                    self._pieces.append((first, theta, omega, c, d, k, a, decay))
+                    highest = self._highest - sag
+                    if not (-highest <= current <= highest and -highest <= after <= highest):
+                        self._highest = max(current, -current, after, -after) + sag
+                    current = after
                 else:
                     self._zero_s += first
                 if net.modes or self.energy is not None:
-                    modes = self._fade(modes, (before, first, k, a))
+                    modes = self._fade(modes, (theta, first, k, a))
+                theta, sine, cosine = end, end_sine, end_cosine
                 t = t + first if first < left else total
             if out or on:
                 self.current_a, self._modes = current, modes

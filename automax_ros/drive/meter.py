@@ -30,7 +30,7 @@ class Sample:
         overlap_s: how long a rail had two or three phases, s.
     """
 
-    __slots__ = ("_pieces", "_square", "charge_c", "duration_s", "overlap_s", "volt_s", "zero_current_s")
+    __slots__ = ("_highest", "_pieces", "_square", "charge_c", "duration_s", "overlap_s", "volt_s", "zero_current_s")
 
     def __init__(
         self,
@@ -41,7 +41,9 @@ class Sample:
         overlap_s: float,
         square: float,
         pieces: list[RawPiece],
+        highest_a: float = inf,
     ) -> None:
+        """Take the integrals, and what the current's magnitude (A) has not passed, for all that was looked at."""
         self.duration_s = duration_s
         self.charge_c = charge_c
         self.volt_s = volt_s
@@ -49,6 +51,7 @@ class Sample:
         self.overlap_s = overlap_s
         self._square = square
         self._pieces = pieces
+        self._highest = highest_a
 
     @property
     def mean_current_a(self) -> float:
@@ -65,6 +68,8 @@ class Sample:
 
         Only the last 64 intervals are looked at (those that the circuit keeps).
         """
+        if self._highest < level_a:
+            return False
         conducting_s = self.duration_s - self.zero_current_s
         # No pulse of a bridge is steeper than a triangle by more than this: most samples need no search.
         if conducting_s <= 0.0 or abs(self.charge_c) * _STEEPEST < level_a * conducting_s:

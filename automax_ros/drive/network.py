@@ -65,9 +65,9 @@ class Network:
     """The equations of one set of closed legs, as numbers for ``circuit``; built once for a set and a line segment."""
 
     __slots__ = (
-        "_drop_v", "_omega", "active", "alarms", "armature_short", "c", "constant", "d", "decay", "decay_s",
+        "_drop_v", "_omega", "active", "alarms", "armature_short", "bend", "c", "constant", "d", "decay", "decay_s",
         "floating_offset", "guards", "inductance", "instant", "leg_weights", "mask", "modes", "offsets",
-        "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset", "resistance", "share",
+        "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset", "resistance", "share", "sign",
         "tied", "watches",
     )  # fmt: skip
 
@@ -139,6 +139,7 @@ class Network:
         self.inductance = z.l + n * z.ls
         self.decay = self.resistance / self.inductance
         self.c, self.d = _response(driven[0], driven[1], self.resistance, line.omega * self.inductance)
+        self.bend = line.omega * line.omega * hypot(self.c, self.d)
 
     def _solve_phases(self, line: AcLine, z: Impedances) -> None:
         self.phase_c, self.phase_d, self.phase_k = [0.0] * 3, [0.0] * 3, [0.0] * 3
@@ -226,6 +227,10 @@ class Network:
             guards[key] = guards.get(key, 0) | ARMATURE_ARC
         square = omega * omega
         self.guards: list[Guard] = [(mask, *key, square * hypot(key[0], key[1])) for key, mask in guards.items()]
+        alone = len(guards) == 1 and self.active and not self.modes
+        only = self.guards[0] if alone else None
+        self.sign = only[3] if only and abs(only[3]) == 1.0 and only[4] == 0.0 else 0.0
+        """1 or -1 where the armature current, times this, is all that must stay positive; else 0."""
 
     def _guard(self, armature: float, a: float, b: float, c: float) -> _Current:
         """Return the factors of a sum of the armature current and the phase currents with weights."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, exp, inf, sin
+from math import inf
 
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.network import Network
@@ -11,19 +11,18 @@ from automax_ros.drive.waves import ZERO_A, first_zero
 Phases = tuple[float, float, float]
 Start = tuple[float, float, float, float, float]
 """At the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
+Span = tuple[float, float, float, float, float, float, float, float]
+"""A ``Start``, then at the limit: sine and cosine of the line's angle, and the decay of the armature's wave."""
 
 
 def next_ending(
-    net: Network, omega: float, state: Start, modes: Phases, limit: float
-) -> tuple[float, int, tuple[float, float, float] | None]:
-    """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs.
-
-    Third, if they were needed: sine and cosine of the line's angle and the armature's decay at the limit.
-    """
-    theta, sine, cosine, k, a = state
+    net: Network, omega: float, span: Span, modes: Phases, limit: float
+) -> tuple[float, int]:
+    """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs."""
+    theta, sine, cosine, k, a, end_sine, end_cosine, fall = span
     decay, decay_s = net.decay, net.decay_s
     first, out = limit, 0
-    ahead, lowest = None, -ZERO_A
+    lowest = -ZERO_A
     for mask, c, d, share, part, wa, wb, wc, bend in net.guards:
         guard_k, guard_a = share * k + part, share * a
         value = c * cosine + d * sine + guard_k + guard_a
@@ -45,11 +44,8 @@ def next_ending(
             least = value if value > 0.0 else 0.0
             if least + first * (slope - 0.5 * bend * first) > 0.0:
                 continue
-            if not out and not guard_b:  # likewise from both ends; the interval probably needs the values there
-                if ahead is None:
-                    angle = theta + omega * limit
-                    ahead = sin(angle), cos(angle), exp(-decay * limit)
-                final = c * ahead[1] + d * ahead[0] + guard_k + guard_a * ahead[2]
+            if not out and not guard_b:  # likewise from both ends
+                final = c * end_cosine + d * end_sine + guard_k + guard_a * fall
                 sag = 0.5 * bend * limit - (final - least) / limit
                 if final > 0.0 and (sag <= 0.0 or 2.0 * bend * least > sag * sag):
                     continue
@@ -61,7 +57,7 @@ def next_ending(
             first, out = zero, mask
     if out and out != net.guards[0][0]:
         net.put_first(out)
-    return first, out, ahead
+    return first, out
 
 
 def next_turn_on(
