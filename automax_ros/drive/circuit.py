@@ -152,6 +152,11 @@ class Circuit(Conduction):
         return numbers_of(self._net.mask)
 
     @property
+    def flows(self) -> bool:
+        """Whether armature current flows."""
+        return self._net.active
+
+    @property
     def idle_s(self) -> float:
         """How long no armature current has flowed up to now, s; 0 while it flows."""
         return 0.0 if self._net.active else (self.now_ns - self._ended_ns) * 1e-9
@@ -184,7 +189,7 @@ class Circuit(Conduction):
         net = self._net
         if net.modes:
             return max(map(abs, self.phase_currents()))
-        return max(map(abs, net.share)) * abs(self.current_a) if net.active else 0.0
+        return net.largest_share * abs(self.current_a) if net.active else 0.0
 
     # What can break
 

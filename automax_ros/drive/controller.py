@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import fmod, pi
 
+from automax_ros.drive.ac_line import Rotation
 from automax_ros.drive.cml.signals import (
     LINE,
     OVERCURRENT,
@@ -54,19 +55,19 @@ class DriveController:
         plant.advance(now_ns)
         circuit, line = plant.circuit, plant.line
         sample = plant.sample()
-        if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.data.parameters.line_v:
+        if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.rated_v:
             status |= LINE
-        if line.rotation.value < 0:
+        if line.rotation is Rotation.CBA:
             status |= ROTATION_ABC
         amps = sample.mean_current_a
         line_a, level_a = circuit.line_a, self.level * plant.rated_amps / 100
         if line_a > level_a or sample.exceeds(level_a):
             status |= OVERCURRENT
-        idle_us = int(circuit.idle_s * 1e6)
+        idle_us = 0 if circuit.flows else int(circuit.idle_s * 1e6)
         voltage = since_ns = 0
         if status & VOLTAGE:
             volts = circuit.emf_v if idle_us else sample.mean_voltage_v
-            voltage = _word(volts * VOLTS / plant.data.parameters.line_v)
+            voltage = _word(volts * VOLTS / plant.rated_v)
         if status & LINE:
             turn = fmod(line.angle(now_ns), TURN)
             since_ns = round((turn if turn >= 0.0 else turn + TURN) / line.omega * 1e9)

@@ -66,7 +66,7 @@ class Network:
 
     __slots__ = (
         "_drop_v", "_omega", "active", "alarms", "armature_short", "bend", "c", "constant", "d", "decay", "decay_s",
-        "floating_offset", "guards", "inductance", "instant", "leg_weights", "mask", "modes", "offsets",
+        "floating_offset", "guards", "inductance", "instant", "largest_share", "leg_weights", "mask", "modes", "offsets",
         "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset", "resistance", "share", "sign",
         "tied", "watches",
     )  # fmt: skip
@@ -121,6 +121,7 @@ class Network:
             if not self.active:
                 self.share = [0.0, 0.0, 0.0]
         self.offsets = [offset + arc for offset, arc in zip(self.offsets, wiring.phase_arc_v, strict=True)]
+        self.largest_share = max(map(abs, self.share))
         self.rail_of_phases = groups
         self.tied = [(g[0], g[1], g[2] if len(g) > 2 else None) for g in groups if len(g) > 1]
         self.modes = bool(self.tied)

@@ -88,6 +88,7 @@ class DrivePlant(Stateful):
     Attributes:
         circuit: line, bridge and motor.
         rated_amps: rated armature current, A.
+        rated_v: nominal line-to-line voltage, V rms.
         meter: what an observer measures by, None while nobody does.
         notes: what is broken, as the verbs of ``plant_faults`` that broke it.
         sag_end_ns: until when the line's voltage sags (ns), 0 where no end is known.
@@ -100,6 +101,7 @@ class DrivePlant(Stateful):
         parameters = data.parameters
         self.data = data
         self.rated_amps = parameters.amps
+        self.rated_v = parameters.line_v
         self.line = AcLine(
             parameters.line_v,
             parameters.line_hz,
@@ -155,11 +157,12 @@ class DrivePlant(Stateful):
         if self._together is not None:
             self._together(until_ns)
             return
+        circuit = self.circuit
         while self._contacts and self._contacts[0][0] <= until_ns:
-            self.circuit.advance(max(self._contacts[0][0], self.circuit.now_ns))
+            circuit.advance(max(self._contacts[0][0], circuit.now_ns))
             self.switch_contacts()
-        if until_ns > self.circuit.now_ns:
-            self.circuit.advance(until_ns)
+        if until_ns > circuit.now_ns:
+            circuit.advance(until_ns)
 
     def go_together(self, advance: Callable[[int], None]) -> None:
         """Let somebody pass this plant's time with another's: ``plant_coupling``."""

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from automax_ros.drive.cml.outputs import Outputs
     from automax_ros.drive.cml.pll import Pll
 
+COUNTS = FULL * 100 / RATED
+"""Counts of feedback per unit of ``Measured.current`` where LIM_BAR is 1 %."""
 LONGEST_ZERO_US = 3472
 """Largest DC_TIME, us (52.2.1)."""
 FRESH_SCANS = 2
@@ -72,7 +74,7 @@ class CurrentControl(Stateful):
 
     def feed_back(self, measured: Measured, lim_bar: int, period_ns: int) -> None:
         """Scale the mean current of the last scan, 4095 counts at LIM_BAR: once each scan, whatever the drive does."""
-        counts = measured.current * (FULL * 100 / RATED) / lim_bar
+        counts = measured.current * COUNTS / lim_bar
         zero_us = measured.zero_us
         # DC_TIME is in whole us, and the scan a little longer.
         self.part = max(0.0, 1.0 - zero_us * 6000 / (period_ns - 12_000)) if zero_us else 1.0
@@ -155,11 +157,12 @@ class CurrentControl(Stateful):
 
     def show(self, outputs: Outputs) -> None:
         """Write the loop's outputs; to be called in run alone, they are held in standby (52.2.1)."""
+        chain, regulator = self.chain, self.regulator
         outputs.dc_time = self.dc_time
-        outputs.bridge_pol = self.bridge == 2
-        outputs.ref_rate_out, outputs.ref_lag_out = round(self.chain.rate_out), round(self.chain.lag_out)
-        outputs.fdbk_gain, outputs.i_fdbk = self.regulator.fdbk_gain, self.i_fdbk
-        outputs.integral_gain, outputs.delta = self.regulator.integral_gain, round(self.regulator.delta_us)
+        outputs.bridge_pol = self.change.bridge == 2
+        outputs.ref_rate_out, outputs.ref_lag_out = round(chain.rate_out), round(chain.lag_out)
+        outputs.fdbk_gain, outputs.i_fdbk = regulator.fdbk_gain, self.i_fdbk
+        outputs.integral_gain, outputs.delta = regulator.integral_gain, round(regulator.delta_us)
 
     def _take(self, bridge: int, delta_us: float) -> None:
         """Begin to use a bridge that has no current at a DELTA, us."""

@@ -74,12 +74,14 @@ class Feeding(Stateful):
             next_ns: how long it is, ns.
             flow_ns: for how long a pair conducts, ns; not longer than to the next.
         """
-        word, most = (pulses[0].gates, 0) if pulses else (self.word, 0)
+        fed, began_ns = self.word, self.began_ns
+        word, most = (pulses[0].gates, 0) if pulses else (fed, 0)
         for after_ns, _, gates in (*pulses, (next_ns, 0, 0)):
-            carries_ns = min(after_ns, self.began_ns + flow_ns) - max(self.began_ns, 0)
+            end_ns = began_ns + flow_ns
+            carries_ns = (after_ns if after_ns < end_ns else end_ns) - (began_ns if began_ns > 0 else 0)
             if carries_ns > most:
-                word, most = self.word, carries_ns
+                word, most = fed, carries_ns
             if gates:
-                self.word, self.began_ns = gates, after_ns
-        self.began_ns -= next_ns
+                fed, began_ns = gates, after_ns
+        self.word, self.began_ns = fed, began_ns - next_ns
         return word

@@ -10,8 +10,11 @@ CC_THRESH, for which no clock is told, is read each tick (decision).
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from automax_ros.blocks.cml_limits import ioc_is_possible, is_good
 from automax_ros.drive.cml.inputs import Inputs
+from automax_ros.drive.cml.pll import LONGEST_NS, SHORTEST_NS
 from automax_ros.drive.state import Stateful
 
 TICK_NS = 5_500_000
@@ -25,6 +28,12 @@ BAD_DYNAMIC, BAD_FIXED, BAD_LEVEL = 7105, 7106, 7107
 _LIMITED = ("ac_line_freq", "ref_lag", "pi_w_lead", "ag_factor", "max_m_dropout", "ioc_thresh", "lim_bar", "osv_thresh")
 _SWITCHES = ("digital_tach", "tach_loss_stop", "auto_phrot")
 _DYNAMIC = ("cc_thresh", "ref_rate", "kp", "test_alpha")
+
+
+@lru_cache(maxsize=64)
+def _is_rate_at_any_line(ref_rate: float) -> bool:
+    """Return whether REF_RATE has a value (s) within its limits whatever period the line may be measured to have."""
+    return all(is_good("REF_RATE", ref_rate, 1e9 / period_ns) for period_ns in (SHORTEST_NS, LONGEST_NS))
 
 
 class Latched(Stateful):
@@ -95,9 +104,10 @@ class Latched(Stateful):
         """
         self.cml_coast_stop = inputs.cml_coast_stop
         problems = self._read("kp", inputs.kp, 0.0) if inputs.kp != self.kp or self._bad else []
-        if inputs.ref_rate or self._bad:
-            problems += self._read("ref_rate", inputs.ref_rate, 1e9 / period_ns)
-        else:
+        rate = inputs.ref_rate
+        if self._bad or (rate and not (rate == self.ref_rate and _is_rate_at_any_line(rate))):
+            problems += self._read("ref_rate", rate, 1e9 / period_ns)
+        elif not rate:
             self.ref_rate = 0.0
         if self.cml_test and (inputs.test_alpha != self.test_alpha or self._bad):
             problems += self._read("test_alpha", inputs.test_alpha, 0.0)
