@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterable
 from dataclasses import asdict, replace
+from heapq import heappop, heappush
 
 from automax_ros.drive.errors import GateError, require
 from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, numbers_of
@@ -67,7 +67,7 @@ class Bridge(Stateful):
             raise GateError("an S6 has no bridge 2: only the SCRs 1 to 6 can be fired")
         if off_ns <= on_ns:
             raise GateError(f"a gate window from {on_ns} to {off_ns} ns is empty")
-        heapq.heappush(self.pending, (on_ns, off_ns, mask))
+        heappush(self.pending, (on_ns, off_ns, mask))
 
     def cancel(self, now_ns: int) -> None:
         """Take back every gate window, begun or to come, as when pulses are suppressed; what conducts stays on."""
@@ -78,35 +78,39 @@ class Bridge(Stateful):
     def begin_gates(self, now_ns: int) -> int:
         """Begin every window that is due; returns the mask of fired SCRs whose gate lead is open."""
         lost = 0
-        while self.pending and self.pending[0][0] <= now_ns:
-            _, off_ns, mask = heapq.heappop(self.pending)
-            lost |= mask & self.open_gates
-            mask &= ~self.open_gates
+        pending, ends = self.pending, self.gate_end_ns
+        while pending and pending[0][0] <= now_ns:
+            _, off_ns, mask = heappop(pending)
+            if self.open_gates:
+                lost |= mask & self.open_gates
+                mask &= ~self.open_gates
             self.gated |= mask
             while mask:
                 low = mask & -mask
-                self.gate_end_ns[low.bit_length() - 1] = off_ns
+                ends[low.bit_length() - 1] = off_ns
                 mask ^= low
         return lost
 
     def candidates(self, now_ns: float, conducting: int) -> int:
         """Return the SCRs that forward voltage would turn on now: gated ones, and those not recovered."""
-        waiting = (self.gated | self.recovering) & ~conducting
+        gated, recovering = self.gated, self.recovering
+        waiting = (gated | recovering) & ~conducting
         mask = 0
         while waiting:
             low = waiting & -waiting
             waiting ^= low
             bit = low.bit_length() - 1
-            if self.gated & low:
+            if gated & low:
                 if self.gate_end_ns[bit] > now_ns:
                     mask |= low
                 else:
-                    self.gated ^= low
-            if self.recovering & low:
+                    gated ^= low
+            if recovering & low:
                 if self.recovered_ns[bit] > now_ns:
                     mask |= low
                 elif self.rest_ns[bit] <= now_ns:
-                    self.recovering ^= low
+                    recovering ^= low
+        self.gated, self.recovering = gated, recovering
         return mask
 
     def window_end_ns(self, mask: int, now_ns: float) -> float:

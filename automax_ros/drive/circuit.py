@@ -98,7 +98,8 @@ class Circuit(Conduction):
         """
         if until_ns < self.now_ns:
             raise ParameterError(f"cannot go back from {self.now_ns} to {until_ns} ns")
-        bridge, line, pending = self.bridge, self.line, self.bridge.pending
+        bridge, line, machine, pending = self.bridge, self.line, self.machine, self.bridge.pending
+        longest_ns = self._step_ns
         while True:
             now = self.now_ns
             if now >= until_ns:
@@ -110,11 +111,11 @@ class Circuit(Conduction):
                 if lost:
                     for number in numbers_of(lost):
                         self._emit(EventKind.GATE_OPEN, 0.0, number)
-            stop = now + self.machine.step_ns
+            stop = now + machine.step_ns
             if stop > until_ns:  # noqa: PLR1730 - min() costs a call
                 stop = until_ns
-            if self._step_ns and stop > now + self._step_ns:
-                stop = now + self._step_ns
+            if longest_ns and stop > now + longest_ns:
+                stop = now + longest_ns
             if stop > line.next_change_ns:  # noqa: PLR1730
                 stop = line.next_change_ns
             if pending and stop > pending[0][0]:

@@ -74,9 +74,8 @@ class Conduction(Stateful):
         total = (stop_ns - start_ns) * 1e-9
         theta = line.start_angle + omega * ((start_ns - line.start_ns) * 1e-9)
         emf = self._emf = machine.emf(total)
-        net, current = self._net, self.current_a
-        began_a = current
-        modes = self._modes
+        net, modes = self._net, self._modes
+        began_a = current = self.current_a
         sine, cosine = sin(theta), cos(theta)
         t = charge = 0.0
         while True:
@@ -97,27 +96,22 @@ class Conduction(Stateful):
                     when, mask = next_turn_on(
                         net, bridge, omega, emf, wanted, now_ns, (theta, sine, cosine, k, a), left
                     )
-                    if when == 0.0:
-                        self.current_a, self._modes = current, modes
-                        net = self._switch(0, mask, start_ns, t, sine, cosine)
-                        current, modes = self.current_a, self._modes
-                        continue
                     if when < first:
                         first, on = when, mask
-            end = theta + omega * first
-            end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
-            after = c * end_cosine + d * end_sine + k + a * fall
-            # How far a current can leave the straight line from one end to the other.
-            sag = 0.125 * (net.bend + decay * decay * (a if a >= 0.0 else -a)) * first * first
-            sign = net.sign
-            if net.guards and (sign * current <= sag or sign * after <= sag):
-                state = theta, sine, cosine, k, a, end_sine, end_cosine, fall
-                when, mask = next_ending(net, omega, state, modes, first)
-                if mask:
-                    first, out, on = when, mask, 0
-                    end = theta + omega * first
-                    end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
-                    after = c * end_cosine + d * end_sine + k + a * fall
+            if first > 0.0:
+                end = theta + omega * first
+                end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
+                after = c * end_cosine + d * end_sine + k + a * fall
+                # How far the current can leave the straight line from one end to the other.
+                sag = 0.125 * (net.bend + decay * decay * (a if a >= 0.0 else -a)) * first * first
+                if net.guards and (net.sign * current <= sag or net.sign * after <= sag):
+                    span = theta, sine, cosine, k, a, end_sine, end_cosine, fall
+                    when, mask = next_ending(net, omega, span, modes, first)
+                    if mask:
+                        first, out, on = when, mask, 0
+                        end = theta + omega * first
+                        end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
+                        after = c * end_cosine + d * end_sine + k + a * fall
             if first > 0.0:
                 if net.active:
                     charge += (
@@ -163,8 +157,9 @@ class Conduction(Stateful):
         if len(self._pieces) > PIECES_KEPT:
             self._square += sum(Piece(*piece).square() for piece in self._pieces)
             self._pieces.clear()
-        if self.machine.turns:
-            self.machine.advance(total, charge, change_a)
+        machine = self.machine
+        if machine.turns:
+            machine.advance(total, charge, change_a)
         if self.energy is not None:
             angle = self.line.angle(stop_ns)
             squares = sum(phase**2 for phase in self._phases(self._net, self.current_a, sin(angle), cos(angle)))
@@ -174,16 +169,17 @@ class Conduction(Stateful):
         """Let SCRs go out (or arcs end), or turn on, at an instant; return the circuit from then on."""
         old = self._net
         phases = self._phases(old, self.current_a, sine, cosine)
+        now_ns = start_ns + t * 1e9
         if on:
-            self._note_turn_on(on, start_ns, t)
+            self._note_turn_on(on, now_ns, t)
         if out >> 12:
             self._open(out, t)
         net = self._enter((old.mask | on) & ~out, phases, sine, cosine)
         if old.active and not net.active:
-            self._ended_ns = start_ns + t * 1e9
+            self._ended_ns = now_ns
         gone = old.mask & ~net.mask
         if gone:
-            self.bridge.put_out(gone, start_ns + t * 1e9)
+            self.bridge.put_out(gone, now_ns)
             if old.modes and not old.alarms and out:
                 self._note_failed_commutation(out, net.mask, t)
         if self._trace or net.alarms & ~old.alarms:
@@ -297,15 +293,15 @@ class Conduction(Stateful):
 
     # What is told
 
-    def _note_turn_on(self, on: int, start_ns: int, t: float) -> None:
+    def _note_turn_on(self, on: int, now_ns: float, t: float) -> None:
         bridge = self.bridge
         for number in numbers_of(on):
             bit = BIT[number]
             self._newest[bit >> 1 & 1] = number
-            bridge.on_ns[bit] = start_ns + t * 1e9
+            bridge.on_ns[bit] = now_ns
             if self._trace:
                 self._emit(EventKind.TURN_ON, t, number)
-            if not bridge.gated >> bit & 1 or bridge.gate_end_ns[bit] <= start_ns + t * 1e9:
+            if not bridge.gated >> bit & 1 or bridge.gate_end_ns[bit] <= now_ns:
                 self._emit(EventKind.COMMUTATION_FAILURE, t, number)
 
     def _note_failed_commutation(self, out: int, left: int, t: float) -> None:

@@ -226,9 +226,9 @@ class Motor(Stateful):
         field = self.field
         if field is not None and field.current != field.voltage:
             self.k_v_s = self.data.k_v_s * field.flux(half)
-        self._emf = self.k_v_s * (self.speed_rad_s + self.acceleration * half)
-        self._emf += self._owed_v_s / max(duration_s, REPAID_S)
-        return self._emf
+        emf = self.k_v_s * (self.speed_rad_s + self.acceleration * half)
+        self._emf = emf = emf + self._owed_v_s / (duration_s if duration_s > REPAID_S else REPAID_S)
+        return emf
 
     def load_torque(self, speed_rad_s: float) -> float:
         """Return the load torque (N m) now, at a speed."""
@@ -240,8 +240,8 @@ class Motor(Stateful):
 
     def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
         """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
-        before = self.speed_rad_s
-        self.torque_n_m = torque = self.k_v_s * charge_c / duration_s
+        before, k_v_s = self.speed_rad_s, self.k_v_s
+        self.torque_n_m = torque = k_v_s * charge_c / duration_s
         if self.held:
             self._hold(duration_s, torque)
             mean = before
@@ -253,10 +253,12 @@ class Motor(Stateful):
             after = self.speed_rad_s
             self.acceleration = (after - before) / duration_s
             # The mean speed: of both ends, less what a torque that rose in between came too late for.
-            mean = 0.5 * (before + after) - self.k_v_s * change_a * duration_s / (12.0 * self.inertia_kg_m2)
-        self._owed_v_s += (self.k_v_s * mean - self._emf) * duration_s
-        self._smooth += (self.acceleration - self._smooth) * (duration_s / (duration_s + SMOOTH_S))
-        slope = abs(self.k_v_s * self._smooth)
+            mean = 0.5 * (before + after) - k_v_s * change_a * duration_s / (12.0 * self.inertia_kg_m2)
+        self._owed_v_s += (k_v_s * mean - self._emf) * duration_s
+        self._smooth = smooth = self._smooth + (self.acceleration - self._smooth) * (
+            duration_s / (duration_s + SMOOTH_S)
+        )
+        slope = abs(k_v_s * smooth)
         if slope * LONGEST_S2 < HELD_V_S:
             self.step_ns = LONGEST_NS
         else:
@@ -311,9 +313,9 @@ class Motor(Stateful):
 
     def _hold(self, time_s: float, torque: float) -> None:
         """Let a torque (N m) act for a time on a shaft whose speed something keeps: that takes what is left of it."""
-        speed = self.speed_rad_s
-        rubbing = self.data.coulomb_n_m * ((speed > 0.0) - (speed < 0.0))
-        left = torque + self.coupling_n_m - rubbing - self.data.viscous_n_m_s * speed
+        data, speed = self.data, self.speed_rad_s
+        rubbing = data.coulomb_n_m * ((speed > 0.0) - (speed < 0.0))
+        left = torque + self.coupling_n_m - rubbing - data.viscous_n_m_s * speed
         self._move(time_s, speed, torque, left, rubbing)
 
     def _move(self, time_s: float, mean_speed: float, torque: float, load: float, rubbing: float) -> None:

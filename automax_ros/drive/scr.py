@@ -63,6 +63,11 @@ def mask_of(numbers: Iterable[int]) -> int:
     Raises:
         GateError: there is no SCR of that number.
     """
+    return _mask_of(tuple(numbers))
+
+
+@lru_cache(maxsize=4096)
+def _mask_of(numbers: tuple[int, ...]) -> int:
     mask = 0
     for number in numbers:
         if number not in MASK:

@@ -15,9 +15,7 @@ Span = tuple[float, float, float, float, float, float, float, float]
 """A ``Start``, then at the limit: sine and cosine of the line's angle, and the decay of the armature's wave."""
 
 
-def next_ending(
-    net: Network, omega: float, span: Span, modes: Phases, limit: float
-) -> tuple[float, int]:
+def next_ending(net: Network, omega: float, span: Span, modes: Phases, limit: float) -> tuple[float, int]:
     """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs."""
     theta, sine, cosine, k, a, end_sine, end_cosine, fall = span
     decay, decay_s = net.decay, net.decay_s

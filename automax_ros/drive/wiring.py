@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from automax_ros.drive.scr import P
 
@@ -29,7 +30,7 @@ class Wiring:
     armature_closed: bool = True
     armature_arc_v: float = 0.0
 
-    @property
+    @cached_property
     def arcing(self) -> bool:
         """Whether a phase or the contactor is opening."""
         return self.armature_arc_v != 0.0 or self.phase_arc_v != (0.0, 0.0, 0.0)

@@ -24,6 +24,7 @@ def _words(order: tuple[int, ...], add: int) -> tuple[int, ...]:
 _GATES = {
     (bridge, order is REVERSED): _words(order, 10 * (bridge - 1)) for bridge in (1, 2) for order in (STANDARD, REVERSED)
 }
+_new = tuple.__new__
 
 
 class Firing(Stateful):
@@ -76,7 +77,7 @@ class Firing(Stateful):
         words = _GATES[bridge, reverse]
         after = delay - (count - newest) * sixth
         if number == newest and after >= earliest_ns:
-            return (Pulse(after, sixth, words[(position - count + number) % 6]),)
+            return (_new(Pulse, (after, sixth, words[(position - count + number) % 6])),)
         planned = []
         while number <= newest:
             after = delay - (count - number) * sixth
