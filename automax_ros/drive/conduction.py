@@ -83,32 +83,28 @@ class Conduction(Stateful):
             if left <= 0.0:
                 break
             out = on = 0
-            c = d = k = a = 0.0
-            decay = net.decay
+            c, d, decay = net.c, net.d, net.decay
+            k = a = 0.0
             if net.active:
-                c, d = net.c, net.d
                 k = (net.constant - emf) / net.resistance
                 a = current - c * cosine - d * sine - k
             if (bridge.gated | bridge.recovering) & ~net.mask:
-                now_ns = start_ns + t * 1e9
-                wanted = bridge.candidates(now_ns, net.mask)
-                if wanted:
-                    when, mask = next_turn_on(
-                        net, bridge, omega, emf, wanted, now_ns, (theta, sine, cosine, k, a), left
-                    )
-                    if when < first:
-                        first, on = when, mask
+                state = theta, sine, cosine, k, a
+                when, mask = next_turn_on(net, bridge, omega, emf, start_ns + t * 1e9, state, left)
+                if when < first:
+                    first, on = when, mask
+            sign = net.sign
+            if net.guards and not sign and first > 0.0:
+                first, out = next_ending(net, omega, (theta, sine, cosine, k, a), modes, first)
             if first > 0.0:
                 end = theta + omega * first
                 end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
                 after = c * end_cosine + d * end_sine + k + a * fall
                 # How far the current can leave the straight line from one end to the other.
                 sag = 0.125 * (net.bend + decay * decay * (a if a >= 0.0 else -a)) * first * first
-                if net.guards and (net.sign * current <= sag or net.sign * after <= sag):
-                    span = theta, sine, cosine, k, a, end_sine, end_cosine, fall
-                    when, mask = next_ending(net, omega, span, modes, first)
-                    if mask:
-                        first, out, on = when, mask, 0
+                if sign and (sign * current <= sag or sign * after <= sag):
+                    first, out = next_ending(net, omega, (theta, sine, cosine, k, a), modes, first)
+                    if out:
                         end = theta + omega * first
                         end_sine, end_cosine, fall = sin(end), cos(end), exp(-decay * first)
                         after = c * end_cosine + d * end_sine + k + a * fall
@@ -132,7 +128,7 @@ class Conduction(Stateful):
                 t = t + first if first < left else total
             if out or on:
                 self.current_a, self._modes = current, modes
-                net = self._switch(out, on, start_ns, t, sine, cosine)
+                net = self._switch(out, 0 if out else on, start_ns, t, sine, cosine)
                 current, modes = self.current_a, self._modes
         self.current_a, self._modes = current, modes
         self._finish(stop_ns, total, charge, current - began_a)
@@ -168,13 +164,17 @@ class Conduction(Stateful):
     def _switch(self, out: int, on: int, start_ns: int, t: float, sine: float, cosine: float) -> Network:
         """Let SCRs go out (or arcs end), or turn on, at an instant; return the circuit from then on."""
         old = self._net
-        phases = self._phases(old, self.current_a, sine, cosine)
         now_ns = start_ns + t * 1e9
         if on:
             self._note_turn_on(on, now_ns, t)
         if out >> 12:
             self._open(out, t)
-        net = self._enter((old.mask | on) & ~out, phases, sine, cosine)
+        mask = (old.mask | on) & ~out
+        net = self._nets.get(mask) or self._network(mask)
+        if net.modes or net.instant or self.bridge.wiring.arcing:
+            net = self._enter(mask, self._phases(old, self.current_a, sine, cosine), sine, cosine)
+        else:
+            self._take(net)
         if old.active and not net.active:
             self._ended_ns = now_ns
         gone = old.mask & ~net.mask
@@ -191,9 +191,7 @@ class Conduction(Stateful):
         net = self._nets.get(mask) or self._network(mask)
         if net.instant or self.bridge.wiring.arcing:
             net, phases = self._clear_up(net, phases, sine, cosine)
-        if not net.active:
-            self.current_a = 0.0
-        self._modes = _NO_MODES
+        self._take(net)
         if net.modes and net.decay_s < inf:
             modes = [0.0, 0.0, 0.0]
             for x, y, z in net.tied:
@@ -205,8 +203,14 @@ class Conduction(Stateful):
                     last = phases[z] - mean - net.phase_c[z] * cosine - net.phase_d[z] * sine - net.phase_k[z]
                     modes[y], modes[z] = -first - last, last
             self._modes = (modes[0], modes[1], modes[2])
-        self._net = net
         return net
+
+    def _take(self, net: Network) -> None:
+        """Go on with a circuit, without modes of the source so far."""
+        if not net.active:
+            self.current_a = 0.0
+        self._modes = _NO_MODES
+        self._net = net
 
     def _clear_up(self, net: Network, phases: Phases, sine: float, cosine: float) -> tuple[Network, Phases]:
         """Commutate what has no source impedance, open arcs without current; return the circuit and phase currents."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import cos, exp, inf, sin
 
 from automax_ros.drive.bridge import Bridge
 from automax_ros.drive.network import Network
@@ -11,23 +11,23 @@ from automax_ros.drive.waves import ZERO_A, first_zero
 Phases = tuple[float, float, float]
 Start = tuple[float, float, float, float, float]
 """At the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
-Span = tuple[float, float, float, float, float, float, float, float]
-"""A ``Start``, then at the limit: sine and cosine of the line's angle, and the decay of the armature's wave."""
 
 
-def next_ending(net: Network, omega: float, span: Span, modes: Phases, limit: float) -> tuple[float, int]:
+def next_ending(net: Network, omega: float, state: Start, modes: Phases, limit: float) -> tuple[float, int]:
     """Return when (s from now, at most a limit) the first current ends, and whose: a mask of SCRs and arcs."""
-    theta, sine, cosine, k, a, end_sine, end_cosine, fall = span
+    theta, sine, cosine, k, a = state
     decay, decay_s = net.decay, net.decay_s
+    mode_a, mode_b, mode_c = modes
     first, out = limit, 0
     lowest = -ZERO_A
+    end_sine = end_cosine = fall = 0.0
     for mask, c, d, share, part, wa, wb, wc, bend in net.guards:
         guard_k, guard_a = share * k + part, share * a
         value = c * cosine + d * sine + guard_k + guard_a
         slope = omega * (d * cosine - c * sine) - decay * guard_a
         if guard_a < 0.0:
             bend -= decay * decay * guard_a  # noqa: PLW2901
-        guard_b = wa * modes[0] + wb * modes[1] + wc * modes[2] if net.modes else 0.0
+        guard_b = wa * mode_a + wb * mode_b + wc * mode_c
         if guard_b:
             value += guard_b
             slope -= decay_s * guard_b
@@ -43,6 +43,9 @@ def next_ending(net: Network, omega: float, span: Span, modes: Phases, limit: fl
             if least + first * (slope - 0.5 * bend * first) > 0.0:
                 continue
             if not out and not guard_b:  # likewise from both ends
+                if not fall:
+                    angle = theta + omega * limit
+                    end_sine, end_cosine, fall = sin(angle), cos(angle), exp(-decay * limit)
                 final = c * end_cosine + d * end_sine + guard_k + guard_a * fall
                 sag = 0.5 * bend * limit - (final - least) / limit
                 if final > 0.0 and (sag <= 0.0 or 2.0 * bend * least > sag * sag):
@@ -63,7 +66,6 @@ def next_turn_on(
     bridge: Bridge,
     omega: float,
     emf: float,
-    wanted: int,
     now_ns: float,
     state: Start,
     limit: float,
@@ -73,6 +75,9 @@ def next_turn_on(
     ``state`` is the line's angle, its sine and cosine, and k and a of the armature current. No SCR with a time
     means that nothing is known beyond it: some SCR rests until then.
     """
+    wanted = bridge.candidates(now_ns, net.mask)
+    if not wanted:
+        return inf, 0
     theta, sine, cosine, k, a = state
     decay = net.decay
     soonest, who = inf, 0
