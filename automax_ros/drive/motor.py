@@ -320,7 +320,8 @@ class Motor(Stateful):
 
     def _move(self, time_s: float, mean_speed: float, torque: float, load: float, rubbing: float) -> None:
         way = mean_speed * time_s
-        self.angle_rad = fmod(self.angle_rad + way, TURN)
+        angle = self.angle_rad + way
+        self.angle_rad = angle if -TURN < angle < TURN else fmod(angle, TURN)
         self.shaft_j += torque * way
         self.load_j += load * way
         self.friction_j += (rubbing + self.data.viscous_n_m_s * mean_speed) * way

@@ -116,7 +116,8 @@ class CurrentMinorLoop(Stateful):
         if sequence.under_way:
             problems += self._go_on(now_ns, inputs, verdict)
         pulses = self._fire(measured)
-        block, ok = not sequence.running or self.control.block, self.latched.usable and not self.faults.active
+        block = sequence.phase < _RUN or self.control.block
+        ok = self.latched.usable and not self.faults.active
         # Named tuples are made as tuples are: their own way takes twice the time.
         values = pll.next_ns, sequence.relays, pulses, self.latched.ioc_thresh, block, ok
         row = self._row(measured) if ticked else None
@@ -188,22 +189,22 @@ class CurrentMinorLoop(Stateful):
 
     def _fire(self, measured: Measured) -> tuple[Pulse, ...]:
         """Plan the gates up to the next interrupt, as the regulator or the test in use has them."""
-        pll, latched, phase = self.pll, self.latched, self.sequence.phase
+        pll, latched, phase, control = self.pll, self.latched, self.sequence.phase, self.control
         reverse = _reverse(measured)
-        if not self.sequence.running:
-            none = self.control.off()
+        if phase < _RUN:
+            none = control.off()
             if phase is _SCR_TEST:
                 return self.scr_test.fire(pll.position, pll.period_ns, reverse=reverse)
             return none
         stopping = phase is not _RUN
         if stopping:
-            self.control.chain.begin()
+            control.chain.begin()
         if latched.cml_test:
             delta_us = 0.0 if stopping else (180 - latched.test_alpha) * pll.period_ns / 360_000
-            pulses = self.control.open_loop(delta_us, 2 if latched.test_brpol else 1, pll, reverse=reverse)
+            pulses = control.open_loop(delta_us, 2 if latched.test_brpol else 1, pll, reverse=reverse)
         else:
-            pulses = self.control.scan(measured, 0 if stopping else latched.reference, latched, pll, reverse=reverse)
-        self.control.show(self.outputs)
+            pulses = control.scan(measured, 0 if stopping else latched.reference, latched, pll, reverse=reverse)
+        control.show(self.outputs)
         self.faults.note_delta(self.outputs.delta)
         return pulses
 
@@ -221,11 +222,11 @@ class CurrentMinorLoop(Stateful):
 
     def _record(self, pulses: tuple[Pulse, ...]) -> tuple[int, int, int] | None:
         """Return the record of a scan for DIAG_DATA: only while the loop regulates (52.3.2)."""
-        if not self.sequence.running or self.latched.cml_test:
+        if self.sequence.phase < _RUN or self.latched.cml_test:
             return None
-        next_ns = self.pll.next_ns
+        next_ns, outputs = self.pll.next_ns, self.outputs
         gates = self.feeding.follow(pulses, next_ns, int(self.control.part * next_ns))
-        return self.outputs.i_fdbk, self.outputs.ref_lag_out, gates
+        return outputs.i_fdbk, outputs.ref_lag_out, gates
 
     # What is kept
 
