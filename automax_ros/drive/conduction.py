@@ -157,7 +157,7 @@ class Conduction(Stateful):
         if machine.turns:
             machine.advance(total, charge, change_a)
         if self.energy is not None:
-            angle = self.line.angle(stop_ns)
+            angle = self.line.angle(stop_ns) if self._net.modes else 0.0
             squares = sum(phase**2 for phase in self._phases(self._net, self.current_a, sin(angle), cos(angle)))
             self.energy.stored_j = 0.5 * (self._z.l * self.current_a**2 + self._z.ls * squares)
 

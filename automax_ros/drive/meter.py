@@ -137,23 +137,52 @@ class EnergyMeter(Stateful):
             modes: decaying parts of the three phases' source modes at the start, A.
         """
         theta, duration, k, a = interval
+        if not net.modes:
+            if net.active:
+                moments = Moments(theta, line.omega, net.decay, inf, duration)
+                self._add_one(net, line, z, wiring, emf_v, (net.c, net.d, k, a, 0.0), moments)
+            return
         if not net.active:
             k = a = 0.0
-        moments = Moments(theta, line.omega, net.decay, net.decay_s if net.modes else inf, duration)
+        moments = Moments(theta, line.omega, net.decay, net.decay_s, duration)
         current: Wave = (net.c, net.d, k, a, 0.0) if net.active else (0.0, 0.0, 0.0, 0.0, 0.0)
         charge = moments.single(current)
-        heat = z.r * moments.product(current, current)
+        heat = z.r * moments.square(current)
         drop = -net.rail_offset * charge
         for x in range(3):
             share = net.share[x]
             wave: Wave = (share * net.c + net.phase_c[x], share * net.d + net.phase_d[x],
                           share * k + net.phase_k[x], share * a, modes[x])  # fmt: skip
             cosine, sine = line.unit_wave(x)
-            self.source_j += moments.product(wave, (line.amplitude_v * cosine, line.amplitude_v * sine, 0.0, 0.0, 0.0))
-            heat += z.rs * moments.product(wave, wave)
+            self.source_j += moments.with_voltage(wave, line.amplitude_v * cosine, line.amplitude_v * sine)
+            heat += z.rs * moments.square(wave)
             through = moments.single(wave)
             drop += (net.offsets[x] - wiring.phase_arc_v[x]) * through
             self.arc_j += wiring.phase_arc_v[x] * through
+        self._count(heat, drop, charge, emf_v, wiring)
+
+    def _add_one(
+        self, net: Network, line: AcLine, z: Impedances, wiring: Wiring, emf_v: float, current: Wave, moments: Moments
+    ) -> None:
+        """Add an interval in which one current flows, through the armature and a phase of each rail: most of them."""
+        charge, square = moments.single(current), moments.square(current)
+        heat = z.r * square
+        drop = -net.rail_offset * charge
+        volts_c = volts_d = 0.0
+        for share, offset, arc_v, (cosine, sine) in zip(
+            net.share, net.offsets, wiring.phase_arc_v, map(line.unit_wave, range(3)), strict=True
+        ):
+            if share:
+                volts_c += share * cosine
+                volts_d += share * sine
+                heat += z.rs * share * share * square
+                drop += (offset - arc_v) * share * charge
+                self.arc_j += arc_v * share * charge
+        self.source_j += moments.with_voltage(current, line.amplitude_v * volts_c, line.amplitude_v * volts_d)
+        self._count(heat, drop, charge, emf_v, wiring)
+
+    def _count(self, heat: float, drop: float, charge: float, emf_v: float, wiring: Wiring) -> None:
+        """Count what a charge through the armature brings, and what was lost on its way, J."""
         self.arc_j += wiring.armature_arc_v * charge
         self.resistance_j += heat
         self.drop_j += drop

@@ -153,7 +153,7 @@ class Piece(NamedTuple):
         """Return the integral of the current's square (A^2 s)."""
         moments = Moments(self.theta, self.omega, self.decay, inf, self.duration_s)
         wave = (self.c, self.d, self.k, self.a, 0.0)
-        return moments.product(wave, wave)
+        return moments.square(wave)
 
     def extremes(self) -> tuple[float, float]:
         """Return the least and the greatest current (A) of the interval."""
@@ -218,15 +218,22 @@ class Moments:
         c, d, k, a, b = wave
         return c * self.cosine + d * self.sine + k * self.duration + a * self.a + b * self.b
 
-    def product(self, one: Wave, two: Wave) -> float:
-        """Return the integral of the product of two waves."""
-        c, d, k, a, b = two
+    def square(self, wave: Wave) -> float:
+        """Return the integral of a wave's square."""
+        c, d, k, a, b = wave
         return (
-            one[0] * (c * self._cc + d * self._cs + k * self.cosine + a * self._ca + b * self._cb)
-            + one[1] * (c * self._cs + d * self._ss + k * self.sine + a * self._sa + b * self._sb)
-            + one[2] * self.single(two)
-            + one[3] * (c * self._ca + d * self._sa + k * self.a + a * self._aa + b * self._ab)
-            + one[4] * (c * self._cb + d * self._sb + k * self.b + a * self._ab + b * self._bb)
+            c * (c * self._cc + 2 * (d * self._cs + k * self.cosine + a * self._ca + b * self._cb))
+            + d * (d * self._ss + 2 * (k * self.sine + a * self._sa + b * self._sb))
+            + k * (k * self.duration + 2 * (a * self.a + b * self.b))
+            + a * (a * self._aa + 2 * b * self._ab)
+            + b * b * self._bb
+        )
+
+    def with_voltage(self, wave: Wave, by_c: float, by_d: float) -> float:
+        """Return the integral of a wave times a sinusoidal voltage, whose factors c and d are given."""
+        c, d, k, a, b = wave
+        return by_c * (c * self._cc + d * self._cs + k * self.cosine + a * self._ca + b * self._cb) + by_d * (
+            c * self._cs + d * self._ss + k * self.sine + a * self._sa + b * self._sb
         )
 
 

@@ -23,7 +23,7 @@ Progress = Mapping[str, Any]
 
 
 class HeardMemory:
-    """Memory as a scan under way uses it: ``heard`` is all that it was given since somebody set that to nothing.
+    """Memory as a scan under way uses it: ``heard`` is all that it was given since it began.
 
     After ``tell`` it gives what an earlier scan was given and writes nothing, until ``live``.
     """
@@ -39,6 +39,11 @@ class HeardMemory:
     def now_ns(self) -> int:
         """The time of what happens next."""
         return self._memory.now_ns if self._told is None else self.latched_ns
+
+    def begin(self) -> None:
+        """Begin a scan, which has heard nothing and has not latched: the scan before leaves nothing in its progress."""
+        self.heard = []
+        self.latched_ns = 0
 
     def tell(self, heard: Sequence[Any], latched_ns: int) -> None:
         """Give what a scan was given that latched at an instant, in place of what memory holds."""

@@ -173,7 +173,7 @@ class Task:
         self.heed_forces()
         if self._scans is not None:
             self._put_down()
-        self._heard.heard = []
+        self._heard.begin()
         self._under_way = scan = ScanUnderWay(now_ns, skipped, self._state[:], None, self._heard)
         if self._arrays:
             self._copy_arrays(scan.state)

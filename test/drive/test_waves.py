@@ -78,18 +78,20 @@ def test_a_current_that_begins_at_zero():
 
 
 @settings(repeatable, max_examples=40)
-@given(waves, waves, st.floats(0, 6), decays, st.floats(1e-5, 5e-3))
-def test_integrals_of_products(one, two, theta, rates, duration):
+@given(waves, st.tuples(factor, factor), st.floats(0, 6), decays, st.floats(1e-5, 5e-3))
+def test_integrals_of_squares_and_of_power(one, volts, theta, rates, duration):
     moments = Moments(theta, OMEGA, *rates, duration)
-    scale = duration * max(map(abs, one)) * max(1.0, *map(abs, two)) * 25 + 1e-9
+    two = (*volts, 0.0, 0.0, 0.0)
+    scale = duration * max(map(abs, one)) * max(1.0, *map(abs, one), *map(abs, two)) * 25 + 1e-9
     points = [duration * part for part in (0.001, 0.01, 0.1)]
 
     def integral(function):
         return quad(function, 0.0, duration, epsabs=1e-10 * scale, epsrel=1e-10, limit=400, points=points)[0]
 
     expected = integral(lambda t: value(one, theta, *rates, t) * value(two, theta, *rates, t))
-    assert moments.product(one, two) == pytest.approx(expected, abs=1e-7 * scale)
-    assert moments.product(two, one) == pytest.approx(moments.product(one, two), abs=1e-9 * scale)
+    assert moments.with_voltage(one, *volts) == pytest.approx(expected, abs=1e-7 * scale)
+    expected = integral(lambda t: value(one, theta, *rates, t) ** 2)
+    assert moments.square(one) == pytest.approx(expected, abs=1e-7 * scale)
     assert moments.single(one) == pytest.approx(integral(lambda t: value(one, theta, *rates, t)), abs=1e-7 * scale)
 
 

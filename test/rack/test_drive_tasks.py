@@ -195,6 +195,22 @@ def test_rack_goes_on_from_a_state_bit_for_bit(tmp_path, at_ns, extra):
     assert comparable(other) == comparable(rack)
 
 
+@pytest.mark.parametrize("after_ns", [1, 100_000, 300_000])
+def test_a_scan_under_way_has_nothing_of_the_scan_before_in_its_state(tmp_path, after_ns):
+    """Whether or not it has latched: a rack that was cut before that scan has the same state in it."""
+    rack = rack_of(tmp_path, extra=MODELED)
+    permit(rack)
+    rack.scheduler.run_until(52 * MS)
+    other = Rack(rack.config)
+    other.load(rack.state())
+    interrupt_ns = rack.drives.port(7).next_ns
+    assert interrupt_ns is not None
+    for item in (rack, other):
+        item.scheduler.run_until(interrupt_ns + after_ns)
+    assert rack.task("CML").progress is not None
+    assert comparable(other) == comparable(rack)
+
+
 def test_forces_reach_inputs_and_no_output(tmp_path):
     """52.0: FORCE is supported for inputs, not for outputs; 52.1.5: not for SPEED_FDBK and OSV_FDBK."""
     rack = running(tmp_path)
