@@ -148,6 +148,15 @@ def test_a_runaway_load_trips_the_overspeed_fault():
     assert rack.value("F_OSV@") is True
 
 
+@pytest.mark.parametrize("set_point", [1750, -1750])
+def test_the_largest_set_point_is_kept_by_a_regulator_that_sees_what_lies_above_it(set_point):
+    rack = built()
+    rack.start([("SPEED_SP%", set_point)])
+    run_to(rack, 12.0)
+    assert abs(rack.value("RPM") - set_point) < 10
+    assert rack.value("FAULT@") is False
+
+
 def test_an_emergency_stop_lets_it_coast_and_needs_a_new_start():
     rack = built()
     rack.start()

@@ -93,7 +93,8 @@ class BridgeChange(Stateful):
 def preset_us(measured: Measured, bridge: int, wanted: float, thresh: int, period_us: float) -> float:
     """Return the DELTA with which a bridge begins so that it gives a current at once, by the CEMF measured.
 
-    Without armature voltage feedback the CEMF is taken as 0 (decision).
+    Without armature voltage feedback the CEMF is taken as 0, alpha is 90 degrees whatever the reference: at speed that
+    ends in IOC (decision, 52.6.2).
 
     Args:
         measured: what was measured at the end of the last scan, in which no current flowed.
@@ -102,7 +103,9 @@ def preset_us(measured: Measured, bridge: int, wanted: float, thresh: int, perio
         thresh: CC_THRESH, counts: a smaller reference begins with an earlier DELTA.
         period_us: the line's period.
     """
-    ratio = measured.voltage / (VOLTS * VD0) if measured.status & VOLTAGE else 0.0
+    if not measured.status & VOLTAGE:
+        return 0.25 * period_us
+    ratio = measured.voltage / (VOLTS * VD0)
     if bridge == 2:
         ratio = -ratio
     continuous = (1.0 - acos(max(-HIGHEST_COS, min(HIGHEST_COS, ratio))) / pi) * 0.5 * period_us
