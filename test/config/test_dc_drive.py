@@ -137,6 +137,21 @@ def test_diag_names_a_missing_phase(set_point, terminal):
     assert rack.value("FAULT@") is False
 
 
+@pytest.mark.parametrize("terminal", [1, 2, 3])
+def test_diag_names_a_missing_phase_under_a_great_current(terminal):
+    """At 300 rpm with the rated torque what is left of the current never ends: it is least where it begins."""
+    rack = built()
+    rack.start([("SPEED_SP%", 300)])
+    run_to(rack, 5.0)
+    rack.plants["MOTOR"].load_torque_nm = 600.0
+    run_to(rack, 7.5)
+    assert rack.value("CUR_FB%") > 2500
+    rack.plants["MOTOR"].circuit.open_phase(terminal - 1)
+    run_to(rack, 9.5)
+    assert (rack.value("LOST_PHASE%"), rack.value("OPEN_GATE%")) == (terminal, 0)
+    assert rack.value("FAULT@") is False
+
+
 def test_a_runaway_load_trips_the_overspeed_fault():
     rack = built()
     rack.start([("SPEED_SP%", 1700)])
