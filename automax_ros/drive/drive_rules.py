@@ -27,7 +27,9 @@ PMI_TRIP_POINTS, PMI_MOST_TRIP = 75, 225
 def line_frequency(case: DriveCase) -> Finding:
     """AC_LINE_FREQ must not be above the lowest frequency of the line (52.1.1)."""
     line_hz, given = case.parameters.line_hz, case.value("AC_LINE_FREQ")
-    if given is None or given == line_hz:
+    if given is None:
+        verdict, why = Verdict.ATTENTION, "no task with DC_DRIVE_CML gives it"
+    elif given == line_hz:
         verdict, why = Verdict.FINE, "that of the line"
     elif given > line_hz:
         verdict, why = Verdict.WRONG, "more than the line has: enter the lowest frequency that is expected"
@@ -36,7 +38,7 @@ def line_frequency(case: DriveCase) -> Finding:
     return Finding(
         "AC_LINE_FREQ",
         verdict,
-        f"{case.text('AC_LINE_FREQ')} Hz, {why}",
+        f"{case.text('AC_LINE_FREQ')}{'' if given is None else ' Hz'}, {why}",
         "AC_LINE_FREQ = lowest frequency of the line (52.1.1)",
         f"line {line_hz:g} Hz",
         {"ac_line_freq": given, "line_hz": line_hz},

@@ -145,6 +145,13 @@ def test_line_frequency(judged, hertz, given, verdict, code):
     assert judged(rack, task=loop_task(AC_LINE_FREQ=given), code=code)["AC_LINE_FREQ"]["verdict"] == verdict
 
 
+def test_nothing_is_fine_of_a_frequency_that_no_task_gives(judged):
+    task = "10 LOCAL A%\n20 CALL SCAN_LOOP(TICKS=2)\n30 A% = 1\n40 END\n"
+    found = judged(task=task)["AC_LINE_FREQ"]
+    assert (found["verdict"], found["values"]["ac_line_freq"]) == ("attention", None)
+    assert "not known Hz" not in found["result"]
+
+
 @pytest.mark.parametrize(
     ("statement", "wired", "millihenry", "verdict", "code"),
     [
