@@ -184,8 +184,9 @@ class RackStream:
             self._send_state(task, now, own.intersection(stream.states))
 
     def end(self) -> None:
-        """Send what is held back by rate limits and the final states."""
+        """Send what is held back by rate limits, what a scan under way has written so far, and the final states."""
         now = self._rack.now_ns
+        self._rack.observers.tell_writes()
         for view, value in self._values.items():
             if value.waits:
                 self._send_value(view, value, now)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from rack.drive_tasks import CML, SPEED, rack_of
+from rack.drive_tasks import CML, SPEED, YAML, rack_of
 
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagReader
@@ -11,7 +11,7 @@ from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.replay.report import Kind
 from automax_ros.running.drive_record import COMMAND_VIEW, MEASURED_VIEW
-from automax_ros.wire.messages import Scan
+from automax_ros.wire.messages import CommonWrite, Scan
 from automax_ros.wire.stream import RackStream
 
 from .replays import edited, record, replayed, rewritten
@@ -226,3 +226,28 @@ def test_another_measurement_makes_a_difference(bag, tmp_path):
 
     report = replayed(rewritten(bag, tmp_path / "bag", change))
     assert (report.first.task, report.first.scan) == ("CML", 400)
+
+
+def test_recording_that_ends_within_a_scan_has_all_writes(tmp_path):
+    """A 57C405 shows the voltage at the interrupt, and in modeled execution the scan ends later than the recording."""
+    yaml = YAML.replace("  8: {module: 57C408}\n", "  8: {module: 57C408}\n  9: {module: 57C405, drive: 7}\n")
+    yaml = yaml.replace("  START@: {}", "  VOLTS%: {slot: 9, register: 0}\n  START@: {}")
+    rack = rack_of(tmp_path, extra="execution: modeled\n", yaml=yaml)
+    stream = RackStream(rack, rack.fingerprint)
+    recorder = Recorder(rack, stream, tmp_path / "bag")
+    stream.begin()
+    rack.start()
+    for number in range(9):
+        happens(rack, number)
+        rack.run(0.1)
+    before = rack.value("VOLTS%")
+    while rack.value("VOLTS%") == before:
+        rack.run(1e-6)
+    stream.end()
+    recorder.close()
+    view, last = rack.memory.view("VOLTS%"), None
+    for item in BagReader(tmp_path / "bag").messages():
+        if isinstance(item.message, CommonWrite):
+            values = item.message.values
+            last = dict(zip(values.variable, values.value, strict=True)).get(view, last)
+    assert last == rack.value("VOLTS%") != before
