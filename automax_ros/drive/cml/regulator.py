@@ -26,10 +26,10 @@ INTEGRAL_STEP = 0.55
 """Part of an error that the integral takes off in a scan, in discontinuous conduction (decision)."""
 LEAST_PART = 0.05
 """Conducting part of a scan below which the integral gain rises no more (decision)."""
-RAISED, FALL = 0.11, 0.88
+RAISED, FALL = 0.13, 0.88
 """After discontinuous conduction the continuous integral gain is greater by this part of an error, which falls by this
 factor each scan: the drop over the resistance comes with the current (decision)."""
-RISE = 0.28
+RISE = 0.30
 """DELTA rises in a scan by at most this part of a scan in discontinuous conduction, or what conducts would not tell
 (decision)."""
 AHEAD = 0.4
@@ -125,6 +125,7 @@ class Regulator(Stateful):
             move = min(gain * error, max(move, boundary - self.integral_us))
         self.push_us = kp * error
         self._move(gain, move, 0.0, min(0.5, self.delta_us / period_us + RISE / 6.0) * period_us)
+        self.push_us = 0.0  # AHEAD is of a push in continuous conduction
 
     def _move(self, gain: float, move_us: float, lowest_us: float, highest_us: float) -> None:
         """Move the integrator, and find DELTA between two bounds."""

@@ -65,6 +65,19 @@ def test_steps_of_the_current(size, hertz, emf, sign):
         assert abs(mean - last) < 0.01 * abs(last)
 
 
+@pytest.mark.parametrize("rpm", [300, 600, 1000, 1100, 1150, 1200, 1250, 1300, 1400])
+def test_steps_from_zero_of_the_examples_motor_at_speeds_between(rpm):
+    """Near 1200 rpm an SCR is fired as the scan ends: there the current comes latest."""
+    bench = Bench("150hp")
+    bench.plant.motor.speed_rad_s = rpm * 0.10472
+    bench.start()
+    for sign in (1, -1):
+        rise, over, mean = step(bench, 0, sign * 2048)
+        assert rise < 15.0
+        assert over < 20.0
+        assert abs(mean - sign * 2048) < 20
+
+
 def test_small_currents_settle_in_discontinuous_conduction():
     bench = Bench("150hp")
     bench.emf(200.0)
