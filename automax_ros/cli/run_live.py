@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import sys
 import time
 
 from automax_ros.bags.recorder import Recorder
@@ -18,6 +19,9 @@ from automax_ros.rack.operation_log import OperationLog
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import default_folder
 from automax_ros.rack.standing import StopCause
+
+SWITCH_S = 0.0005
+"""How long a thread that saves or sends may keep the interpreter from the scans, s (5 ms is Python's own)."""
 
 
 def run_live(plan: RunPlan, stop: StopRequest) -> int:
@@ -55,7 +59,9 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         recording.flush(now_ns)
         recording.tell()
 
+    switch_s = sys.getswitchinterval()
     try:
+        sys.setswitchinterval(SWITCH_S)
         if plan.record is not None:
             recorder = Recorder(rack, live.stream, plan.record, live_options(plan.recording))
             recording = RecordingWatch(recorder, display)
@@ -70,6 +76,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         report = report_at_end(rack, stimulation, services.happened)
     finally:
         gc.unfreeze()
+        sys.setswitchinterval(switch_s)
         state.freeze()
         try:
             live.close()

@@ -143,6 +143,7 @@ class BasicTask(Task):
         }
         self._fresh()
         super().install(compiled)
+        _ = self.compiled.burst  # compiled here: the first burst of a live rack would be late
 
     def file(self, number: int) -> OpenedFile:
         """Return what a number after # is."""

@@ -23,6 +23,8 @@ START_LEAD_NS = 50 * NS_PER_MS
 """The start lies this far ahead of ``begin``, so that presets and start-up parts make no scan miss its deadline."""
 CHORE_PERIOD_NS = 100 * NS_PER_MS
 """How often the loop calls ``on_idle``."""
+CHORE_ROOM_NS = 2 * NS_PER_MS
+"""``on_idle`` is put off, by another period at most, while the next event is nearer than this."""
 
 
 class Pacer:
@@ -78,7 +80,7 @@ class Pacer:
     ) -> None:
         """Keep pace until the scheduler's time is ``until_ns`` (what is due then is left), or asked to stop.
 
-        ``on_idle`` gets the time, every 100 ms between events.
+        ``on_idle`` gets the time, about every 100 ms, where there is time before the next event.
         """
         next_chore = 0
         while not should_stop():
@@ -88,10 +90,15 @@ class Pacer:
                 self._scheduler.pass_until(until_ns)
                 return
             self._scheduler.run_due(now)
-            if on_idle is not None and now >= next_chore:
+            if on_idle is not None and now >= next_chore and self._has_room(next_chore):
                 next_chore = now + CHORE_PERIOD_NS
                 on_idle(now)
             self._wait(self._idle_s(until_ns))
+
+    def _has_room(self, since_ns: int) -> bool:
+        """Return whether a chore that has been due for some time may be done now."""
+        now, due = self.now_ns, self._scheduler.next_ns
+        return due is None or due - now >= CHORE_ROOM_NS or now - since_ns >= CHORE_PERIOD_NS
 
     def _idle_s(self, until_ns: int | None) -> float:
         now = self.now_ns
