@@ -66,10 +66,10 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
             recorder = Recorder(rack, live.stream, plan.record, live_options(plan.recording))
             recording = RecordingWatch(recorder, display)
             sync = DiskSync(recorder.sync)
-        display.message(_opening(rack, domain))
         # What is there now stays: a look of the collector at all of it would hold up scans by tens of ms.
         gc.collect()
         gc.freeze()
+        display.message(_opening(rack, domain))
         live.start([*state.settings, *plan.settings])
         stimulation.begin()
         live.run(plan.duration_ns, on_idle)

@@ -94,7 +94,7 @@ def preset_us(measured: Measured, bridge: int, wanted: float, thresh: int, perio
     """Return the DELTA with which a bridge begins so that it gives a current at once, by the CEMF measured.
 
     Without armature voltage feedback the CEMF is taken as 0, alpha is 90 degrees whatever the reference: at speed that
-    ends in IOC (decision, 52.6.2).
+    ends in IOC, as 52.6.2 says (decision).
 
     Args:
         measured: what was measured at the end of the last scan, in which no current flowed.
