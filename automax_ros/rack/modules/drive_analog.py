@@ -13,15 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from automax_ros.compile.cost import Model
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.numbers import round_count
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
-from automax_ros.rack.modules.io_config import IoModel
+from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
 from automax_ros.rack.modules.io_module import IoModule
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.scalars import integer_value
-from automax_ros.rack.task_config import TaskConfig
 
 GAINS = {230: 0.02, 380: 0.0121, 460: 0.01, 550: 0.00835, 660: 0.00696}
 """Volts at the 57C405 a volt of the armature, by the nominal line voltage of the transformer, V rms (52.6.1)."""
@@ -42,7 +40,7 @@ def voltage_counts(volts: float, line_v: float) -> int:
 
 
 @dataclass(frozen=True)
-class DriveAnalogConfig:
+class DriveAnalogConfig(WithoutTasks):
     """A 57C405; ``drive`` is the slot of the 57C406 to whose armature it is wired."""
 
     slot: int
@@ -51,22 +49,12 @@ class DriveAnalogConfig:
     line: int = 0
     drive_span: Span | None = field(default=None, compare=False)
 
-    tick_ns = 0
-    times = Model.NONE
-    has_battery = False
-    keeps_locals = True
-    common_registers = 0
     registers: Registers = _REGISTERS
 
     @property
     def name(self) -> str:
         """The module's name in the rack, as that of its node."""
         return f"drive_analog_{self.slot}"
-
-    @property
-    def tasks(self) -> tuple[TaskConfig, ...]:
-        """No tasks."""
-        return ()
 
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""

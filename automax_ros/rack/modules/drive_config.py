@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from automax_ros.compile.cost import Model
 from automax_ros.rack.modules.drive_controller import DEFAULTS, DriveControllerModule
-from automax_ros.rack.modules.io_config import IoModel
+from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
-from automax_ros.rack.task_config import TaskConfig
 
 if TYPE_CHECKING:
     from automax_ros.rack.plants.config import PlantConfig
@@ -26,7 +24,7 @@ _REGISTERS = Registers(
 
 
 @dataclass(frozen=True)
-class DriveConfig:
+class DriveConfig(WithoutTasks):
     """A 57C406; without a ``plant`` it has registers and switches only, and its loop sees no line."""
 
     slot: int
@@ -34,11 +32,6 @@ class DriveConfig:
     plant: PlantConfig | None = None
     line: int = 0
 
-    tick_ns = 0
-    times = Model.NONE
-    has_battery = False
-    keeps_locals = True
-    common_registers = 0
     registers: Registers = _REGISTERS
 
     @property
@@ -50,11 +43,6 @@ class DriveConfig:
     def plants(self) -> Mapping[str, PlantConfig]:
         """The plant of its one drive."""
         return {} if self.plant is None else {"": self.plant}
-
-    @property
-    def tasks(self) -> tuple[TaskConfig, ...]:
-        """No tasks: its loop is a task of a Processor."""
-        return ()
 
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""

@@ -13,15 +13,8 @@ from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Part
 from automax_ros.rack.task_config import TaskConfig
 
 
-@dataclass(frozen=True)
-class IoConfig:
-    """An I/O module in any slot; ``node`` begins its name."""
-
-    slot: int
-    model: str
-    node: str
-    registers: Registers
-    line: int = 0
+class WithoutTasks:
+    """What the configuration of a module says that runs no tasks and holds no common variables of its own."""
 
     tick_ns = 0
     times = Model.NONE
@@ -30,14 +23,25 @@ class IoConfig:
     common_registers = 0
 
     @property
-    def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
-        return f"{self.node}_{self.slot}"
-
-    @property
     def tasks(self) -> tuple[TaskConfig, ...]:
         """No tasks."""
         return ()
+
+
+@dataclass(frozen=True)
+class IoConfig(WithoutTasks):
+    """An I/O module in any slot; ``node`` begins its name."""
+
+    slot: int
+    model: str
+    node: str
+    registers: Registers
+    line: int = 0
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"{self.node}_{self.slot}"
 
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""
