@@ -16,6 +16,8 @@ TARGET = ROOT / "automax_ros" / "wire" / "message_types.json"
 OWN = "automax_msgs"
 # Parts of services' answers; no recording holds them.
 SERVED = frozenset({"LoggedError", "TaskInfo"})
+# Tables of a rack that is live, and their lines; no recording holds them: what they show is in it in other ways.
+LIVE = frozenset({"Force", "ForceTable", "ScanStatistics", "TaskStatistics", "TaskTable"})
 STANDARD = (
     "builtin_interfaces/msg/Time",
     "rosgraph_msgs/msg/Clock",
@@ -53,7 +55,7 @@ def definition_texts() -> dict[str, str]:
     Raises:
         FileNotFoundError: a standard definition is not installed.
     """
-    own = [path for path in (ROOT / "msg_defs" / "msg").glob("*.msg") if path.stem not in SERVED]
+    own = [path for path in (ROOT / "msg_defs" / "msg").glob("*.msg") if path.stem not in SERVED | LIVE]
     texts = {f"{OWN}/msg/{path.stem}": path.read_text(encoding="utf-8") for path in own}
     for name in STANDARD:
         path = installed_file(name, ".msg")
