@@ -36,7 +36,7 @@ interpreter_of() {
 fingerprint() {
     {
         echo "$PWD"
-        cat pyproject.toml setup.py setup.cfg package.xml automax_ros/__init__.py tools/setup_environment.sh \
+        cat pyproject.toml setup.cfg automax_ros/__init__.py tools/setup_environment.sh \
             tools/build_messages.py tools/message_code.py tools/message_libraries.py msg_defs/package.xml
         tail -n +1 msg_defs/msg/*.msg msg_defs/srv/*.srv
     } | sha256sum
