@@ -1,7 +1,8 @@
 """The package automax_ros as colcon builds it: what setup.cfg says, and the files that ROS looks for in share/.
 
 colcon takes no package from a folder below another package: with a package.xml or setup.py in the repository's own
-folder a plain `colcon build` would not see msg_defs/. So they stand here, next to links to what they install (decision).
+folder a plain `colcon build` would not see msg_defs/. So they stand here, next to links to what they install
+(decision).
 """
 
 from pathlib import Path

@@ -55,7 +55,7 @@ def imports_of(path: Path) -> Iterator[tuple[int, str]]:
 
 def test_version_is_the_same_everywhere():
     versions = {
-        "package.xml": ElementTree.parse(ROOT / "package.xml").findtext("version"),
+        "colcon/package.xml": ElementTree.parse(ROOT / "colcon" / "package.xml").findtext("version"),
         "msg_defs/package.xml": ElementTree.parse(ROOT / "msg_defs" / "package.xml").findtext("version"),
         "installed": metadata.version("automax_ros"),
     }
@@ -63,7 +63,7 @@ def test_version_is_the_same_everywhere():
 
 
 def test_package_xml_names_the_messages_and_the_build_type():
-    package = ElementTree.parse(ROOT / "package.xml")
+    package = ElementTree.parse(ROOT / "colcon" / "package.xml")
     assert package.getroot().get("format") == "3"
     assert package.findtext("export/build_type") == "ament_python"
     assert "automax_msgs" in [element.text for element in package.findall("exec_depend")]
@@ -86,7 +86,7 @@ def test_empy_that_cannot_build_the_messages_is_not_installed(version):
 
 
 def test_ament_index_marker_is_there_and_empty():
-    assert (ROOT / "resource" / "automax_ros").read_bytes() == b""
+    assert (ROOT / "colcon" / "resource" / "automax_ros").read_bytes() == b""
 
 
 def test_rooms_are_told_in_their_order():

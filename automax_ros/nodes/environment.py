@@ -28,7 +28,7 @@ from pathlib import Path
 from automax_ros.core.faults import Fault
 
 SETUP_COMMAND = "make setup"
-COLCON_COMMAND = "colcon build --base-paths src src/automax_ros/msg_defs"
+COLCON_COMMAND = "colcon build"
 
 
 # Set for the process that prepare() starts in place of this one: a second restart could not do better.
