@@ -68,6 +68,6 @@ if ! supported "$venv/bin/python" || ! grep -qs "$venv/bin" "$venv/bin/pip"; the
 fi
 rm -f "$stamp"
 echo "installing dependencies into .venv (about a minute the first time) ..."
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[ros,build,plot,test]'
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[ros,build,plot,docs,test]'
 "$venv/bin/python" tools/build_messages.py
 echo "$current" >"$stamp"

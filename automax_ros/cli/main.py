@@ -40,6 +40,7 @@ SUBCOMMANDS: dict[str, str] = {
     "compare": "compare a block with the Logix instruction that replaces it",
     "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
+    "schema": "JSON schema of rack files or stimuli files, for editors",
     "explain": "say what a problem code means and how to cure it",
 }
 """Every subcommand and its line of help; the module of that name in this folder is imported when it is asked for.

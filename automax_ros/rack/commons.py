@@ -5,6 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import (
+    Keys,
+    Schema,
+    either,
+    entries,
+    flag,
+    line,
+    listed,
+    may_be_empty,
+    number,
+    scalar,
+    section,
+    words,
+)
 from automax_ros.core.kinds import Direction
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType, bare_name
@@ -12,11 +26,12 @@ from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
-from automax_ros.rack.names import PREDEFINED, DeclarationFault, VariableName, variable_name
+from automax_ros.rack.names import COMMON_NAME, PREDEFINED, DeclarationFault, VariableName, variable_name
 from automax_ros.rack.points import KEYS, PointReader
 from automax_ros.rack.presets import preset_value
 from automax_ros.rack.reserved import is_reserved
 from automax_ros.rack.scalars import boolean_value, number_value, text_value, wrong_kind
+from automax_ros.rack.scale import SCHEMA as SCALE
 from automax_ros.rack.scale import Scale, scale_of
 from automax_ros.rack.sections import Section, entries_of, report_twice
 
@@ -26,8 +41,29 @@ DESCRIPTION_LIMIT = 200
 MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
 """Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
 
-OPTIONS = ("ros", "rate_limit_hz", "preset", "non_volatile", "unit", "scale", "description", *KEYS)
 _DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
+OPTIONS: Keys = {
+    "ros": words("`out`: a topic with the value; `in`: that, and one that writes it; `closed`: neither.", _DIRECTIONS),
+    "rate_limit_hz": number("Most messages per second on the topic.", MIN_RATE_HZ, MAX_RATE_HZ),
+    "preset": either(
+        "Written when the rack starts; for an array also a list, the last subscript running fastest.",
+        scalar("The value, for an array that of each element."),
+        listed("A value for each element.", scalar("The value of an element.")),
+    ),
+    "non_volatile": flag("Whether the value survives STOP ALL, a power cycle and a restart.", False),
+    "unit": line("The engineer's unit.", UNIT_LIMIT),
+    "scale": SCALE,
+    "description": line("A line about the variable.", DESCRIPTION_LIMIT),
+    **KEYS,
+}
+"""What may be said of a common variable."""
+SCHEMA: Schema = may_be_empty(
+    entries(
+        "The rack's common variables: name, type character, length of a string, largest subscripts.",
+        COMMON_NAME,
+        may_be_empty(section("A common variable.", OPTIONS)),
+    )
+)
 _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 
 

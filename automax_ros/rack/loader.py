@@ -7,27 +7,52 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span
+from automax_ros.core.json_schema import Keys, Schema, document, flag, named, number, section, words
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, read_yaml
+from automax_ros.rack.commons import SCHEMA as COMMON_SCHEMA
 from automax_ros.rack.commons import CommonReader
 from automax_ros.rack.config import CommonVariable, ModuleLoss, RackConfig, Timing
-from automax_ros.rack.executive import NEWEST, executive_value
+from automax_ros.rack.executive import NEWEST, OLDEST, executive_value
 from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
-from automax_ros.rack.names import is_rack_name
+from automax_ros.rack.names import RACK_NAME, is_rack_name
 from automax_ros.rack.plants.feeds import read_feeds
+from automax_ros.rack.plants.reading import SCHEMA as PLANTS_SCHEMA
 from automax_ros.rack.plants.reading import Plants, read_plants
 from automax_ros.rack.ros_names import namespace
 from automax_ros.rack.scalars import boolean_value, text_value
 from automax_ros.rack.sections import Section, entries_of
+from automax_ros.rack.slots import SCHEMA as SLOTS_SCHEMA
 from automax_ros.rack.slots import SlotReader
 from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.views import bank_variables
 
 _START = Span(1, 1, 2)
-KEYS = ("rack", "operator", "execution", "executive", "auto_run", "on_module_loss", "slots", "plants", "common")
+_TIMINGS, _LOSSES = [timing.value for timing in Timing], [loss.value for loss in ModuleLoss]
+KEYS: Keys = {
+    "rack": named("The rack's name; in lower case its ROS 2 namespace.", RACK_NAME),
+    "operator": flag("Whether the running rack has services that operate it.", False),
+    "execution": words(
+        "`ideal`: a scan takes no time; `modeled`: the time that the manual prints.",
+        _TIMINGS,
+        "ideal",
+    ),
+    "executive": number("Version of the AutoMax Programming Executive.", OLDEST / 10, NEWEST / 10, NEWEST / 10),
+    "auto_run": flag("AUTO RUN: whether a power cycle ends with the tasks in RUN that ran before it.", False),
+    "on_module_loss": words("What a rack of several processes does when it loses one.", _LOSSES, "stop_all"),
+    "slots": SLOTS_SCHEMA,
+    "plants": PLANTS_SCHEMA,
+    "common": COMMON_SCHEMA,
+}
 """What a rack file may say at its top."""
+_REQUIRED = ("rack", "slots")
+
+
+def schema() -> Schema:
+    """Return the JSON schema of a rack file, for editors: what its form can be wrong in, not how its parts agree."""
+    return document("AutoMax rack", section("A rack: its modules, tasks and common variables.", KEYS, _REQUIRED))
 
 
 @dataclass(frozen=True)
@@ -95,7 +120,7 @@ class _RackReader:
         if entries is None:
             return None
         section = Section(entries, "a rack file", KEYS, self._findings)
-        section.require(("rack", "slots"), "the rack file", _START, self._findings)
+        section.require(_REQUIRED, "the rack file", _START, self._findings)
         name = self._name(section.get("rack"))
         operator = self._flag(section, "operator")
         auto_run = self._flag(section, "auto_run")

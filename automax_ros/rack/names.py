@@ -24,6 +24,10 @@ PREDEFINED = (AUTO_RUN, "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in 
 """Commons that the rack itself writes (2.4.6)."""
 
 _RACK = re.compile(r"[A-Z0-9]{1,8}\Z")
+RACK_NAME = "^[A-Za-z0-9]{1,8}$"
+TASK_NAME = f"^[A-Za-z][A-Za-z0-9_]{{0,{TASK_NAME_LIMIT - 1}}}$"
+COMMON_NAME = f"^[A-Za-z_][A-Za-z0-9_]{{0,{NAME_LIMIT - 1}}}([%!@]|\\$(:[0-9]{{1,3}})?)?\\s*([(\\[][0-9, ]*[)\\]])?$"
+"""The same as patterns of a JSON schema, in lower case too: the reader says so and goes on."""
 _TASK = re.compile(r"[A-Z][A-Z0-9_]*\Z")
 _BARE = re.compile(r"[A-Z_][A-Z0-9_]*\Z")
 _DECLARATION = re.compile(

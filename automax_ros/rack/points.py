@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import Keys, whole
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import Point
+from automax_ros.rack.config import MAX_SLOT, Point
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import VariableName
 from automax_ros.rack.scalars import integer_value
 from automax_ros.rack.sections import Section
 
-KEYS = ("slot", "register", "bit")
+KEYS: Keys = {
+    "slot": whole("Slot of the module that the point belongs to.", 0, MAX_SLOT),
+    "register": whole("Register of the module; a DOUBLE INTEGER takes this one and the next.", 0, 65535),
+    "bit": whole("Bit of the register, for a BOOLEAN; 0 is the lowest.", 0, 15),
+}
+"""Where a point stands."""
 _SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32, DataType.REAL: 32}
 """Bits of the types that a point may have (J2-3045 p. 7-1); a REAL only on the application registers of a UDC."""
 
@@ -33,7 +39,7 @@ class PointReader:
         if not given:
             return None
         what = f"I/O point {declared.name}"
-        wanted = KEYS if declared.type is DataType.BOOLEAN else KEYS[:2]
+        wanted = KEYS if declared.type is DataType.BOOLEAN else ("slot", "register")
         if not section.require(wanted, what, span, self._findings) or not self._is_possible(section, declared):
             return None
         slot = self._number(section, "slot", what, 0, 15)

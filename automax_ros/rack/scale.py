@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.json_schema import Keys, Schema, listed, section
 from automax_ros.core.numbers import REAL_LIMIT, round_count
 from automax_ros.core.types import DataType
 from automax_ros.core.yaml_text import Node, Sequence
@@ -20,7 +21,11 @@ from automax_ros.rack.scalars import integer_value, number_value, wrong_kind
 from automax_ros.rack.sections import Section, entries_of
 
 _CODE = "AMX6450"
-_KEYS = ("counts", "value")
+_KEYS: Keys = {
+    key: listed(text, {"type": "number"}, least=2, most=2)
+    for key, text in (("counts", "Counts at two points."), ("value", "What they mean there, in `unit`."))
+}
+SCHEMA: Schema = section("What the counts mean in `unit`: a straight line through two points.", _KEYS, _KEYS)
 _N = TypeVar("_N", int, float)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import did_you_mean, quoted
@@ -29,8 +29,8 @@ class Section:
     Reports AMX6006 a key twice and AMX6007 a key that is not known.
     """
 
-    def __init__(self, entries: Iterable[Entry], what: str, known: tuple[str, ...], findings: Findings) -> None:
-        """Sort the entries; ``what`` names the section in messages."""
+    def __init__(self, entries: Iterable[Entry], what: str, known: Collection[str], findings: Findings) -> None:
+        """Sort the entries; ``what`` names the section in messages, ``known`` are its keys."""
         self._values: dict[str, Entry] = {}
         for key, value in entries:
             if key.text not in known:
@@ -62,7 +62,7 @@ class Section:
         return not missing
 
 
-def _report_unknown(key: Scalar, what: str, known: tuple[str, ...], findings: Findings) -> None:
+def _report_unknown(key: Scalar, what: str, known: Collection[str], findings: Findings) -> None:
     hint = did_you_mean(key.text, known) or f"{what} has the keys {', '.join(known)}"
     findings.add("AMX6007", f"{what} has no key {quoted(key.text)}", key.span, hint)
 

@@ -5,18 +5,31 @@ from __future__ import annotations
 import re
 
 from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import Schema, either, entries, section
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
-from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_number
+from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_number, spellings
 from automax_ros.rack.plants.reading import Plants
 from automax_ros.rack.scalars import text_value, wrong_kind
 from automax_ros.rack.sections import Entry, Section, entries_of
 from automax_ros.rack.tasks import TaskReader
 
 _SLOT = re.compile(r"[0-9]{1,3}\Z")
+SCHEMA: Schema = entries(
+    "What stands in the rack, by slots 0 to 15.",
+    f"^0*({'|'.join(map(str, range(MAX_SLOT + 1)))})$",
+    either(
+        "A module.",
+        *(
+            section(f"{model}: {text}.", {"module": spellings(model), **kind.options}, ("module",))
+            for kind in KINDS
+            for model, text in kind.models.items()
+        ),
+    ),
+)
 
 
 class SlotReader:

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Protocol, TypeGuard
 
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.json_schema import Keys, Schema, entries, flag, line, may_be_empty, section, whole
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.language.syntax.task_kind import LADDER_SUFFIX, TASK_SUFFIXES, NotATask, is_task_file, kind_of_file
 from automax_ros.rack.files import FileFault, read_bytes, stays_next_to
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.names import DeclarationFault, check_task_name
+from automax_ros.rack.names import TASK_NAME, DeclarationFault, check_task_name
 from automax_ros.rack.scalars import boolean_value, integer_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 from automax_ros.rack.task_config import MAX_PRIORITY, MAX_TASKS, MIN_PRIORITY, TaskConfig
@@ -44,6 +45,11 @@ class TaskPlaces(Protocol):
     @property
     def most(self) -> int: ...  # noqa: D102
 
+    @property
+    def schema(self) -> Schema:
+        """The schema of what stands after the key."""
+        ...
+
     def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
         """Return what the key of a task says, None (reported) where it is wrong."""
         ...
@@ -53,6 +59,7 @@ class Priorities:
     """A Processor's tasks: priorities, several tasks of one priority if need be."""
 
     key, sample, most = "priority", "8", MAX_TASKS
+    schema = whole("4 is served first; equal ones in the order of their names.", MIN_PRIORITY, MAX_PRIORITY)
 
     def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
         """Return a priority."""
@@ -62,6 +69,22 @@ class Priorities:
 
 
 PRIORITIES = Priorities()
+
+
+def tasks_schema(places: TaskPlaces) -> Schema:
+    """Return the schema of a module's tasks."""
+    task = section("A task: one program.", _keys(places), (places.key,))
+    return may_be_empty(entries("The tasks of the module, by their names.", TASK_NAME, task, places.most))
+
+
+def _keys(places: TaskPlaces) -> Keys:
+    """Return what may be said of a task."""
+    file = "The source, .BLK or .BAS, below the rack file's folder; without the key the task's name with .BLK or .BAS."
+    return {
+        "file": line(file, _PATH_LIMIT),
+        places.key: places.schema,
+        "critical": flag("Whether only STOP ALL stops it.", False),
+    }
 
 
 @dataclass
@@ -96,7 +119,7 @@ class TaskReader:
         entries = entries_of(node, what, self.findings)
         if entries is None:
             return None
-        section = Section(entries, what, ("file", places.key, "critical"), self.findings)
+        section = Section(entries, what, _keys(places), self.findings)
         section.require((places.key,), what, key.span, self.findings)
         given = section.get(places.key)
         place = places.read(given, what, self.findings) if given is not None else None

@@ -46,7 +46,7 @@ def test_page_has_every_key():
     text = PAGE.read_text(encoding="utf-8")
     tables = text.split("| option |")
     options = re.findall(r"^\| `(\w+)` \|", tables[1].split("\n###")[0] + tables[2].split("\n###")[0], re.M)
-    assert tuple(options) == commons.OPTIONS
+    assert options == list(commons.OPTIONS)
 
 
 def test_page_names_every_module():

@@ -8,8 +8,10 @@ cycle clear them, as volatile common memory (decision). They do not arbitrate th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from automax_ros.compile.cost import Model
+from automax_ros.core.json_schema import Keys
 from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule, Module, Parts, QuietModule, Registers
 from automax_ros.rack.task_config import TaskConfig
 
@@ -63,7 +65,7 @@ class CommonMemoryKind:
 
     word = "common memory"
     models = dict.fromkeys(COMMON_REGISTERS, "common memory module")
-    options = ()
+    options: Keys = MappingProxyType({})
 
     def read(self, found: FoundModule) -> CommonMemoryConfig:
         """Read the section, which has no keys of its own."""

@@ -14,7 +14,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import Keys, whole
 from automax_ros.core.numbers import round_count
+from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
 from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
 from automax_ros.rack.modules.io_module import IoModule
@@ -78,7 +80,9 @@ class DriveAnalogKind:
     word = "drive analog I/O"
     table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _REGISTERS)})
     models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
-    options = ("drive",)
+    options: Keys = MappingProxyType(
+        {"drive": whole("Slot of the 57C406 whose armature voltage is wired to it.", 0, MAX_SLOT)}
+    )
 
     def read(self, found: FoundModule) -> DriveAnalogConfig:
         """Read which drive it is wired to."""

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from automax_ros.core.json_schema import Keys
 from automax_ros.rack.modules.drive_controller import DEFAULTS, DriveControllerModule
 from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
+from automax_ros.rack.plants.config import plant_name
 
 if TYPE_CHECKING:
     from automax_ros.rack.plants.config import PlantConfig
@@ -56,7 +58,7 @@ class DriveControllerKind:
     word = "drive I/O controller"
     table: Mapping[str, IoModel] = MappingProxyType({"57C406": IoModel("drive I/O controller module", _REGISTERS)})
     models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
-    options = ("plant",)
+    options: Keys = MappingProxyType({"plant": plant_name("The plant that the module drives.")})
 
     def read(self, found: FoundModule) -> DriveConfig:
         """Read the plant."""

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
 from automax_ros.compile.cost import Model
+from automax_ros.core.json_schema import Keys
 from automax_ros.rack.modules.io_module import IoModule
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.task_config import TaskConfig
@@ -72,7 +73,7 @@ class IoKind:
     node: str
     table: Mapping[str, IoModel]
     models: Mapping[str, str] = field(init=False)
-    options: tuple[str, ...] = ()
+    options: Keys = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Derive what the other kinds say for themselves."""

@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from automax_ros.compile.cost import CostModel, Model
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.json_schema import Keys
 from automax_ros.drive.plant import DrivePlant
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.plants.reading import Plants
@@ -210,8 +211,8 @@ class ModuleKind(Protocol):
     def models(self) -> Mapping[str, str]: ...  # noqa: D102
 
     @property
-    def options(self) -> tuple[str, ...]:
-        """The keys of its section, ``module`` left out."""
+    def options(self) -> Keys:
+        """The keys of its section with the schemas of their values, ``module`` left out."""
         ...
 
     def read(self, found: FoundModule) -> ModuleConfig:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from automax_ros.compile.cost import Model
-from automax_ros.core.ticks import DEFAULT_TICK_NS, tick_ns
+from automax_ros.core.json_schema import Keys, steps
+from automax_ros.core.ticks import DEFAULT_TICK_NS, MAX_TICK_NS, MIN_TICK_NS, NS_PER_MS, TICK_STEP_NS, tick_ns
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.executive import OLDEST, tick_fault, version_text
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
@@ -15,11 +17,13 @@ from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule
 from automax_ros.rack.scalars import wrong_kind
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.task_config import TaskConfig
+from automax_ros.rack.tasks import PRIORITIES, tasks_schema
 
 MAX_PROCESSORS = 4
 """Processors of one rack (J2-3106-1 p. 2-5)."""
 _COMMON_REGISTERS = 65536
 """Registers for commons where a Processor works alone (decision: as many as the 57C413 has)."""
+_TICKS_MS = tuple(time / NS_PER_MS for time in (MIN_TICK_NS, MAX_TICK_NS, TICK_STEP_NS, DEFAULT_TICK_NS))
 _TICK = re.compile(r"[0-9]{1,6}(\.[0-9]{1,9})?\Z")
 _SINCE = {"57C435": 30}
 """The first version of the Executive with a module, in tenths, where that is not the oldest (1.1)."""
@@ -95,7 +99,12 @@ class ProcessorKind:
 
     word = "processor"
     models = {"57C430A": "6010", "57C431": "6011", "57C435": "7010"}  # noqa: RUF012
-    options = ("tick_ms", "tasks")
+    options: Keys = MappingProxyType(
+        {
+            "tick_ms": steps("Tick rate in ms; the scan time of a task is its TICKS times this.", *_TICKS_MS),
+            "tasks": tasks_schema(PRIORITIES),
+        }
+    )
 
     def read(self, found: FoundModule) -> ProcessorConfig:
         """Read tick and tasks."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 
+from automax_ros.core.json_schema import Schema, either, named, words
 from automax_ros.rack.modules.analog_io import ANALOG_IO
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
@@ -46,6 +47,15 @@ NOT_YET = {
 """Modules that exist but that the emulator cannot be yet."""
 
 _NUMBER = re.compile(r"(57C?[0-9]{3})[A-Z]?\Z")
+
+
+def spellings(model: str) -> Schema:
+    """Return the schema of a module's number, in all spellings that ``module_number`` takes."""
+    letters = "".join(f"[{char}{char.lower()}]" if char.isalpha() else char for char in model)
+    revision = "" if model[-1].isalpha() else "[A-Za-z]?"
+    text = f"The module's number: {model}, {SUPPORTED[model].models[model]}."
+    numbers = [model, int(model)] if model.isdecimal() else [model]
+    return either(text, words(text, numbers), named(text, f"^([Bb]/[Mm] *)?{letters}{revision}$"))
 
 
 def module_number(text: str) -> str:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 
 from automax_ros.compile.cost import Model
 from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import Keys, may_be_empty, section, words
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import UDC_TICK_NS
 from automax_ros.core.yaml_text import Node
@@ -16,11 +18,11 @@ from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.modules.udc import UdcModule
 from automax_ros.rack.modules.udc_registers import UDC_REGISTERS
-from automax_ros.rack.plants.config import PlantConfig
+from automax_ros.rack.plants.config import PlantConfig, plant_name
 from automax_ros.rack.scalars import text_value
 from automax_ros.rack.sections import Section, entries_of
 from automax_ros.rack.task_config import TaskConfig
-from automax_ros.rack.tasks import TaskPlace
+from automax_ros.rack.tasks import TaskPlace, tasks_schema
 
 MAX_UDCS = 10
 """UDC modules of one rack (J2-3106-1 p. 2-5)."""
@@ -65,6 +67,7 @@ class _Drives:
     """The tasks of one UDC: each drive has at most one."""
 
     key, sample, most = "drive", "A", len(DRIVES)
+    schema = words("The drive that the task is for; A runs before B.", DRIVES)
 
     def __init__(self) -> None:
         self._taken: dict[str, Span] = {}
@@ -85,12 +88,17 @@ class _Drives:
         return None
 
 
+_PLANTS = may_be_empty(
+    section("The plants that its drives turn.", {drive: plant_name(f"The plant of drive {drive}.") for drive in DRIVES})
+)
+
+
 class UdcKind:
     """What a rack file may say of a UDC."""
 
     word = "UDC"
     models = {"57552": "UDC module"}  # noqa: RUF012
-    options = ("tasks", "plants")
+    options: Keys = MappingProxyType({"tasks": tasks_schema(_Drives()), "plants": _PLANTS})
 
     def read(self, found: FoundModule) -> UdcConfig:
         """Read tasks and plants."""

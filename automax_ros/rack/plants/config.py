@@ -7,12 +7,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from automax_ros.core.json_schema import Schema, named
 from automax_ros.drive.nameplate import EXAMPLES, NamePlate
 from automax_ros.drive.plant_coupling import CouplingData
 from automax_ros.rack.scale import Scale
 
+PLANT_NAME = r"[A-Z][A-Z0-9_]{0,15}"
+"""A plant's name, as a pattern."""
 MOTORS = {"dc_10hp_240v": "10hp", "dc_150hp_500v": "150hp", "dc_800hp_700v": "800hp"}
 """Motors that a plant may have by name, each with its name in ``drive/nameplate``."""
+
+
+def plant_name(text: str) -> Schema:
+    """Return the schema of a value that names a plant; ``text`` says for what."""
+    return named(text, f"^{PLANT_NAME.replace('A-Z', 'A-Za-z')}$")
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.json_schema import Keys, Schema, number, section
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Node
 from automax_ros.drive.coupling import LEAST_RATIO, MOST_RATIO
@@ -12,7 +13,7 @@ from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.plant_coupling import CouplingData
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.plants.building import build_plants, couple_plants
-from automax_ros.rack.plants.config import CoupleConfig, PlantConfig
+from automax_ros.rack.plants.config import CoupleConfig, PlantConfig, plant_name
 from automax_ros.rack.scalars import number_value, text_value
 from automax_ros.rack.sections import Section, entries_of
 
@@ -23,7 +24,13 @@ RANGES = {
     "damping_nms_per_rad": (0.0, 1e6),
 }
 """Ranges of a coupling's numbers (decision)."""
-KEYS = ("to", *RANGES)
+KEYS: Keys = {
+    "to": plant_name("The other plant."),
+    "ratio": number("Speed of this plant's motor over that of the other.", *RANGES["ratio"], 1),
+    "stiffness_nm_per_rad": number("Stiffness at this shaft; without it stiff.", *RANGES["stiffness_nm_per_rad"]),
+    "damping_nms_per_rad": number("Damping of the spring.", *RANGES["damping_nms_per_rad"]),
+}
+SCHEMA: Schema = section("What couples the shaft to that of another plant.", KEYS, ("to",))
 
 
 def read_couple(node: Node, what: str, findings: Findings) -> CoupleConfig | None:

@@ -18,14 +18,12 @@ from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import PREDEFINED, VariableName
 from automax_ros.rack.plants.config import FeedConfig
+from automax_ros.rack.plants.feed_keys import KEYS, LEAST_MS, MOST_MS, USUAL_MS
 from automax_ros.rack.scalars import number_value, text_value
 from automax_ros.rack.scale import Scale, scale_of
 from automax_ros.rack.sections import Section, entries_of, report_twice
 
 CODE = "AMX6479"
-KEYS = ("signal", "every_ms", "scale")
-LEAST_MS, MOST_MS, USUAL_MS = 0.1, 10_000.0, 1.0
-"""Range of ``every_ms``, and what it is without the key (decision: an instrument is quicker than most scans)."""
 _ABSENT = "the rack has no common variable"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from automax_ros.core.json_schema import Keys, Schema, listed, may_be_empty, number, section, words
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Node, Sequence
 from automax_ros.drive.ac_line import HIGHEST_HZ, LOWEST_HZ
@@ -15,19 +16,41 @@ SUPPLY = {"v_ll": (50.0, 1000.0), "hz": (LOWEST_HZ, HIGHEST_HZ), "ls_mh": (0.001
 """Ranges of a line's numbers (decision: lines of these drives; without inductance a shorted SCR had no limit)."""
 STANDARD, OTHER = "CBA", "ABC"
 """The two rotations of a line (52.1.5)."""
+_SUPPLY_KEYS: Keys = {
+    "v_ll": number("Line-to-line voltage, V rms.", *SUPPLY["v_ll"]),
+    "hz": number("Frequency, Hz.", *SUPPLY["hz"]),
+    "ls_mh": number("Source inductance of a phase, mH.", *SUPPLY["ls_mh"]),
+    "rs_mohm": number("Source resistance of a phase, milliohm.", *SUPPLY["rs_mohm"], 5),
+    "rotation": words("CBA is the standard rotation.", (STANDARD, OTHER), STANDARD),
+}
 LOAD = {"torque_nm": (-1e6, 1e6), "friction_nm": (0.0, 1e6), "speed_rpm": (-10_000.0, 10_000.0)}
 """Ranges of a load's numbers (decision)."""
 LEAST_INERTIA, MOST_INERTIA = 1.0, 10_000.0
 """Range of ``inertia`` (decision): it counts the motor's own, which is 1."""
 MOST_PAIRS = 100
 """Most pairs of ``torque_per_rpm`` (decision)."""
+_LOAD_KEYS: Keys = {
+    "torque_nm": number("Torque that keeps its direction, N m; positive brakes positive speed.", *LOAD["torque_nm"], 0),
+    "friction_nm": number("Coulomb friction, N m.", *LOAD["friction_nm"], 0),
+    "speed_rpm": number("The speed at which the shaft is held; alone. 0 is a locked rotor.", *LOAD["speed_rpm"]),
+    "torque_per_rpm": listed(
+        "A table of speed and torque, straight lines between its pairs.",
+        listed("rpm and N m.", {"type": "number"}, least=2, most=2),
+        least=2,
+        most=MOST_PAIRS,
+    ),
+    "ros": words("`in`: ROS 2 sets torque_nm.", ("in",)),
+}
+SUPPLY_SCHEMA: Schema = may_be_empty(section("The AC line of the drive.", _SUPPLY_KEYS))
+LOAD_SCHEMA: Schema = may_be_empty(section("What the motor turns.", _LOAD_KEYS))
+INERTIA_SCHEMA: Schema = number("Inertia of motor and load over the motor's own.", LEAST_INERTIA, MOST_INERTIA, 1)
 _ALONE = "speed_rpm"
 
 
 def read_supply(node: Node, what: str, findings: Findings) -> SupplyConfig:
     """Return a plant's AC line; what is wrong goes to the findings."""
     where = f"line of {what}"
-    section = Section(entries_of(node, where, findings) or (), where, (*SUPPLY, "rotation"), findings)
+    section = Section(entries_of(node, where, findings) or (), where, _SUPPLY_KEYS, findings)
     return SupplyConfig(
         **_numbers(section, SUPPLY, where, findings),
         standard=_standard(section.get("rotation"), where, findings),
@@ -37,7 +60,7 @@ def read_supply(node: Node, what: str, findings: Findings) -> SupplyConfig:
 def read_load(node: Node, what: str, findings: Findings) -> LoadConfig:
     """Return a plant's load; what is wrong goes to the findings."""
     where = f"load of {what}"
-    section = Section(entries_of(node, where, findings) or (), where, (*LOAD, "torque_per_rpm", "ros"), findings)
+    section = Section(entries_of(node, where, findings) or (), where, _LOAD_KEYS, findings)
     _check_alone(section, where, findings)
     numbers = _numbers(section, LOAD, where, findings)
     return LoadConfig(

@@ -9,15 +9,25 @@ import re
 from dataclasses import dataclass, field
 
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.json_schema import Keys, Schema, either, entries, may_be_empty, number, section, whole, words
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.nameplate import NamePlate
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.plants.building import plant_data
-from automax_ros.rack.plants.config import MOTORS, LoadConfig, PlantConfig, SupplyConfig
+from automax_ros.rack.plants.config import MOTORS, PLANT_NAME, LoadConfig, PlantConfig, SupplyConfig, plant_name
+from automax_ros.rack.plants.couples import SCHEMA as COUPLE_SCHEMA
 from automax_ros.rack.plants.couples import check_couples, read_couple
-from automax_ros.rack.plants.keys import read_inertia, read_load, read_supply
+from automax_ros.rack.plants.feed_keys import SCHEMA as FEEDS_SCHEMA
+from automax_ros.rack.plants.keys import (
+    INERTIA_SCHEMA,
+    LOAD_SCHEMA,
+    SUPPLY_SCHEMA,
+    read_inertia,
+    read_load,
+    read_supply,
+)
 from automax_ros.rack.scalars import integer_value, number_value, text_value
 from automax_ros.rack.sections import Section, entries_of, report_twice
 
@@ -25,13 +35,43 @@ MOST_PLANTS = 32
 """Most plants of a rack (decision: two for each of 16 slots)."""
 MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
 """Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
-_SIMULATED = ("line", "load", "inertia", "couple", "feeds")
-KEYS = ("motor", "motor_overload_ratio", *_SIMULATED)
-"""What may be said of a plant."""
-_PLATE = ("hp", "volts", "rpm", "amps", "resistance_ohm", "inductance_h", "inertia_kg_m2")
+_LEAST, _MOST = 1e-9, 1e9
+_PLATE: Keys = {
+    "hp": number("Rated power, hp.", _LEAST, _MOST),
+    "volts": number("Rated armature voltage, V.", _LEAST, _MOST),
+    "rpm": number("Rated speed.", _LEAST, _MOST),
+    "amps": number("Rated armature current, A.", _LEAST, _MOST),
+    "resistance_ohm": number("Resistance of the armature.", _LEAST, _MOST),
+    "inductance_h": number("Inductance of the armature.", _LEAST, _MOST),
+    "inertia_kg_m2": number("Inertia of the motor.", _LEAST, _MOST),
+}
 _PLATE_REQUIRED = ("hp", "volts", "rpm")
-_MOST = 1e9
-_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}\Z")
+_SIMULATED: Keys = {
+    "line": SUPPLY_SCHEMA,
+    "load": LOAD_SCHEMA,
+    "inertia": INERTIA_SCHEMA,
+    "couple": COUPLE_SCHEMA,
+    "feeds": FEEDS_SCHEMA,
+}
+KEYS: Keys = {
+    "motor": either(
+        "The motor; a plant without one is not simulated.",
+        words("A motor that the emulator has.", MOTORS),
+        section("The motor's name plate.", _PLATE, _PLATE_REQUIRED),
+    ),
+    "motor_overload_ratio": whole("Motor Overload Ratio of the drive, %.", MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO),
+    **_SIMULATED,
+}
+"""What may be said of a plant."""
+SCHEMA: Schema = may_be_empty(
+    entries(
+        "The lines, motors and loads of drives, by their names.",
+        plant_name("")["pattern"],
+        may_be_empty(section("A plant.", KEYS)),
+        MOST_PLANTS,
+    )
+)
+_NAME = re.compile(PLANT_NAME + r"\Z")
 _LIMIT = 100
 
 
@@ -155,7 +195,7 @@ def _plate(node: Mapping, what: str, findings: Findings) -> NamePlate | None:
         value = section.get(key)
         if value is None:
             continue
-        found = number_value(value, f"{key} of {what}", findings, low=1e-9, high=_MOST, code="AMX6473")
+        found = number_value(value, f"{key} of {what}", findings, low=_LEAST, high=_MOST, code="AMX6473")
         if found is None:
             return None
         numbers[key] = found

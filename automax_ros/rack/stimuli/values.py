@@ -19,7 +19,7 @@ from automax_ros.rack.stimuli.signals import Signal, Signals
 from automax_ros.rack.stimuli.stage import Action, Stage, Stimulus
 from automax_ros.rack.stimuli.waves import MOST_HZ, Ramp, Sine, Square, Wave
 
-_LEAST_HZ = 0.0001
+LEAST_HZ = 0.0001
 """Lowest frequency (decision: slower is a ramp)."""
 
 
@@ -113,7 +113,7 @@ class _Shape:
         if node is None:
             return None
         what = f"hz of {self.what}"
-        found = number_value(node, what, self.findings, low=_LEAST_HZ, high=MOST_HZ, code="AMX6738")
+        found = number_value(node, what, self.findings, low=LEAST_HZ, high=MOST_HZ, code="AMX6738")
         return Fraction(node.text) if found is not None and isinstance(node, Scalar) else None
 
 
