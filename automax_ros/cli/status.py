@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Protocol
 
 from automax_ros.cli.status_line import StatusLine
-from automax_ros.core.text import count_of, printable
+from automax_ros.cli.status_parts import Progress, Summary
+from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.values import value_text
 from automax_ros.rack.modules.drive_interrupts import Timed
@@ -18,16 +19,69 @@ from automax_ros.rack.settings import CommonElement
 from automax_ros.running.health import Health
 
 
+class Screen(Protocol):
+    """Where a run is shown."""
+
+    @property
+    def began_ns(self) -> int:
+        """When it was made, on the monotonic clock."""
+        ...
+
+    def due(self) -> int:
+        """Return the ns since the last progress if it is time for the next, which the caller shows then, else 0."""
+        ...
+
+    def progress(self, progress: Progress) -> None:
+        """Show how the run stands."""
+        ...
+
+    def message(self, text: str) -> None:
+        """Show a line of its own."""
+        ...
+
+    def summary(self, summary: Summary) -> None:
+        """Show what the run came to."""
+        ...
+
+
+class Person:
+    """The screen of a person: standard output."""
+
+    def __init__(self) -> None:
+        """Begin; nothing is printed yet."""
+        self._line = StatusLine()
+        self.began_ns = self._line.began_ns
+        self.due, self.message = self._line.due, self._line.message
+
+    def progress(self, progress: Progress) -> None:
+        """Show the line of status, on a terminal in place of the last."""
+        self._line.show(progress.parts)
+
+    def summary(self, summary: Summary) -> None:
+        """Print the summary in place of the line."""
+        self._line.clear()
+        print("\n".join(summary.lines), flush=True)
+
+
 class StatusDisplay:
-    """Shows a rack's progress on standard output; ``live``: on the wall clock, so loads can be measured.
+    """Shows a rack's progress on a screen; ``live``: on the wall clock, so loads can be measured.
 
     ``health`` is what a rack on the wall clock has trouble with; each thing is a line when it first happens.
     """
 
-    def __init__(self, rack: Rack, watch: Sequence[CommonElement], *, live: bool, health: Health | None = None) -> None:
-        """Begin; nothing is printed before the first update is due."""
+    def __init__(
+        self,
+        rack: Rack,
+        watch: Sequence[CommonElement],
+        *,
+        live: bool,
+        health: Health | None = None,
+        screen: Screen | None = None,
+    ) -> None:
+        """Begin; nothing is shown before the first update is due. ``screen`` is a person's unless it is given."""
         self._rack, self._watch, self._live, self._health = rack, watch, live, health
-        self._line = StatusLine()
+        self._screen: Screen = Person() if screen is None else screen
+        self.message = self._screen.message
         self._last_rack_ns = 0
         self._last_scans = 0
         self._last_busy: dict[int, int] = {}
@@ -35,13 +89,9 @@ class StatusDisplay:
     def update(self, now_ns: int) -> None:
         """Show news, and the state at a rack time if it is time to."""
         self._tell_news()
-        passed = self._line.due()
+        passed = self._screen.due()
         if passed:
-            self._show(now_ns, passed)
-
-    def message(self, text: str) -> None:
-        """Print a line of its own."""
-        self._line.message(text)
+            self._screen.progress(self._progress(now_ns, passed))
 
     def printed(self) -> None:
         """Show what PRINT statements have written since the last call."""
@@ -50,63 +100,57 @@ class StatusDisplay:
                 self.message(f"{task.name}: {printable(task.printed.popleft())}")
 
     def finish(self, bag: Path | None, *, complete: bool = True) -> None:
-        """Print the last state and the summary; ``complete`` says whether all of the run is in the recording."""
+        """Show the last news and the summary; ``complete`` says whether all of the run is in the recording."""
         self._tell_news()
-        self._line.clear()
+        took = None if self._live else (time.monotonic_ns() - self._screen.began_ns) / NS_PER_S
         rack = self._rack
-        seconds, took = rack.now_ns / NS_PER_S, (time.monotonic_ns() - self._line.began_ns) / NS_PER_S
-        pace = "" if self._live else f" in {took:.2f} s ({seconds / took if took else 0:.0f} times real time)"
-        print(f"ran {seconds:.3f} s{pace}")
-        print(f"  {'task':10}{'slot':>4}{'period ms':>11}{'scans':>10}{'late':>7}{'errors':>8}", end="")
-        print(f"{'mean us':>10}{'longest us':>12}" if self._live else "")
-        for task in rack.tasks:
-            statistics = rack.statistics[task.name]
-            period = f"{task.period_ns / 1e6:g}" if task.period_ns else "-"
-            print(
-                f"  {task.name:10}{task.slot:>4}{period:>11}{statistics.scans:>10}"
-                f"{statistics.skipped:>7}{task.errors.count:>8}",
-                end="",
-            )
-            mean = statistics.total_ns / statistics.scans / 1000 if statistics.scans else 0.0
-            print(f"{mean:>10.1f}{statistics.longest_ns / 1000:>12.1f}" if self._live else "")
-        for module in rack.modules if self._live else ():
-            if isinstance(module, Timed) and module.timing.interrupts:
-                print(f"  {module.config.name}: {module.timing.describe()}")
-        for task in rack.tasks:
-            for entry in task.errors.entries:
-                print(f"  {task.name}: {entry.describe()}")
-        if self._watch:
-            print("  " + "  ".join(self._values()))
+        self._screen.summary(
+            Summary(rack.now_ns / NS_PER_S, self._live, tuple(self._rows()), tuple(self._notes()), self._values(), took)
+        )
         if bag is not None:
             size = sum(item.stat().st_size for item in bag.iterdir())
             rest = "" if complete else f", not to the end of the run; to complete the file: automax bag repair {bag}"
-            print(f"recorded {bag}: {size / 1e6:.2f} MB{rest}")
-        sys.stdout.flush()
+            self.message(f"recorded {bag}: {size / 1e6:.2f} MB{rest}")
+
+    def _rows(self) -> Iterator[str]:
+        """Return the summary's line of each task."""
+        for task in self._rack.tasks:
+            statistics = self._rack.statistics[task.name]
+            period = f"{task.period_ns / 1e6:g}" if task.period_ns else "-"
+            row = f"  {task.name:10}{task.slot:>4}{period:>11}{statistics.scans:>10}"
+            row += f"{statistics.skipped:>7}{task.errors.count:>8}"
+            mean = statistics.total_ns / statistics.scans / 1000 if statistics.scans else 0.0
+            yield row + (f"{mean:>10.1f}{statistics.longest_ns / 1000:>12.1f}" if self._live else "")
+
+    def _notes(self) -> Iterator[str]:
+        """Return what the summary says of interrupts and errors."""
+        for module in self._rack.modules if self._live else ():
+            if isinstance(module, Timed) and module.timing.interrupts:
+                yield f"  {module.config.name}: {module.timing.describe()}"
+        for task in self._rack.tasks:
+            for entry in task.errors.entries:
+                yield f"  {task.name}: {entry.describe()}"
 
     def _tell_news(self) -> None:
         for text in self._health.news() if self._health else ():
             self.message(printable(text))
 
-    def _show(self, now_ns: int, passed_ns: int) -> None:
+    def _progress(self, now_ns: int, passed_ns: int) -> Progress:
+        """Return how the rack stands, ``passed_ns`` of the wall clock after the last time."""
         scans = sum(item.scans for item in self._rack.statistics.values())
-        elapsed = (now_ns - self._last_rack_ns) / NS_PER_S
-        rate = (scans - self._last_scans) / elapsed if elapsed else 0.0
-        parts = [f"{now_ns / NS_PER_S:8.1f} s", *self._standing(), f"{rate:.0f} scans/s"]
-        if self._live:
-            parts += [self._load(module, passed_ns) for module in self._rack.task_modules]
-        else:
-            parts.append(f"{(now_ns - self._last_rack_ns) / passed_ns:.0f}x")
-        parts += self._trouble()
-        parts += self._values()
+        rack_ns = now_ns - self._last_rack_ns
+        rate = (scans - self._last_scans) * NS_PER_S / rack_ns if rack_ns else 0.0
         self._last_rack_ns, self._last_scans = now_ns, scans
-        self._line.show(parts)
+        loads = [self._load(module, passed_ns) for module in self._rack.task_modules] if self._live else []
+        pace = None if self._live else rack_ns / passed_ns
+        return Progress(now_ns, self._standing(), rate, tuple(loads), pace, self._trouble(), self._values())
 
-    def _standing(self) -> list[str]:
+    def _standing(self) -> tuple[str, ...]:
         """Return what stands in the way of the tasks: no power, or what stopped them all."""
         operations = self._rack.operations
         if not operations.powered:
-            return ["power off"]
-        return [] if operations.stopped is None else [operations.stopped.title]
+            return ("power off",)
+        return () if operations.stopped is None else (operations.stopped.title,)
 
     def _load(self, module: Module, passed_ns: int) -> str:
         """Return a Processor's share of the time since the last line, and the deadlines it has missed."""
@@ -117,12 +161,11 @@ class StatusDisplay:
         late = sum(item.statistics.skipped for item in module.tasks)
         return f"P{slot} {100 * share:.1f} % late {late}"
 
-    def _trouble(self) -> list[str]:
+    def _trouble(self) -> dict[str, int]:
         """Return the counts of what went wrong."""
         errors = {"run-time error": sum(task.errors.count for task in self._rack.tasks)}
-        counts = self._health.counts if self._health else errors
-        return [count_of(number, kind) for kind, number in counts.items() if number]
+        return dict(self._health.counts) if self._health else errors
 
-    def _values(self) -> list[str]:
+    def _values(self) -> tuple[str, ...]:
         values = [value_text(self._rack.value(item.name, item.index)) for item in self._watch]
-        return [f"{item.label}={printable(value)}" for item, value in zip(self._watch, values, strict=True)]
+        return tuple(f"{item.label}={printable(value)}" for item, value in zip(self._watch, values, strict=True))
