@@ -14,7 +14,8 @@ from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType, Value
 from automax_ros.running.channels import CHANNEL_VIEWS
 from automax_ros.running.drive_record import COMMAND_NUMBERS, COMMAND_VIEW, MEASURED_NUMBERS, MEASURED_VIEW
-from automax_ros.wire.messages import CommonImage, CommonWrite, Values, Variable, VariableTable
+from automax_ros.wire.messages import CommonImage, CommonWrite, Variable, VariableTable
+from automax_ros.wire.values import Values
 
 Key = tuple[int, int]
 """A value of common memory: number of the variable, flat index of the element."""

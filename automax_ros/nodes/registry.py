@@ -26,7 +26,6 @@ from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.registry import SUPPORTED
 from automax_ros.rack.modules.resolver import RESOLVER
 from automax_ros.rack.modules.udc_config import UDC
-from automax_ros.rack.plants.driven import driven_plants
 
 NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     PROCESSOR: ProcessorNode,
@@ -55,5 +54,5 @@ def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
         node = NODES[SUPPORTED[module.config.model]]
         if node is not None:
             made.append(node(site, module))
-    made += (DrivePlantNode(site, driven) for driven in driven_plants(site.rack.config))
+    made += (DrivePlantNode(site, driven) for driven in site.rack.part.driven)
     return tuple(made)

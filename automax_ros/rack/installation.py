@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
@@ -52,8 +52,8 @@ class Prepared:
 class Installation:
     """All tasks of a rack, compiled; ``warnings`` are what their checks found short of errors."""
 
-    def __init__(self, config: RackConfig) -> None:
-        """Check and compile all tasks.
+    def __init__(self, config: RackConfig, here: Collection[str] | None = None) -> None:
+        """Check all tasks and compile them, or those of ``here`` alone.
 
         Raises:
             RackError: a task has errors; nothing is started then (the hardware's E0).
@@ -75,7 +75,8 @@ class Installation:
             self._programs = {**self._programs, task.name: result.program}
             if result.diagnostics:
                 self.warnings.append((source, result.diagnostics))
-            self._compiled[task.name] = self._compile(task.name, result.program)
+            if here is None or task.name in here:
+                self._compiled[task.name] = self._compile(task.name, result.program)
 
     def compiled(self, task: str) -> CompiledTask:
         """Return a task of the rack's file."""

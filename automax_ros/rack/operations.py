@@ -54,8 +54,10 @@ class Operations:
         channels: Channels,
         observers: Observers,
         forcing: Forcing,
+        elsewhere: frozenset[tuple[int, int]] = frozenset(),
     ) -> None:
-        """Take the parts of a rack that is built and not yet started."""
+        """Take the parts of a rack; ``elsewhere`` (views and elements) are modules' of other processes: not cleared."""
+        self._elsewhere = elsewhere
         self._forcing = forcing
         self._events, self._channels = events, channels
         self._config, self._modules, self.installation = config, modules, installation
@@ -76,16 +78,18 @@ class Operations:
         """Why all tasks were stopped, None while the rack runs."""
         return None if self.stopped is None else self.stopped.reason
 
-    def start(self) -> None:
+    def start(self, *, joining: bool = False) -> None:
         """Begin what modules do by themselves, and put tasks into RUN with their first scan at this instant.
 
-        These are all tasks, or those of ``starting`` where that is known: the ones that ran before a power-up.
+        These are all tasks, or those of ``starting`` where that is known: the ones that ran before a power-up. With
+        ``joining`` others run this rack: first scans come at the next ticks, and none where it is stopped.
         """
         for module in self._modules:
             module.power_on()
         now = self._scheduler.now_ns
         begins = [item for item in self._in_starting_order() if self.starting is None or item.name in self.starting]
-        self._run_together(begins, lambda _: now)
+        if not (joining and self.stopped):
+            self._run_together(begins, self._next_tick if joining else lambda _: now)
 
     def run(self, name: str) -> None:
         """Put a task into RUN: its start-up part now, its first scan at the next tick of its Processor (decision).
@@ -333,7 +337,7 @@ class Operations:
         return sorted(self._tasks.values(), key=lambda item: (item.task.priority, item.task.name))
 
     def _clear_memory(self, *, keep_non_volatile: bool) -> None:
-        kept = frozenset[tuple[int, int]]().union(*(module.kept for module in self._modules))
+        kept = self._elsewhere.union(*(module.kept for module in self._modules))
         self._memory.now_ns = self._scheduler.now_ns
         self._memory.clear(PRESET_WRITER, keep_non_volatile=keep_non_volatile, kept=kept)
         self.write_status()

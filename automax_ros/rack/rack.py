@@ -10,46 +10,41 @@ rack.operations.stop("SPEED")
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Collection, Sequence
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
 from automax_ros.rack.adjusting import Adjustments
-from automax_ros.rack.background_task import WaitTrigger
+from automax_ros.rack.beginning import begin_memory
 from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.forcing import Force, Forcing
 from automax_ros.rack.installation import Finding, Installation
+from automax_ros.rack.installer import Installer
 from automax_ros.rack.modules.kind import Module, Parts
 from automax_ros.rack.observers import Observers, RackObserver
 from automax_ros.rack.operations import Operations
+from automax_ros.rack.part import RackPart
 from automax_ros.rack.plants.feeding import PlantFeeds
 from automax_ros.rack.plants.running import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
 from automax_ros.rack.rack_state import RackState
 from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
 from automax_ros.rack.settings import common_named
-from automax_ros.rack.task_config import TaskConfig
-from automax_ros.rack.triggers import DriveTrigger, MakeTrigger, Trigger, usual_trigger
 from automax_ros.rack.views import backplane_of, view_specs
-from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, WriterSpec, writers_of
-from automax_ros.running.basic_task import BasicTask
+from automax_ros.rack.writers import OPERATOR_WRITER, WriterSpec, writers_of
 from automax_ros.running.channels import Channels
-from automax_ros.running.cml_task import CmlTask
 from automax_ros.running.common_clock import CommonClock
 from automax_ros.running.drives import Drives
 from automax_ros.running.events import Events
 from automax_ros.running.execution import IDEAL, Execution
 from automax_ros.running.interrupts import Interrupts
-from automax_ros.running.make_task import make_task
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.processor_time import ProcessorTime
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import EVENT_TIMEOUT, ScanRecord, Status, Task
-from automax_ros.running.views import Memory
 
 _FAULTED = Status.FAULTED
 """A name of its own, since it is asked for after each scan and an enumeration's member is slow to get."""
@@ -59,36 +54,54 @@ class Rack:
     """A rack that runs. ``stopwatch`` (ns, monotonic) measures execution times; without one they count as 0.
 
     ``execution`` executes the scans of all modules in place of what the configuration says (``rack/stepping``).
+    ``local`` are the slots whose modules are in this process (``rack/part``), all if None.
     """
 
     def __init__(
-        self, config: RackConfig, *, stopwatch: Callable[[], int] | None = None, execution: Execution | None = None
+        self,
+        config: RackConfig,
+        *,
+        stopwatch: Callable[[], int] | None = None,
+        execution: Execution | None = None,
+        local: Collection[int] | None = None,
     ) -> None:
-        """Compile all tasks against the rack's common memory and build the modules.
+        """Compile the tasks against the rack's common memory and build the modules.
 
         Raises:
             RackError: a task has errors; nothing is started then (the hardware's E0).
         """
         self.config = config
+        self.part = RackPart.of(config, local)
         self.memory = CommonMemory(view_specs(config.variables))
         self._forcing = Forcing(config, self.memory, lambda: self.tasks)
         self.writers: tuple[WriterSpec, ...] = writers_of(config)
         self.scheduler = Scheduler()
-        self._stopwatch = stopwatch
-        self._ids = {writer.name: writer.id for writer in self.writers if writer.is_task}
-        self._slots = {task.name: module.slot for module, task in config.placed_tasks}
-        self._installation = Installation(config)
+        installation = Installation(config, self.part.tasks)
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
         self.events = Events()
         self.channels = Channels()
         self.drives = Drives()
         self._interrupts = Interrupts(self.memory, self.events)
-        self._inputs = ProcessInputs(self.memory, self.scheduler)
+        self.inputs = ProcessInputs(self.memory, self.scheduler)
         self._clock = CommonClock(self.scheduler, self.memory, self._clock_fault)
-        self.plants = RackPlants(config.plants)
+        self.plants = RackPlants(self.part.plants)
         self.sampling = PlantSampling(self.plants, self.scheduler)
-        self._feeds = PlantFeeds(config, self.plants, self.memory, self._inputs, self.scheduler)
+        self._feeds = PlantFeeds(config, self.plants, self.memory, self.inputs, self.scheduler)
+        installer = Installer(
+            config=config,
+            installation=installation,
+            memory=self.memory,
+            scheduler=self.scheduler,
+            backplane=self.backplane,
+            events=self.events,
+            channels=self.channels,
+            drives=self.drives,
+            interrupts=self._interrupts,
+            after=self._after,
+            no_event=self._no_event,
+            stopwatch=stopwatch,
+        )
         parts = Parts(
             memory=self.memory,
             scheduler=self.scheduler,
@@ -96,34 +109,35 @@ class Rack:
             events=self.events,
             clock=self._clock,
             interrupts=self._interrupts,
-            inputs=self._inputs,
+            inputs=self.inputs,
             drives=self.drives,
-            install=self._install,
+            install=installer.install,
             execution=self._execution if execution is None else lambda _: execution,
             tell_writes=self.observers.tell_writes,
             writer={item.name: item.id for item in self.writers if item.kind is WriterKind.IO}.__getitem__,
             plants=self.plants,
         )
-        self.modules: list[Module] = [module.build(parts) for module in config.modules]
+        self.modules: list[Module] = [module.build(parts) for module in self.part.modules]
         self.operations = Operations(
             config,
             self.modules,
-            self._installation,
+            installation,
             self.memory,
             self.scheduler,
             self.events,
             self.channels,
             self.observers,
             self._forcing,
+            elsewhere=self.part.elsewhere(self.memory, self.backplane),
         )
         self.adjust = Adjustments(
-            config, self.operations, self.memory, self._inputs, self._forcing, self.scheduler, self.observers, self.tune
+            config, self.operations, self.memory, self.inputs, self._forcing, self.scheduler, self.observers, self.tune
         )
 
     @property
     def warnings(self) -> list[Finding]:
         """What the checks of the tasks found, short of errors."""
-        return self._installation.warnings
+        return self.operations.installation.warnings
 
     @property
     def scheduled(self) -> list[ScheduledTask]:
@@ -191,17 +205,32 @@ class Rack:
             MemoryValueError: a setting's value does not fit.
         """
         self.memory.now_ns = self.now_ns
-        for view, variable in enumerate(self.config.variables):
-            for element, value in enumerate(variable.presets):
-                self._inputs.write_from_outside(view, value, PRESET_WRITER, element)
+        begin_memory(self.config, self.inputs, self.memory)
         self.operations.write_status()
+        self.set_from_start(settings)
+        self.operations.start()
+        self._begin_plants()
+
+    def join(self, now_ns: int) -> None:
+        """Take part in a rack that runs already: the first scans come at the next ticks.
+
+        Only for a rack that is distributed: what the others have written comes over the bus (``rack/bus``), which also
+        knows whether the tasks may run.
+        """
+        self.scheduler.pass_until(now_ns)
+        self.operations.start(joining=True)
+        self._begin_plants()
+
+    def set_from_start(self, settings: Sequence[tuple[str, Value]]) -> None:
+        """Write commons as an operator would, before any task runs.
+
+        Raises:
+            NameFault, MemoryValueError: as ``start``.
+        """
         for name, value in settings:
             found = common_named(self.config, name)
-            self._inputs.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
+            self.inputs.write_from_outside(self.memory.view(found.name), value, OPERATOR_WRITER, found.index)
         self.observers.tell_writes()
-        self.operations.start()
-        self._feeds.begin(self.operations, self.observers)
-        self.sampling.begin()
 
     def run(self, seconds: float) -> None:
         """Let simulated time pass."""
@@ -226,7 +255,7 @@ class Rack:
         accepted = [(element, memory.accepted(view, value, element)) for element, value in values]
         memory.now_ns = self.now_ns
         for element, value in accepted:
-            self._inputs.write(view, element, value, writer)
+            self.inputs.write(view, element, value, writer)
         self.observers.tell_writes()
 
     def force(self, name: str, value: Value, writer: int = OPERATOR_WRITER) -> None:
@@ -326,50 +355,14 @@ class Rack:
             module.load(state.modules[module.config.slot])
         self._forcing.load()
         self.events.load(state.events)
+        self._begin_plants()
+
+    def _begin_plants(self) -> None:
         self._feeds.begin(self.operations, self.observers)
         self.sampling.begin()
 
     def _execution(self, module: str) -> Execution:
         return ProcessorTime(self.scheduler, module) if self.config.execution is Timing.MODELED else IDEAL
-
-    def _install(
-        self,
-        task: TaskConfig,
-        execution: Execution,
-        *,
-        memory: Memory | None = None,
-        trigger: MakeTrigger | None = None,
-        then: Callable[[Task], None] | None = None,
-    ) -> ScheduledTask:
-        installed = make_task(
-            self._installation.compiled(task.name),
-            memory or self.memory,
-            writer=self._ids[task.name],
-            slot=self._slots[task.name],
-            priority=task.priority,
-            backplane=self.backplane,
-            events=self.events,
-            channels=self.channels,
-            drives=self.drives,
-        )
-        return ScheduledTask(
-            installed,
-            self._installation.sources[task.name],
-            scheduler=self.scheduler,
-            trigger=trigger or self._usual_trigger,
-            execution=execution,
-            after=self._after if then is None else partial(self._after_and, then),
-            stopwatch=self._stopwatch,
-        )
-
-    def _usual_trigger(self, task: Task) -> Trigger:
-        """Return the trigger of a task as it is installed; the interrupts that it waits for are connected."""
-        self._interrupts.bind(task)
-        if isinstance(task, CmlTask):
-            return DriveTrigger(task)
-        if isinstance(task, BasicTask):
-            return WaitTrigger(task, self.events, self.channels, self.scheduler, lambda: self._no_event(task))
-        return usual_trigger(task, self.events, self.scheduler, self._no_event)
 
     def _no_event(self, task: Task) -> None:
         next(item for item in self.scheduled if item.task is task).fault(EVENT_TIMEOUT)
@@ -378,14 +371,10 @@ class Rack:
         if self.operations.powered:
             self.operations.stop_all(reason, code)
 
-    def _after_and(self, then: Callable[[Task], None], task: Task, record: ScanRecord | None) -> None:
-        self._after(task, record)
-        then(task)
-
     def _after(self, task: Task, record: ScanRecord | None) -> None:
         if record is not None:
             self.observers.scanned(task, record)
-        if self._inputs.frozen and self._inputs.scanned(task.name):
+        if self.inputs.frozen and self.inputs.scanned(task.name):
             self.observers.tell_writes()
         if task.status is _FAULTED:
             last = task.errors.last

@@ -36,6 +36,7 @@ class CommonMemory(Image):
         self._locals_forced = False
         self._force_watchers: list[Callable[[], None]] = []
         self._log: list[Write] | None = None
+        self._causes: list[Write] | None = None
         self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
 
     def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
@@ -148,6 +149,19 @@ class CommonMemory(Image):
         entries, self._log = self._log or [], None if self._log is None else []
         return entries
 
+    def keep_causes(self) -> None:
+        """Begin to keep what was written by name, without what follows from it on views of the same registers.
+
+        Whoever asks must ``take_causes``.
+        """
+        if self._causes is None:
+            self._causes = []
+
+    def take_causes(self) -> list[Write]:
+        """Return these writes since they were last taken, oldest first."""
+        causes, self._causes = self._causes or [], None if self._causes is None else []
+        return causes
+
     def clear(self, writer: int = 0, *, keep_non_volatile: bool = True, kept: Container[tuple[int, int]] = ()) -> None:
         """Set volatile variables to 0, except what is forced: STOP ALL and system restart (2.4.5).
 
@@ -185,6 +199,8 @@ class CommonMemory(Image):
         self.sequence += 1
         if self._log is not None:
             self._log.append(Write(self.sequence, self.now_ns, writer, kind, view, element, value))
+        if self._causes is not None:
+            self._causes.append(Write(self.sequence, self.now_ns, writer, kind, view, element, value))
         if entries:
             # What shares registers with a forced view is not forced itself.
             told = WriteKind.OUTSIDE if kind in (WriteKind.FORCE, WriteKind.RELEASE) else kind

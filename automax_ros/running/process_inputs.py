@@ -53,14 +53,14 @@ class ProcessInputs:
         """Let values from outside pass through a function before they reach a variable."""
         self._shapes.update(dict.fromkeys(keys, shape))
 
-    def write(self, view: int, element: int, value: Value, writer: int) -> None:
+    def write(self, view: int, element: int, value: Value, writer: int, kind: WriteKind = WriteKind.OUTSIDE) -> None:
         """Write a value that fits its variable, now or when it is free again."""
         key = view, element
         if key in self._shapes:
             value = self._shapes[key](value)
         freezer = self.frozen.get(key)
         if freezer is None:
-            self._memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
+            self._memory.write_now(view, value, writer, element, kind)
         else:
             # Last in order, so that a word written after one of its bits wins over it.
             freezer.kept.pop(key, None)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
@@ -15,8 +16,18 @@ from automax_ros.running.views import Place, ViewSpec
 
 Entry = tuple[int, int, Value]
 """View, element, value."""
-_WORD = 0xFFFF
+WORD = 0xFFFF
+"""All bits of a register."""
 _TWO_WORDS = (DataType.DOUBLE, DataType.REAL)
+
+
+class Part(NamedTuple):
+    """What a write says of one register: the bits of ``mask`` are those of ``bits``."""
+
+    bank: int
+    register: int
+    bits: int
+    mask: int
 
 
 class RegisterMap:
@@ -52,6 +63,16 @@ class RegisterMap:
             if shown != read(other, 0):
                 yield other, 0, shown
 
+    def parts(self, view: int, element: int, value: Value) -> list[Part]:
+        """Return what a write of a point or a register says of the registers that it touches."""
+        place = self._places.get(view)
+        if place is None:
+            return [Part(view, element, _unsigned(value), WORD)]
+        if place.bit is not None:
+            return [Part(place.bank, place.register, int(bool(value)) << place.bit, 1 << place.bit)]
+        words = self._words(view, element, value, lambda *_: 0)
+        return [Part(place.bank, register, word, WORD) for register, word in words.items()]
+
     def keeping(
         self,
         view: int,
@@ -64,7 +85,7 @@ class RegisterMap:
         for point in self._points.get((view, element), ()):
             if (point, 0) in forced:
                 bit = self._places[point].bit
-                mask = _WORD if bit is None else 1 << bit
+                mask = WORD if bit is None else 1 << bit
                 value = _signed(_unsigned(value) & ~mask | _unsigned(read(view, element)) & mask)
         return value
 
@@ -92,14 +113,14 @@ class RegisterMap:
         place, kind = self._places.get(view), self._types[view]
         number = _real_bits(value) if place is not None and kind is DataType.REAL else int(value)
         if place is None:
-            return {element: number & _WORD}
+            return {element: number & WORD}
         first = place.register
         if place.bit is not None:
             before = _unsigned(read(place.bank, first))
             return {first: before & ~(1 << place.bit) | number << place.bit}
         if kind in _TWO_WORDS:
-            return {first: number >> 16 & _WORD, first + 1: number & _WORD}
-        return {first: number & _WORD}
+            return {first: number >> 16 & WORD, first + 1: number & WORD}
+        return {first: number & WORD}
 
     def _shown(self, view: int, words: dict[int, int], read: Callable[[int, int], Value]) -> Value:
         """Return what a point shows of its registers; ``words`` are those that have just changed."""
@@ -120,7 +141,7 @@ def _signed(word: int) -> int:
 
 def _unsigned(value: Value) -> int:
     assert not isinstance(value, str)
-    return int(value) & _WORD
+    return int(value) & WORD
 
 
 def _real_bits(value: int | float) -> int:

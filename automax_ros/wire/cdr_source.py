@@ -34,7 +34,8 @@ from automax_ros.wire.cdr_parts import (
     together,
 )
 from automax_ros.wire.definitions import TIME, Field, message_types
-from automax_ros.wire.messages import CLASSES, NO_VALUES, Values
+from automax_ros.wire.messages import CLASSES
+from automax_ros.wire.values import NO_VALUES, Values
 
 MAX_TRAILING = 64
 """Bytes that may follow a message: ROS sizes its buffers as if padding followed empty sequences."""

@@ -10,19 +10,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from automax_ros.core.kinds import Direction
-
-
-class Values(NamedTuple):
-    """Values of common variables: entry i is ``element[i]`` of ``variable[i]``."""
-
-    variable: Sequence[int] = ()
-    element: Sequence[int] = ()
-    value: Sequence[float] = ()
-    text: Sequence[str] = ()
-
-
-NO_VALUES = Values()
-"""The one empty Values: most messages of a recording hold it, and the codec knows it by its identity."""
+from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence
+from automax_ros.wire.values import NO_VALUES, Values
 
 
 class CommonWrite(NamedTuple):
@@ -261,10 +250,13 @@ class UInt8MultiArray(NamedTuple):
 HELD_MARK = "forced "
 """Begins the fields without values that stand first in a TaskState: the names of the locals that a force holds."""
 _OWN = (
+    BusImage,
+    BusWrite,
     CommonImage,
     CommonWrite,
     Operation,
     PlantState,
+    Presence,
     Scan,
     ScanError,
     TaskState,

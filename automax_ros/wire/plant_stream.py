@@ -11,7 +11,7 @@ from math import nan
 from automax_ros.drive.plant import DrivePlant
 from automax_ros.drive.plant_meter import Means
 from automax_ros.drive.plant_signals import Energies, signals_of
-from automax_ros.rack.plants.driven import DrivenPlant, driven_plants
+from automax_ros.rack.plants.driven import DrivenPlant
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import JOINTS, plant_topic
 from automax_ros.wire.cdr import encoder
@@ -41,7 +41,7 @@ class PlantStream:
     def __init__(self, rack: Rack, space: str, stamp: Callable[[int], int]) -> None:
         """Prepare the topics; nothing flows before ``begin``."""
         self._rack, self._stamp = rack, stamp
-        self._plants = [_Plant(driven, rack.plants[driven.name], space) for driven in driven_plants(rack.config)]
+        self._plants = [_Plant(driven, rack.plants[driven.name], space) for driven in rack.part.driven]
         self._encode_state, self._encode_joint = encoder(NAMES[PlantState]), encoder(NAMES[JointState])
 
     @property

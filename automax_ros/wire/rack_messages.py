@@ -21,7 +21,6 @@ from automax_ros.wire.messages import (
     HELD_MARK,
     NAMES,
     NO_LAYOUT,
-    NO_VALUES,
     Bool,
     CommonImage,
     CommonWrite,
@@ -39,11 +38,11 @@ from automax_ros.wire.messages import (
     String,
     TaskState,
     UInt8MultiArray,
-    Values,
     Variable,
     VariableTable,
     Writer,
 )
+from automax_ros.wire.values import NO_VALUES, Values
 
 Message = tuple[object, ...]
 SCALED_TYPE = NAMES[Float32]

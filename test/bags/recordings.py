@@ -23,12 +23,12 @@ from automax_ros.wire.messages import (
     Int16,
     Scan,
     ScanError,
-    Values,
     Variable,
     VariableTable,
     Writer,
 )
 from automax_ros.wire.qos import LATCHED, SCAN, VALUE
+from automax_ros.wire.values import Values
 
 MS = 1_000_000
 RUN = 77
@@ -126,6 +126,7 @@ _RANGES = {
     "int32": (-(2**31), 2**31 - 1),
     "uint32": (0, 2**32 - 1),
     "uint64": (0, 2**64 - 1),
+    "int64": (-(2**63), 2**63 - 1),
 }
 
 

@@ -22,8 +22,9 @@ from automax_ros.bags.repair.rewriting import Found, kept
 from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import NAMES, CommonWrite, Int16, Scan, String, Values
+from automax_ros.wire.messages import NAMES, CommonWrite, Int16, Scan, String
 from automax_ros.wire.qos import LATCHED, VALUE
+from automax_ros.wire.values import Values
 
 from .others import assert_mcap_reads, rosbags_messages
 from .recordings import TABLE, image_of, record, write_of

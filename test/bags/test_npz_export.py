@@ -21,8 +21,9 @@ from automax_ros.bags.scan_table import ScanTable
 from automax_ros.bags.series import Window
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.messages import Scan, Values
+from automax_ros.wire.messages import Scan
 from automax_ros.wire.stream import RackStream
+from automax_ros.wire.values import Values
 
 from .independent import GOLDEN, ROOT, decoded, nanoseconds, steps_of
 from .recordings import MS, TABLE, image_of, record, write_of

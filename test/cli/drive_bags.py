@@ -16,11 +16,11 @@ from automax_ros.wire.messages import (
     PlantState,
     Scan,
     ScanError,
-    Values,
     Variable,
     VariableTable,
 )
 from automax_ros.wire.qos import LATCHED, SCAN
+from automax_ros.wire.values import Values
 
 S = 1_000_000_000
 

@@ -14,7 +14,8 @@ from automax_ros.rack.rack import Rack
 from automax_ros.replay.compare import SETTLED_SCANS, Found, Label, Seen, Tallies, within
 from automax_ros.replay.report import Kind
 from automax_ros.replay.same import same_bits
-from automax_ros.wire.messages import Scan, ScanError, TaskState, Values
+from automax_ros.wire.messages import Scan, ScanError, TaskState
+from automax_ros.wire.values import Values
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed, rewritten
 

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from automax_ros.bags.errors import BagError
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.replay.stored_rack import SourceRefused
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, Values, VariableTable
+from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable
+from automax_ros.wire.values import Values
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed, rewritten
 

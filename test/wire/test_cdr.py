@@ -19,7 +19,6 @@ from automax_ros.wire.definitions import TIME, message_types, schema_text
 from automax_ros.wire.messages import (
     CLASSES,
     NAMES,
-    NO_VALUES,
     Bool,
     Clock,
     CommonWrite,
@@ -31,8 +30,8 @@ from automax_ros.wire.messages import (
     Scan,
     ScanError,
     String,
-    Values,
 )
+from automax_ros.wire.values import NO_VALUES, Values
 
 ALL = sorted(CLASSES)
 REPEATABLE = settings(deadline=None, derandomize=True, max_examples=60)
@@ -85,7 +84,7 @@ class Model:
 
     def value(self, kind: str, value: Any) -> None:
         codes = {"bool": "?", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "uint64": "Q"}
-        codes |= {"float32": "f", "float64": "d"}
+        codes |= {"int64": "q", "float32": "f", "float64": "d"}
         if kind == TIME:
             self.number("i", value // 10**9)
             self.number("I", value % 10**9)

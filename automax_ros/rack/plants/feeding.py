@@ -54,11 +54,11 @@ class PlantFeeds:
         inputs: ProcessInputs,
         scheduler: Scheduler,
     ) -> None:
-        """Take what is fed; nothing is posted yet."""
+        """Take what is fed by these plants; nothing is posted yet."""
         self._plants, self._memory, self._inputs, self._scheduler = plants, memory, inputs, scheduler
         writers = {item.name: item.id for item in writers_of(config) if item.kind is WriterKind.PLANT}
         self._groups: dict[tuple[str, int], list[_Feed]] = {}
-        for item in config.feeds:
+        for item in (feed for feed in config.feeds if feed.plant in plants):
             feed = _Feed(item, memory.view(item.common), writers[item.plant], SIGNALS[item.signal])
             self._groups.setdefault((item.plant, item.every_ns), []).append(feed)
 
