@@ -9,7 +9,7 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 BACKOFFS_NS = (100 * NS_PER_MS, NS_PER_S)
 """How long after its death a process is started again: the first one in ``WINDOW_NS``, the second (decision)."""
 MOST_DEATHS = 3
-"""So many deaths within ``WINDOW_NS`` and a process is given up: it would die again (decision)."""
+"""This many deaths within ``WINDOW_NS`` and a process is given up: it would die again (decision)."""
 WINDOW_NS = 10 * NS_PER_S
 """The time in which deaths count together (decision)."""
 

@@ -1,4 +1,4 @@
-"""One rack of a name in one ROS domain on one host: a file lock that dies with its process."""
+"""One rack of a name, or one process of each of its seats, in one ROS domain on one host: locks that die with it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class LockError(Fault):
 
 
 class RackAlreadyRuns(LockError):
-    """Another process of this host runs a rack of the same name in the same ROS domain."""
+    """Another process of this host runs the rack, or this seat of it, in the same ROS domain."""
 
 
 def domain_id() -> int:
@@ -37,13 +37,18 @@ def domain_id() -> int:
 
 
 class RackLock:
-    """Holds the lock while the ``with`` block lasts; the kernel frees it when the process ends, however it ends."""
+    """Holds the lock while the ``with`` block lasts; the kernel frees it when the process ends, however it ends.
 
-    def __init__(self, namespace: str, domain: int) -> None:
+    A process with the whole rack holds the rack alone. One with a ``seat`` of a rack that is distributed shares the
+    rack with those of other seats, and holds its seat alone.
+    """
+
+    def __init__(self, namespace: str, domain: int, seat: str | None = None) -> None:
         """Name the lock; nothing is taken yet."""
-        self._rack = f"rack /{namespace} in ROS domain {domain}"
-        self._path = Path(tempfile.gettempdir()) / f"automax_ros_{os.getuid()}_{domain}_{namespace}.lock"
-        self._file = -1
+        self._rack, self._seat = f"rack /{namespace} in ROS domain {domain}", seat
+        name = f"automax_ros_{os.getuid()}_{domain}_{namespace.replace('/', '.')}"
+        self._path = Path(tempfile.gettempdir()) / f"{name}.lock"
+        self._files: list[int] = []
 
     def __enter__(self) -> RackLock:
         """Take the lock.
@@ -53,24 +58,42 @@ class RackLock:
             LockError: its file cannot be opened.
         """
         try:
-            self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
-        except OSError as error:
-            raise LockError(f"{self._rack}: cannot open the lock file {self._path}: {error.strerror}") from error
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            holder = os.pread(self._file, 32, 0).decode("ascii", "replace").strip()
-            os.close(self._file)
-            by = f" (process {holder})" if holder.isdigit() else ""
-            raise RackAlreadyRuns(
-                f"{self._rack} runs already{by}: stop it first, or set another ROS_DOMAIN_ID"
-            ) from None
-        os.ftruncate(self._file, 0)
-        os.pwrite(self._file, f"{os.getpid()}\n".encode(), 0)
+            if self._seat is None:
+                self._take(self._path, self._rack, fcntl.LOCK_EX)
+            else:
+                self._take(self._path, self._rack, fcntl.LOCK_SH)
+                self._take(
+                    self._path.with_suffix(f".{self._seat}.lock"), f"{self._seat} of {self._rack}", fcntl.LOCK_EX
+                )
+        except LockError:
+            self._free()
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Free the lock; the file stays, since removing it would let two processes hold two files of one name."""
-        os.close(self._file)
+        """Free the lock; its files stay, since removing one would let two processes hold two files of one name."""
+        self._free()
+
+    def _take(self, path: Path, what: str, how: int) -> None:
+        try:
+            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except OSError as error:
+            raise LockError(f"{what}: cannot open the lock file {path}: {error.strerror}") from error
+        self._files.append(file)
+        try:
+            fcntl.flock(file, how | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = os.pread(file, 32, 0).decode("ascii", "replace").strip()
+            # Those who share a file leave it empty.
+            by = f" (process {holder})" if holder.isdigit() else " (distributed over several processes)"
+            raise RackAlreadyRuns(f"{what} runs already{by}: stop it first, or set another ROS_DOMAIN_ID") from None
+        os.ftruncate(file, 0)
+        if how == fcntl.LOCK_EX:
+            os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+
+    def _free(self) -> None:
+        for file in self._files:
+            os.close(file)
+        self._files.clear()

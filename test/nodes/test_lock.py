@@ -30,6 +30,33 @@ def test_lock_is_free_afterwards():
             pass
 
 
+def test_seats_share_a_rack_and_hold_their_own():
+    with RackLock("line1", 7, "processor_1"), RackLock("line1", 7, "processor_2"):
+        with pytest.raises(
+            RackAlreadyRuns, match=rf"processor_1 of rack /line1 in ROS domain 7 runs already \(process {os.getpid()}\)"
+        ):
+            RackLock("line1", 7, "processor_1").__enter__()
+        with RackLock("line1", 7, "processor_3"):
+            pass
+
+
+def test_whole_rack_and_its_seats_exclude_each_other():
+    with RackLock("line1", 7), pytest.raises(RackAlreadyRuns, match=rf"rack /line1 .* \(process {os.getpid()}\)"):
+        RackLock("line1", 7, "processor_1").__enter__()
+    with RackLock("line1", 7, "processor_1"):
+        with pytest.raises(RackAlreadyRuns, match=r"\(distributed over several processes\)"):
+            RackLock("line1", 7).__enter__()
+        with RackLock("line1", 8):
+            pass
+    with RackLock("line1", 7):
+        pass
+
+
+def test_rack_below_a_namespace_has_a_lock_of_its_own():
+    with RackLock("plant/line1", 7), RackLock("plant_line1", 7), RackLock("line1", 7):
+        pass
+
+
 def test_lock_is_free_after_an_error():
     with pytest.raises(ZeroDivisionError), RackLock("line1", 7):
         raise ZeroDivisionError
