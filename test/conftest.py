@@ -14,7 +14,7 @@ from automax_ros.nodes.environment import put_prefix_first
 
 # No test talks to, or hears, the plant's network.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-for inherited in ("ROS_STATIC_PEERS", "RMW_IMPLEMENTATION", "FASTRTPS_DEFAULT_PROFILES_FILE"):
+for inherited in ("ROS_STATIC_PEERS", "ROS_NAMESPACE", "RMW_IMPLEMENTATION", "FASTRTPS_DEFAULT_PROFILES_FILE"):
     os.environ.pop(inherited, None)
 put_prefix_first()
 

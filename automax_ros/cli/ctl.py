@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from automax_ros.cli.ctl_actions import ACTIONS, Action, Ask
 from automax_ros.cli.ctl_watch import values_of, watch
 from automax_ros.cli.rack_space import space_of
-from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds_above_0
@@ -30,6 +30,7 @@ DEFAULT_TIMEOUT_S = "5"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax ctl`` and of its actions."""
     parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file or folder")
+    add_ros_arguments(parser)
     actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
     for name, action in ACTIONS.items():
         own = actions.add_parser(name, help=action.help, description=action.help)
@@ -47,13 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Ask the rack; 1 where it refused something, 2 where it could not be asked."""
     action = ACTIONS[arguments.action]
-    domain = prepare_ros()
-    space = space_of(arguments.rack)
+    domain = prepare_ros(arguments)
+    ros = ros_arguments(arguments)
+    space = space_of(arguments.rack, ros)
     asks = action.asks(arguments)
     from automax_ros.nodes.operating import NotOperable, RackClient
 
     try:
-        with RackClient(space) as client:
+        with RackClient(space, ros) as client:
             client.find(arguments.timeout)
             if action.repeats:
                 return _watched(client, asks[0], arguments)

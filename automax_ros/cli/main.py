@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from types import ModuleType
     from typing import NoReturn
 
+    from automax_ros.nodes.ros_arguments import RosArguments
+
 SUBCOMMANDS: dict[str, str] = {
     "check": "find everything that is wrong with tasks and rack files",
     "trace": "run a task scan by scan on a CSV table",
@@ -47,6 +49,8 @@ SUBCOMMANDS: dict[str, str] = {
 
 A dash in the name is an underscore in the module's; a word of Python has one at its end."""
 
+ROS_ARGUMENTS = "--ros-args"
+"""What the ROS arguments of a command line begin with."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
 BROKEN_PIPE = 141
@@ -88,19 +92,22 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: list[str]) -> int:
     from automax_ros.core.faults import Fault
 
-    # The options before the subcommand take no values, so the first word is its name.
-    name = next((word for word in argv if not word.startswith("-")), None)
+    name: str | None = None
     try:
+        words, ros = _split(argv)
+        # The options before the subcommand take no values, so the first word is its name.
+        name = next((word for word in words if not word.startswith("-")), None)
         if name is not None and name not in SUBCOMMANDS:
             raise _unknown(name)
         module = _module(name) if name is not None else None
         parser, own = _parser(name, module)
-        arguments, unknown = parser.parse_known_args(argv)
+        arguments, unknown = parser.parse_known_args(words)
         if unknown:
             own.error(f"unrecognized arguments: {' '.join(unknown)}")
         if module is None:
             parser.print_help(sys.stderr)
             return 2
+        _hand_over(ros, arguments)
         return _exit_code(module.run(arguments))
     except Fault as error:
         head = "" if error.place else f"automax{f' {name}' if name in SUBCOMMANDS else ''}: error: "
@@ -108,6 +115,31 @@ def _run(argv: list[str]) -> int:
         return 2
     except SystemExit as stop:  # argparse's way to end after --help, --version and wrong usage
         return _exit_code(stop.code)
+
+
+def _split(argv: list[str]) -> tuple[list[str], RosArguments | None]:
+    """Return the command line without its ROS arguments, and these where there are any."""
+    if ROS_ARGUMENTS not in argv:
+        return argv, None
+    from automax_ros.nodes.ros_arguments import split_arguments
+
+    return split_arguments(argv)
+
+
+def _hand_over(ros: RosArguments | None, arguments: argparse.Namespace) -> None:
+    """Give a subcommand its ROS arguments.
+
+    One that makes no nodes refuses them: they would have no effect. Launch files always pass ``--ros-args``, which
+    alone is allowed (decision).
+    """
+    if ros is None:
+        return
+    if hasattr(arguments, "ros"):
+        arguments.ros = ros
+    elif ros.given:
+        from automax_ros.cli.usage import UsageError
+
+        raise UsageError(f"{ROS_ARGUMENTS}: this subcommand makes no ROS nodes", "leave it out")
 
 
 def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.ArgumentParser, argparse.ArgumentParser]:

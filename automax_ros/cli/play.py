@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.playback import NOT_CHOSEN, Renaming, Survey, choose, survey
 from automax_ros.cli.numbers import option_number
 from automax_ros.cli.progress import ProgressBar
-from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
 from automax_ros.cli.usage import UsageError
@@ -28,10 +28,11 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 
 if TYPE_CHECKING:
     from automax_ros.nodes.player import Player
+    from automax_ros.nodes.ros_arguments import RosArguments
 
 MAX_RATE = 1000
 _SPACE = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*){0,7}/?")
-_SIMPLE = re.compile(r"/[a-z0-9_]+")
+_SIMPLE = re.compile(r"(/[A-Za-z0-9_]{1,64}){1,4}")
 _PERMILLE = 1000
 _SKIPPED_NAMED = 20
 
@@ -54,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--namespace", metavar="NS", help="play into this namespace in place of the rack's")
     parser.add_argument("--start-paused", action="store_true", help="wait for the service ~/resume")
     parser.add_argument("--force", action="store_true", help="play even where a rack of this name is live")
+    add_ros_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -62,12 +64,13 @@ def run(arguments: argparse.Namespace) -> int:
     window_of(arguments)
     target = _namespace(arguments.namespace)
     with stop_signals() as stop:
-        domain = prepare_ros()
+        domain = prepare_ros(arguments)
+        ros = ros_arguments(arguments)
         found = _survey(arguments.bag, arguments.start, arguments.end, stop)
         if found is None:
             return 0
         _choose(found, arguments.topics)
-        renaming = Renaming(found.spaces, target)
+        renaming = Renaming(found.spaces, target or _placed(found.spaces, ros))
         return _play(found, renaming, rate, arguments, stop, domain)
 
 
@@ -94,7 +97,7 @@ def _play(
     from automax_ros.nodes.player import Player
 
     with nullcontext() if arguments.force else _locks(found, renaming, domain):
-        player = Player(found, renaming, rate, clock=arguments.clock)
+        player = Player(found, renaming, rate, clock=arguments.clock, arguments=ros_arguments(arguments))
         try:
             return _Show(found, player, stop, domain).play(arguments)
         finally:
@@ -202,6 +205,14 @@ def _rate(text: str) -> float:
     if rate == 0:
         raise UsageError("--rate: 0 would never end")
     return rate
+
+
+def _placed(spaces: Collection[str], ros: RosArguments) -> str | None:
+    """Return the namespace to play into where ROS arguments give one: in it, under the rack's own name (decision)."""
+    if not ros.namespace:
+        return None
+    own = next(iter(spaces)).rpartition("/")[2] if len(spaces) == 1 else ""
+    return f"/{ros.placed(own)}"
 
 
 def _namespace(text: str | None) -> str | None:

@@ -9,6 +9,7 @@ from automax_ros.cli.rack_file import is_rack_folder, load_rack_file
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import quoted
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.ros_names import namespace
 
@@ -33,17 +34,19 @@ def config_of(path: Path) -> RackConfig:
     return result.config
 
 
-def space_of(text: str) -> str:
+def space_of(text: str, ros: RosArguments = NO_ARGUMENTS) -> str:
     """Return the namespace with its slash, such as ``/pm1``, of a rack's name, namespace, YAML file or folder.
+
+    It lies in the namespace that ROS arguments give, unless it begins with a slash.
 
     Raises:
         UsageError: it is none of these.
     """
     if names_file(text):
-        return f"/{config_of(Path(text)).namespace}"
+        return f"/{ros.placed(config_of(Path(text)).namespace)}"
     space = text.strip().rstrip("/")
     if space and "/" not in space:
         space = namespace(space)
     if not _SPACE.fullmatch(space):
         raise UsageError(f"{quoted(text)} is neither a rack's name or namespace nor a YAML file or its folder")
-    return f"/{space.lstrip('/')}"
+    return space if space.startswith("/") else f"/{ros.placed(space)}"

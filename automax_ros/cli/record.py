@@ -21,7 +21,7 @@ from automax_ros.bags.writer import StorageOptions
 from automax_ros.cli.rack_space import config_of, names_file, space_of
 from automax_ros.cli.record_options import split_seconds, storage_options
 from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
-from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
 from automax_ros.cli.usage import UsageError
@@ -36,6 +36,7 @@ from automax_ros.wire.rack_files import RACK_FILE, RackFile, RackFilesError, sou
 
 if TYPE_CHECKING:
     from automax_ros.nodes.recorder import LiveRecorder
+    from automax_ros.nodes.ros_arguments import RosArguments
 
 DEFAULT_WAIT_S = "10"
 _PATIENCE_S = 3.0
@@ -67,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_WAIT_S,
         help=f"seconds to look for the rack (default: {DEFAULT_WAIT_S})",
     )
+    add_ros_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -74,15 +76,16 @@ def run(arguments: argparse.Namespace) -> int:
     storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
     how = _Storing(storage, arguments.split_s or 0, arguments.tasks)
     with stop_signals() as stop:
-        domain = prepare_ros()
-        own, own_files = _rack(arguments.rack)
+        domain = prepare_ros(arguments)
+        ros = ros_arguments(arguments)
+        own, own_files = _rack(arguments.rack, ros)
         folder = arguments.output or Path(f"{own.strip('/').replace('/', '_')}_{datetime.now():%Y-%m-%d_%H-%M-%S}")
         if folder.exists():
             print(RecordingError("AMX6800", folder, "exists already, not overwriting"), file=sys.stderr)
             return 2
         from automax_ros.nodes.recorder import LiveRecorder
 
-        recorder = LiveRecorder(own)
+        recorder = LiveRecorder(own, ros)
         session = _Session(recorder, own, domain, stop)
         try:
             return session.record(folder, arguments.wait, arguments.duration, how, own_files)
@@ -264,13 +267,13 @@ class _Session:
         return 0
 
 
-def _rack(text: str) -> tuple[str, list[RackFile]]:
+def _rack(text: str, ros: RosArguments) -> tuple[str, list[RackFile]]:
     """Return the namespace with its slash, and the files where RACK is a YAML file."""
     if not names_file(text):
-        return space_of(text), []
+        return space_of(text, ros), []
     config = config_of(Path(text))
     sources = [RackFile(source_name(task.name, task.file.name), source.text) for task, source, _ in check_tasks(config)]
-    return f"/{config.namespace}", [RackFile(RACK_FILE, config.text), *sources]
+    return f"/{ros.placed(config.namespace)}", [RackFile(RACK_FILE, config.text), *sources]
 
 
 def _tasks(table: VariableTable) -> list[str]:

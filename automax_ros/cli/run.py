@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
@@ -16,7 +17,7 @@ from automax_ros.cli.output_files import held_for_writing, require_different_fil
 from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
 from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
 from automax_ros.cli.record_options import add_record_arguments, recording_options
-from automax_ros.cli.ros import prepare_ros
+from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.run_plan import RunPlan
 from automax_ros.cli.run_simulated import run_simulated
 from automax_ros.cli.signals import stop_signals
@@ -25,6 +26,7 @@ from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
 from automax_ros.cli.window import seconds_above_0
 from automax_ros.core.faults import Fault
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.retention import RetentionFault
@@ -63,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--report", type=Path, metavar="FILE.json", help="write how the run ended: tasks, commons, forces, operations"
     )
     add_outside_argument(parser)
+    add_ros_arguments(parser)
 
 
 def _folder(text: str) -> Path:
@@ -76,13 +79,17 @@ def run(arguments: argparse.Namespace) -> int:
     duration_ns = arguments.duration
     if arguments.simulated and arguments.record is not None and duration_ns is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
+    if arguments.simulated and arguments.ros is not None and arguments.ros.given:
+        raise UsageError("--ros-args: with --simulated nothing of ROS is started", "leave one of them out")
     _check_files(arguments)
     with stop_signals() as stop, held_for_writing(arguments.report):
         if not arguments.simulated:
-            prepare_ros(WITHOUT_ROS)
+            prepare_ros(arguments, WITHOUT_ROS)
         config = config_of(arguments.config, allow_outside=arguments.allow_outside)
         if config is None:
             return 1
+        ros = NO_ARGUMENTS if arguments.simulated else ros_arguments(arguments)
+        config = replace(config, namespace=ros.placed(config.namespace))
         plan = RunPlan(
             config,
             duration_ns,
@@ -94,6 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.stimuli,
             arguments.report,
             arguments.allow_outside,
+            ros,
         )
         try:
             if arguments.simulated:

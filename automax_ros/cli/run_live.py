@@ -13,6 +13,7 @@ from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.stimuli_file import stimulation as stimulation_of
+from automax_ros.nodes.discovery_range import range_text
 from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import RackLock, domain_id
 from automax_ros.rack.operation_log import OperationLog
@@ -36,7 +37,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     warn(rack)
     stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     state = StateKeeping(rack, plan.state or default_folder(plan.config))
-    live = LiveRack(rack)
+    live = LiveRack(rack, plan.ros)
     services = OperationLog(lambda: stimulation.is_acting)
     rack.observers.add(services)
     recorder: Recorder | None = None
@@ -103,5 +104,5 @@ def _opening(rack: Rack, domain: int) -> str:
     )
     return (
         f"rack {config.name}: {modules}; {len(config.declared)} common variables\n"
-        f"ROS 2 namespace /{config.namespace} in domain {domain}; Ctrl-C ends the run"
+        f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"
     )

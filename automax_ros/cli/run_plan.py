@@ -12,6 +12,7 @@ from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.cli.output_files import write_report
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.core.types import Value
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.report import report_of
@@ -26,7 +27,8 @@ class RunPlan:
 
     ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the one that was
     named for values that outlive the run, if any. ``stimuli`` is the file of what happens to the rack, ``report`` that
-    in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders.
+    in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
+    command line says to ROS.
     """
 
     config: RackConfig
@@ -39,6 +41,7 @@ class RunPlan:
     stimuli: Path | None = None
     report: Path | None = None
     allow_outside: bool = False
+    ros: RosArguments = NO_ARGUMENTS
 
 
 def warn(rack: Rack) -> None:

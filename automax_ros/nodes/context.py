@@ -5,12 +5,10 @@ from __future__ import annotations
 from rclpy.context import Context
 
 from automax_ros.nodes.environment import RosUnavailable
-
-_NO_CONSOLE = ["--ros-args", "--disable-stdout-logs"]
-"""The console belongs to the command; what nodes log goes to /rosout and to the log files."""
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 
 
-def joined_context() -> Context:
+def joined_context(arguments: RosArguments = NO_ARGUMENTS) -> Context:
     """Return a context that has joined the graph; whoever asks shuts it down.
 
     Raises:
@@ -18,7 +16,7 @@ def joined_context() -> Context:
     """
     context = Context()
     try:
-        context.init(args=_NO_CONSOLE)
+        context.init(args=arguments.words)
     except RuntimeError as error:
         raise RosUnavailable(f"ROS 2 does not start: {error}") from error
     return context

@@ -26,6 +26,7 @@ import tempfile
 from pathlib import Path
 
 from automax_ros.core.faults import Fault
+from automax_ros.nodes.discovery_range import choose_range
 
 SETUP_COMMAND = "make setup"
 COLCON_COMMAND = "colcon build"
@@ -39,10 +40,12 @@ class RosUnavailable(Fault):
     """ROS 2, its middleware or automax_msgs cannot be used here; the text names the command that helps."""
 
 
-def prepare(*, may_restart: bool = True) -> None:
+def prepare(*, may_restart: bool = True, discovery: str | None = None) -> None:
     """Set the environment up for rclpy and check that rclpy and automax_msgs can be imported.
 
     Args:
+        discovery: how far this process speaks (``discovery_range.RANGES``); None leaves it as the environment says,
+            and where that says nothing it is this host (``discovery_range.choose_range``).
         may_restart: False where the process must not be replaced, such as in a test runner that captures output or in
             a notebook; troubled surroundings are then an error.
 
@@ -51,6 +54,7 @@ def prepare(*, may_restart: bool = True) -> None:
     """
     restarted = os.environ.pop(_RESTARTED, None) is not None
     put_prefix_first()
+    choose_range(discovery)
     if not os.environ.get("HOME") and not os.environ.get("ROS_LOG_DIR"):
         # ROS wants a place for log files even where none are written; services often run without a home.
         os.environ["ROS_LOG_DIR"] = tempfile.gettempdir()

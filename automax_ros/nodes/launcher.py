@@ -13,6 +13,7 @@ from automax_ros.core.types import Value
 from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.rack_nodes import RackNodes
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.rack import Rack
 
 
@@ -22,7 +23,7 @@ class LiveRack:
     Make it, ``start`` it, then ``run``; ``close`` in any case. ``on_idle`` or a callback sets ``stopping``.
     """
 
-    def __init__(self, rack: Rack) -> None:
+    def __init__(self, rack: Rack, arguments: RosArguments = NO_ARGUMENTS) -> None:
         """Initialise ROS for this process and create all nodes.
 
         Raises:
@@ -30,9 +31,9 @@ class LiveRack:
         """
         self.rack = rack
         self.stopping = False
-        self._context = joined_context()
+        self._context = joined_context(arguments)
         self._executor = make_executor(self._context)
-        self._nodes = RackNodes(rack, context=self._context)
+        self._nodes = RackNodes(rack, context=self._context, arguments=arguments)
         self._nodes.add_to(self._executor)
         self.stream, self.health = self._nodes.stream, self._nodes.health
 

@@ -24,6 +24,7 @@ from rclpy.qos import qos_policy_name_from_kind
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.guard import Guard
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
@@ -33,6 +34,8 @@ from automax_ros.wire.stream import RackStream
 from automax_ros.wire.topics import Take, Topic
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S
+MAIN_NODE = "rack"
+"""The node that ``__node`` without a name means."""
 _SIM_TIME = "use_sim_time"
 
 
@@ -46,6 +49,7 @@ class Site:
         pacer: what keeps it on the wall clock.
         context: of all its nodes.
         health: where they report trouble.
+        arguments: what they were told by the command line.
         lock: held by whoever touches the rack; one thread at a time, between scans.
     """
 
@@ -54,6 +58,7 @@ class Site:
     pacer: Pacer
     context: Context
     health: Health
+    arguments: RosArguments = NO_ARGUMENTS
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     @contextmanager
@@ -72,7 +77,10 @@ class ModuleNode(Node):  # type: ignore[misc]
         # The rack is the clock: its stamps are the grid's, whatever a launch file says to all nodes.
         own_time = [Parameter(_SIM_TIME, value=False)]
         space = f"/{site.rack.config.namespace}"
-        super().__init__(name, namespace=space, context=site.context, parameter_overrides=own_time)
+        name = site.arguments.name_of(name, main=name == MAIN_NODE)
+        # Rules of a foreign context that are for all nodes must not put the rack elsewhere, or give all one name.
+        own_place = ["--ros-args", "-r", f"__ns:={space}", "-r", f"__node:={name}"]
+        super().__init__(name, namespace=space, context=site.context, cli_args=own_place, parameter_overrides=own_time)
         self.site = site
         self.add_on_set_parameters_callback(_refuse_simulated_time)
         self.guard = Guard(site.health, self.get_logger().error)

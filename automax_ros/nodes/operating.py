@@ -13,6 +13,7 @@ from rclpy.parameter import Parameter
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.context import joined_context
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 
 _LOOK_S = 0.05
 _SETTLED_NS = 2 * NS_PER_S
@@ -32,13 +33,13 @@ class RackClient:
         RosUnavailable: ROS cannot be initialised.
     """
 
-    def __init__(self, space: str) -> None:
+    def __init__(self, space: str, arguments: RosArguments = NO_ARGUMENTS) -> None:
         """Join the graph."""
         self._space = space
-        self._context = joined_context()
+        self._context = joined_context(arguments)
         quiet = [Parameter("start_type_description_service", value=False)]
         self._node = Node(
-            f"ctl_{os.getpid()}",
+            arguments.name_of(f"ctl_{os.getpid()}", main=True),
             context=self._context,
             enable_rosout=False,
             start_parameter_services=False,

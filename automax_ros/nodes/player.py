@@ -27,6 +27,7 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.guard import Guard
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.running.health import Health
 from automax_ros.wire.cdr import CdrError, decoder, encoder
@@ -74,14 +75,23 @@ class Player:
         RosUnavailable: ROS cannot be initialised.
     """
 
-    def __init__(self, survey: Survey, renaming: Renaming, rate: float, *, clock: bool) -> None:
+    def __init__(
+        self,
+        survey: Survey,
+        renaming: Renaming,
+        rate: float,
+        *,
+        clock: bool,
+        arguments: RosArguments = NO_ARGUMENTS,
+    ) -> None:
         self.lateness = Lateness()
         self.paused = False
         self.position = survey.begin
         self._survey, self._renaming, self._rate = survey, renaming, rate
-        self._context = joined_context()
+        self._context = joined_context(arguments)
         space = renaming.space(survey.spaces[0]) if survey.spaces else renaming.topic("")
-        self._node = Node("player", namespace=space or "/", context=self._context, enable_rosout=False)
+        name = arguments.name_of("player", main=True)
+        self._node = Node(name, namespace=space or "/", context=self._context, enable_rosout=False)
         self._node.create_service(Trigger, "~/pause", self._pause)
         self._node.create_service(Trigger, "~/resume", self._resume)
         self.health = Health()

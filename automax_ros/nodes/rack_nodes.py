@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -26,6 +27,7 @@ from rclpy.utilities import get_default_context
 from automax_ros.core.types import Value
 from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.registry import nodes_of
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
@@ -48,24 +50,28 @@ class RackNodes:
         nodes: the node of each module.
     """
 
-    def __init__(self, rack: Rack | Path | str, *, context: Context | None = None) -> None:
+    def __init__(
+        self, rack: Rack | Path | str, *, context: Context | None = None, arguments: RosArguments = NO_ARGUMENTS
+    ) -> None:
         """Create the nodes; nothing runs yet.
 
         Args:
             rack: a rack that was not started, or the path of its YAML file.
             context: the context of all nodes, initialised; rclpy's default one if None.
+            arguments: what the nodes are told besides what the context knows: names, the namespace of a rack that is
+                given by its file.
 
         Raises:
             RackError: the YAML file or a task has errors, which ``findings`` holds.
         """
-        self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack))
+        self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
         self.health = Health()
         self._executor: Any = None
         self._pacer = Pacer(self.rack.scheduler, wait=self._serve)
         self._context = get_default_context() if context is None else context
-        self._site = Site(self.rack, self.stream, self._pacer, self._context, self.health)
+        self._site = Site(self.rack, self.stream, self._pacer, self._context, self.health, arguments)
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._site)
@@ -151,8 +157,9 @@ class RackNodes:
         self.nodes[0].guard.serve(self._executor, self._context, seconds)
 
 
-def _loaded(path: Path) -> Rack:
+def _loaded(path: Path, arguments: RosArguments) -> Rack:
     result = load(path)
     if result.config is None:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
-    return Rack(result.config, stopwatch=time.perf_counter_ns)
+    config = replace(result.config, namespace=arguments.placed(result.config.namespace))
+    return Rack(config, stopwatch=time.perf_counter_ns)

@@ -25,6 +25,7 @@ from automax_ros.bags.live.topics import LiveTopics, TopicKind
 from automax_ros.bags.writer import StorageOptions
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.context import joined_context
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.topics import message_class
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import table_of
@@ -82,10 +83,10 @@ class RawSubscription:
 class RecorderNode(Node):  # type: ignore[misc]
     """The node in the graph; it has no services, for nothing spins it."""
 
-    def __init__(self, space: str, context: Context) -> None:
+    def __init__(self, space: str, context: Context, name: str = "recorder") -> None:
         quiet = [Parameter("start_type_description_service", value=False)]
         super().__init__(
-            "recorder",
+            name,
             namespace=space,
             context=context,
             enable_rosout=False,
@@ -109,13 +110,13 @@ class LiveRecorder:
         RosUnavailable: ROS cannot be initialised.
     """
 
-    def __init__(self, space: str) -> None:
+    def __init__(self, space: str, arguments: RosArguments = NO_ARGUMENTS) -> None:
         """Join the graph; ``space`` is the rack's namespace with its slash."""
         self.recording: LiveRecording | None = None
         self.lost_values: Counter[str] = Counter()
         self._space = space
-        self._context = joined_context()
-        self._node = RecorderNode(space, self._context)
+        self._context = joined_context(arguments)
+        self._node = RecorderNode(space, self._context, arguments.name_of("recorder", main=True))
         self._topics = LiveTopics(space)
         self._table = b""
         self._order: ArrivalOrder[tuple[str, bytes]] = ArrivalOrder(HOLD_NS)

@@ -1,0 +1,36 @@
+"""How far a process speaks in its ROS domain.
+
+ROS itself speaks to the whole subnet, and a rack hands out its sources on ``config``. So the range is this host unless
+ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY or ``--range`` says otherwise (decision). Peers of ROS_STATIC_PEERS
+are reached in any range but ``off``.
+"""
+
+from __future__ import annotations
+
+import os
+
+RANGES = ("localhost", "subnet", "off")
+"""What can be chosen; ``off`` finds nobody."""
+_VARIABLE, _PEERS, _OLD = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"
+_WORDS = {"LOCALHOST": "this host", "SUBNET": "the whole subnet", "OFF": "nobody"}
+
+
+def choose_range(chosen: str | None) -> None:
+    """Set the range for this process and its children, before rclpy is initialised; None keeps what is set."""
+    if chosen is not None:
+        os.environ[_VARIABLE] = chosen.upper()
+        os.environ.pop(_OLD, None)
+    elif not os.environ.get(_VARIABLE) and not os.environ.get(_OLD):
+        os.environ[_VARIABLE] = "LOCALHOST"
+
+
+def range_text() -> str:
+    """Return in words whom this process reaches."""
+    name = os.environ.get(_VARIABLE, "").upper()
+    if os.environ.get(_OLD) == "1":
+        return f"this host ({_OLD})"
+    text = _WORDS.get(name, "the whole subnet" if not name else f"range {name[:40]}")
+    peers = [peer for peer in os.environ.get(_PEERS, "").split(";") if peer.strip()]
+    if peers and name != "OFF":
+        text += f" and {', '.join(peers)[:200]}"
+    return text
