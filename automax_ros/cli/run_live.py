@@ -33,7 +33,7 @@ def run_live(plan: RunPlan, stop: StopRequest) -> int:
 
 
 def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
-    rack = Rack(plan.config, stopwatch=time.perf_counter_ns)
+    rack = Rack(plan.config, stopwatch=time.monotonic_ns)
     warn(rack)
     stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     state = StateKeeping(rack, plan.state or default_folder(plan.config))

@@ -162,4 +162,4 @@ def _loaded(path: Path, arguments: RosArguments) -> Rack:
     if result.config is None:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
     config = replace(result.config, namespace=arguments.placed(result.config.namespace))
-    return Rack(config, stopwatch=time.perf_counter_ns)
+    return Rack(config, stopwatch=time.monotonic_ns)

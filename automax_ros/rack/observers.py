@@ -9,6 +9,10 @@ from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import Write
 
+HALT, STEP, RESUME = "pause", "step", "resume"
+"""Operations that concern time alone: they leave every task as it was."""
+_ON_TIME = frozenset({HALT, STEP, RESUME})
+
 
 @dataclass(frozen=True)
 class Operation:
@@ -27,7 +31,7 @@ class Operation:
 
     def concerns(self, task: str) -> bool:
         """Return whether a task may be another after it; ``task`` of a STOP ALL is only the one that caused it."""
-        return self.task in ("", task) or self.what == "stop_all"
+        return self.what not in _ON_TIME and (self.task in ("", task) or self.what == "stop_all")
 
 
 class RackObserver(Protocol):

@@ -14,6 +14,7 @@ from automax_ros.core.diagnostics import SourceText, render
 from automax_ros.core.faults import Fault
 from automax_ros.core.names import NameFault
 from automax_ros.core.text import printable, quoted
+from automax_ros.core.ticks import seconds_ns
 from automax_ros.core.types import DataType, Value, type_of_name
 from automax_ros.core.values import source_text, value_of, wanted
 from automax_ros.rack.controls import Controls
@@ -30,6 +31,8 @@ MAX_VALUE = 1000
 """Longest text of a value that is looked at, in characters (decision: likewise)."""
 MAX_NAMES = 1000
 """Most names in one request (decision: likewise)."""
+MOST_OFF_S = 86_400
+"""Longest time for which the power is switched off, s (decision: a day)."""
 _MOST_FINDINGS = 100
 
 
@@ -70,6 +73,25 @@ class Orders:
     def clear_errors(self, task: str = "") -> None:
         """Clear the error log of a task, of all without a name."""
         self._rack.operations.clear_errors(self._task("clear_errors", task) if task.strip() else None)
+
+    def delete(self, task: str) -> None:
+        """Take a resting task out of the rack; a reload brings it back."""
+        self._rack.operations.delete(self._task("delete", task))
+
+    def power(self, what: str, off_for_s: float = 0.0, *, without_battery: bool = False) -> None:
+        """Switch the power ``off``, ``on``, or off for a time: ``cycle``."""
+        operations, battery = self._rack.operations, not without_battery
+        switched = self._short("power", what, MAX_NAME).strip().lower()
+        if switched == "off":
+            operations.power_off()
+        elif switched == "on":
+            operations.power_on(battery=battery)
+        elif switched != "cycle":
+            self._refuse("power", f"{quoted(what)} is not off, on or cycle")
+        elif not 0.0 <= off_for_s <= MOST_OFF_S:
+            self._refuse("power", f"the power cannot be off for {off_for_s:g} s: it takes 0 to {MOST_OFF_S}")
+        else:
+            operations.power(seconds_ns(off_for_s), battery=battery)
 
     def set(self, name: str, value: str) -> None:
         """Write a common or an array's element once."""
@@ -222,9 +244,10 @@ class Orders:
             self._refuse(what, f"{len(names)} names: at most {MAX_NAMES} are taken at once")
         return names
 
-    def _short(self, what: str, text: str, most: int) -> None:
+    def _short(self, what: str, text: str, most: int) -> str:
         if len(text) > most:
             self._refuse(what, f"a text of {len(text)} characters: at most {most} are read")
+        return text
 
     def _refuse(self, what: str, reason: str, task: str = "") -> NoReturn:
         self._rack.observers.operated(Operation(self._rack.now_ns, what, task, ok=False, reason=reason))

@@ -30,8 +30,9 @@ from automax_ros.rack.plants.feeding import PlantFeeds
 from automax_ros.rack.plants.running import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
 from automax_ros.rack.rack_state import RackState
-from automax_ros.rack.scheduled_task import ScheduledTask, TaskStatistics
+from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.settings import common_named
+from automax_ros.rack.task_statistics import TaskStatistics
 from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.rack.writers import OPERATOR_WRITER, WriterSpec, writers_of
 from automax_ros.running.channels import Channels
@@ -51,7 +52,7 @@ _FAULTED = Status.FAULTED
 
 
 class Rack:
-    """A rack that runs. ``stopwatch`` (ns, monotonic) measures execution times; without one they count as 0.
+    """A rack that runs. ``stopwatch`` (ns, the pacer's clock) measures execution times; without one they count as 0.
 
     ``execution`` executes the scans of all modules in place of what the configuration says (``rack/stepping``).
     ``local`` are the slots whose modules are in this process (``rack/part``), all if None.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.rack.task_statistics import TaskStatistics
 from automax_ros.rack.triggers import Due, MakeTrigger
 from automax_ros.running.execution import Execution, Ideal, Steps
 from automax_ros.running.modeled_scan import Progress
@@ -20,27 +20,6 @@ _RUNNING = Status.RUNNING
 """A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
 After = Callable[[Task, ScanRecord | None], None]
 """Is told of each scan, and of what stands before SCAN_LOOP, right after it."""
-
-
-@dataclass
-class TaskStatistics:
-    """Counts of one task since the rack was started; times in ns, of the host's where the rack has a stopwatch.
-
-    In modeled execution they are modeled times, from a scan's beginning to its end.
-    """
-
-    scans: int = 0
-    skipped: int = 0
-    last_ns: int = 0
-    longest_ns: int = 0
-    total_ns: int = 0
-
-    def add(self, taken_ns: int) -> None:
-        """Count a scan and its time."""
-        self.scans += 1
-        self.last_ns = taken_ns
-        self.total_ns += taken_ns
-        self.longest_ns = max(self.longest_ns, taken_ns)
 
 
 class ScheduledTask:
@@ -65,6 +44,7 @@ class ScheduledTask:
         self._after, self._stopwatch = after, stopwatch
         self._make_trigger = trigger
         self._began_ns: int | None = None
+        self._late_ns = 0
         self.trigger = trigger(task)
         self.due: Due = self.whole if isinstance(execution, Ideal) else self._begin
 
@@ -152,10 +132,10 @@ class ScheduledTask:
         began = stopwatch() if stopwatch else 0
         record = task.scan(now_ns, skipped)
         if skipped:
-            statistics.skipped += skipped
+            statistics.skip(skipped)
         if stopwatch:
             taken = stopwatch() - began
-            statistics.add(taken)
+            statistics.add(taken, self._late(began, now_ns))
             if record is not None:
                 record.duration_ns = taken
         else:
@@ -164,15 +144,16 @@ class ScheduledTask:
 
     def steps(self, now_ns: int, skipped: int) -> Steps:
         """Return a scan in steps."""
-        self.statistics.skipped += skipped
+        self.statistics.skip(skipped)
         self._began_ns = now_ns
+        self._late_ns = self._late(self._stopwatch(), now_ns) if self._stopwatch else 0
         return self.task.scan_modeled(now_ns, skipped)
 
     def done(self, record: ScanRecord | None) -> None:
         """Tell of a scan whose last step was made; its time is the modeled one."""
         taken = 0 if self._began_ns is None else self._scheduler.now_ns - self._began_ns
         self._began_ns = None
-        self.statistics.add(taken)
+        self.statistics.add(taken, self._late_ns)
         if record is not None:
             record.duration_ns = min(taken, _LONGEST_NS)
         self._after(self.task, record)
@@ -191,6 +172,11 @@ class ScheduledTask:
             self.fault(OVERLAP)
         else:
             self._execution.begin(self, now_ns, skipped)
+
+    def _late(self, began_ns: int, now_ns: int) -> int:
+        """Return how much later than its instant the host has begun a scan, by the clock that keeps pace."""
+        zero_ns = self._scheduler.zero_ns
+        return 0 if zero_ns is None else max(0, began_ns - zero_ns - now_ns)
 
     def _resumed(self, progress: Progress) -> Steps:
         self._began_ns = progress["began_ns"]

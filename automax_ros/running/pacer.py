@@ -7,6 +7,9 @@ Every event stands on an absolute deadline. A periodic one that the host made th
 the next stays on the grid (``Scheduler.run_due``); a drive's interrupts are all carried out, late ones in order. How
 the time to the next deadline is spent is the caller's: a library sleeps, ROS nodes let their executor serve messages,
 so what comes from outside falls between two events.
+
+``halt`` lets time stand still until ``resume``; nothing is late or skipped by that. Whoever steps a halted rack lets
+the scheduler's time go on by itself.
 """
 
 from __future__ import annotations
@@ -46,14 +49,30 @@ class Pacer:
         """
         self._scheduler, self._clock, self._wait = scheduler, clock, wait
         self._zero_ns: int | None = None
+        self.halted = False
+        self.while_halted: Callable[[], object] = _nothing
 
     def begin(self, lead_ns: int = 0) -> None:
         """Let the scheduler's present be ``lead_ns`` from now on the wall clock."""
         self._zero_ns = self._clock() + lead_ns - self._scheduler.now_ns
+        if not self.halted:
+            self._scheduler.zero_ns = self._zero_ns
+
+    def halt(self) -> None:
+        """Let time stand still from now on; ``while_halted`` is called every now and then, 20 times per second."""
+        self.catch_up()
+        self.halted, self._scheduler.zero_ns = True, None
+
+    def resume(self) -> None:
+        """Let time go on from where it stands."""
+        self.halted = False
+        self.begin()
 
     @property
     def now_ns(self) -> int:
         """The time that the scheduler should have by the wall clock, ns; negative during the lead."""
+        if self.halted:
+            return self._scheduler.now_ns
         if self._zero_ns is None:
             self.begin()
         assert self._zero_ns is not None
@@ -69,7 +88,7 @@ class Pacer:
 
     def step(self) -> float:
         """Carry out what is due, and return how long (s) the caller may spend before the next call."""
-        self._scheduler.run_due(self.now_ns)
+        self._carry_out(self.now_ns)
         return self._idle_s(None)
 
     def run(
@@ -82,25 +101,40 @@ class Pacer:
 
         ``on_idle`` gets the time, about every 100 ms, where there is time before the next event.
         """
-        next_chore = 0
+        next_chore = self._clock() + max(0, -self.now_ns)
         while not should_stop():
             now = self.now_ns
             if until_ns is not None and now >= until_ns:
                 self._scheduler.run_due(until_ns - 1)
                 self._scheduler.pass_until(until_ns)
                 return
-            self._scheduler.run_due(now)
-            if on_idle is not None and now >= next_chore and self._has_room(next_chore):
-                next_chore = now + CHORE_PERIOD_NS
+            self._carry_out(now)
+            if on_idle is not None and self._is_chore_time(next_chore):
+                next_chore = self._clock() + CHORE_PERIOD_NS
                 on_idle(now)
             self._wait(self._idle_s(until_ns))
 
-    def _has_room(self, since_ns: int) -> bool:
-        """Return whether a chore that has been due for some time may be done now."""
-        now, due = self.now_ns, self._scheduler.next_ns
-        return due is None or due - now >= CHORE_ROOM_NS or now - since_ns >= CHORE_PERIOD_NS
+    def _carry_out(self, now_ns: int) -> None:
+        if self.halted:
+            self.while_halted()
+        else:
+            self._scheduler.run_due(now_ns)
+
+    def _is_chore_time(self, since_ns: int) -> bool:
+        """Return whether a chore, due since a time of the wall clock, may be done: there is room, or it waits long."""
+        waited = self._clock() - since_ns
+        if waited < 0 or self.halted or waited >= CHORE_PERIOD_NS:
+            return waited >= 0
+        due = self._scheduler.next_ns
+        return due is None or due - self.now_ns >= CHORE_ROOM_NS
 
     def _idle_s(self, until_ns: int | None) -> float:
+        if self.halted:
+            return LONGEST_WAIT_NS / NS_PER_S
         now = self.now_ns
         ends = (now + LONGEST_WAIT_NS, self._scheduler.next_ns, until_ns)
         return max(0, min(end for end in ends if end is not None) - now) / NS_PER_S
+
+
+def _nothing() -> None:
+    """Do nothing while time stands still."""

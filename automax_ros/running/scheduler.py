@@ -63,6 +63,7 @@ class Scheduler:
     """The event queue of one rack.
 
     ``wall_ns`` is the time that ``run_due`` catches up with: ahead of ``now_ns`` while what is late is carried out.
+    ``zero_ns`` is what the clock of the pacer showed at time 0, None where none keeps pace.
     """
 
     def __init__(self, start_ns: int = 0) -> None:
@@ -72,6 +73,7 @@ class Scheduler:
         self._serial = 0
         self._end_ns = start_ns
         self.wall_ns = start_ns
+        self.zero_ns: int | None = None
 
     def at(self, time_ns: int, key: EventKey, action: Action) -> ScheduledEvent:
         """Post an event that happens once.

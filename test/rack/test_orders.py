@@ -183,3 +183,62 @@ def test_a_source_that_was_prepared_before_another_reload_is_known_to_be_old(rac
     rack.run(0.02)
     assert rack.value("OUT%") == 107
     assert [(item.what, item.ok) for item in told.operations] == [("reload", True), ("reload", True)]
+
+
+def test_power_is_switched_in_words(rack, told):
+    orders = Orders(rack)
+    orders.power("off")
+    assert not rack.operations.powered
+    orders.power(" ON ", without_battery=True)
+    assert (rack.operations.powered, rack.operations.battery_good) == (True, False)
+    before = rack.now_ns
+    orders.power("cycle", 0.25)
+    rack.run(0.2)
+    assert not rack.operations.powered
+    rack.run(0.1)
+    assert (rack.operations.powered, rack.operations.battery_good) == (True, True)
+    assert [(item.what, item.at_ns - before) for item in told.operations] == [
+        ("power_off", 0),
+        ("power_on", 0),
+        ("power_off", 0),
+        ("power_on", 250_000_000),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("up",), '"up" is not off, on or cycle'),
+        (("cycle", -1.0), "the power cannot be off for -1 s: it takes 0 to 86400"),
+        (("cycle", float("nan")), "the power cannot be off for nan s"),
+        (("cycle", float("inf")), "the power cannot be off for inf s"),
+        (("on",), "the power is on"),
+        (("x" * (MAX_NAME + 1),), "a text of 101 characters"),
+    ],
+)
+def test_power_that_cannot_be_is_refused_and_told(rack, told, arguments, reason):
+    with pytest.raises(OperationRefused) as refused:
+        Orders(rack).power(*arguments)
+    assert reason in str(refused.value).replace("'", '"')
+    assert not told.operations[-1].ok
+    assert rack.operations.powered
+
+
+def test_a_task_is_deleted_and_comes_back_with_its_source(rack, told):
+    orders = Orders(rack)
+    with pytest.raises(OperationRefused, match="runs: stop it first"):
+        orders.delete("speed")
+    orders.stop("SPEED")
+    orders.delete(" speed ")
+    with pytest.raises(OperationRefused, match="was deleted: reload it first"):
+        orders.run("SPEED")
+    orders.reload("SPEED", SPEED)
+    orders.run("SPEED")
+    assert [(item.what, item.ok) for item in told.operations] == [
+        ("delete", False),
+        ("stop", True),
+        ("delete", True),
+        ("run", False),
+        ("reload", True),
+        ("run", True),
+    ]

@@ -204,3 +204,45 @@ def test_no_other_source_below_the_nodes_asks_a_clock():
         if name in {"time", "datetime"}
     }
     assert asking == {"running/pacer.py"}
+
+
+def test_halted_time_stands_still_and_nothing_is_late_afterwards(pacer, wall, scans):
+    pacer.run(12 * NS_PER_MS)
+    assert [now for now, _ in scans] == [0, 5 * NS_PER_MS, 10 * NS_PER_MS]
+    wall.now_ns += NS_PER_MS
+    pacer.halt()
+    assert pacer.now_ns == 13 * NS_PER_MS, "the present at which it was halted, not that of the last event"
+    looks = []
+    pacer.while_halted = lambda: looks.append(wall.now_ns)
+    chores = []
+    wall.waits.clear()
+    stop_ns = wall.now_ns + NS_PER_S
+    pacer.run(on_idle=lambda now: chores.append((now, wall.now_ns)), should_stop=lambda: wall.now_ns >= stop_ns)
+    assert len(scans) == 3
+    assert set(wall.waits) == {LONGEST_WAIT_NS / NS_PER_S}
+    assert len(looks) == NS_PER_S // LONGEST_WAIT_NS
+    assert {now for now, _ in chores} == {13 * NS_PER_MS}
+    assert len(chores) == 10, "chores go by the wall clock"
+    pacer.catch_up()
+    assert pacer.step() == LONGEST_WAIT_NS / NS_PER_S
+    assert pacer.now_ns == 13 * NS_PER_MS
+    pacer.resume()
+    resumed = wall.now_ns
+    pacer.run(21 * NS_PER_MS)
+    assert scans[3:] == [(15 * NS_PER_MS, 0), (20 * NS_PER_MS, 0)], "on the grid, and none was skipped"
+    assert wall.now_ns == resumed + 8 * NS_PER_MS
+
+
+def test_time_that_was_stepped_is_where_a_halted_pacer_goes_on(pacer, wall, scans):
+    pacer.run(1)
+    pacer.halt()
+    scheduler = pacer._scheduler
+    assert scheduler.zero_ns is None
+    assert scheduler.step(7 * NS_PER_MS)
+    assert not scheduler.step(7 * NS_PER_MS)
+    assert pacer.now_ns == 7 * NS_PER_MS
+    wall.now_ns += NS_PER_S
+    pacer.resume()
+    assert scheduler.zero_ns == wall.now_ns - 7 * NS_PER_MS
+    pacer.run(11 * NS_PER_MS)
+    assert scans == [(0, 0), (5 * NS_PER_MS, 0), (10 * NS_PER_MS, 0)]
