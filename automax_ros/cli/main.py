@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from types import ModuleType
     from typing import NoReturn
 
@@ -43,6 +43,7 @@ SUBCOMMANDS: dict[str, str] = {
     "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
     "schema": "JSON schema of rack files or stimuli files, for editors",
+    "completion": "what makes a shell complete this command line",
     "explain": "say what a problem code means and how to cure it",
 }
 """Every subcommand and its line of help; the module of that name in this folder is imported when it is asked for.
@@ -99,8 +100,9 @@ def _run(argv: list[str]) -> int:
         name = next((word for word in words if not word.startswith("-")), None)
         if name is not None and name not in SUBCOMMANDS:
             raise _unknown(name)
-        module = _module(name) if name is not None else None
-        parser, own = _parser(name, module)
+        module = module_of(name) if name is not None else None
+        parser, subparsers = parsers({} if module is None else {str(name): module})
+        own = subparsers.get(str(name), parser)
         arguments, unknown = parser.parse_known_args(words)
         if unknown:
             own.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -142,8 +144,10 @@ def _hand_over(ros: RosArguments | None, arguments: argparse.Namespace) -> None:
         raise UsageError(f"{ROS_ARGUMENTS}: this subcommand makes no ROS nodes", "leave it out")
 
 
-def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.ArgumentParser, argparse.ArgumentParser]:
-    """Return the parser of the whole command line and the chosen subcommand's, which alone knows its arguments."""
+def parsers(
+    modules: Mapping[str, ModuleType],
+) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+    """Return the parser of the whole command line and those of its subcommands; ``modules`` know their arguments."""
     import argparse
 
     from automax_ros import __version__
@@ -159,23 +163,23 @@ def _parser(chosen: str | None, module: ModuleType | None) -> tuple[argparse.Arg
         prog="automax", description="A Reliance Electric AutoMax rack, emulated.", formatter_class=WideHelp
     )
     parser.add_argument("--version", action="version", version=f"automax {__version__}")
-    chosen_parser = parser
     subcommands = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND")
+    found: dict[str, argparse.ArgumentParser] = {}
     for name, text in SUBCOMMANDS.items():
-        own = module if name == chosen else None
-        subparser = subcommands.add_parser(
+        own = modules.get(name)
+        found[name] = subcommands.add_parser(
             name,
             help=text,
             description=own.__doc__ if own else None,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         if own is not None:
-            own.add_arguments(subparser)
-            chosen_parser = subparser
-    return parser, chosen_parser
+            own.add_arguments(found[name])
+    return parser, found
 
 
-def _module(name: str) -> ModuleType:
+def module_of(name: str) -> ModuleType:
+    """Return the module of a subcommand; its ``add_arguments`` and ``run`` are all there is to it."""
     import importlib
     import keyword
 

@@ -1,0 +1,85 @@
+"""Every subcommand with its arguments, as data: for the pages of the reference and for the shells' completion."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from automax_ros.cli.main import SUBCOMMANDS, module_of, parsers
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option with all its names; ``values`` are the words that it takes, () where it takes others or none."""
+
+    names: tuple[str, ...]
+    takes_value: bool
+    values: tuple[str, ...]
+    metavar: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Command:
+    """A subcommand: its words after ``automax``, what it is for, what it takes; ``inner`` are its own subcommands."""
+
+    words: tuple[str, ...]
+    title: str
+    text: str
+    usage: str
+    positionals: tuple[Option, ...]
+    options: tuple[Option, ...]
+    inner: tuple[Command, ...]
+
+    def all(self) -> Iterator[Command]:
+        """Yield it and the subcommands in it."""
+        yield self
+        for command in self.inner:
+            yield from command.all()
+
+
+def commands() -> tuple[Command, ...]:
+    """Return every subcommand, in the order of the help."""
+    found = parsers({name: module_of(name) for name in SUBCOMMANDS})[1]
+    return tuple(_command(found[name], (name,), title) for name, title in SUBCOMMANDS.items())
+
+
+def _command(parser: argparse.ArgumentParser, words: tuple[str, ...], title: str) -> Command:
+    inner: list[Command] = []
+    options: list[Option] = []
+    positionals: list[Option] = []
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            inner += _inner(action, words)
+        elif action.option_strings:
+            options.append(_option(action))
+        else:
+            positionals.append(_option(action))
+    text = parser.description or ""
+    usage = " ".join(parser.format_usage().removeprefix("usage:").split())
+    return Command(words, title, text, usage, tuple(positionals), tuple(options), tuple(inner))
+
+
+def _inner(action: argparse._SubParsersAction[argparse.ArgumentParser], words: Sequence[str]) -> Iterator[Command]:
+    titles = {choice.dest: choice.help or "" for choice in action._choices_actions}
+    for name, parser in action.choices.items():
+        yield _command(parser, (*words, name), titles.get(name, ""))
+
+
+def _option(action: argparse.Action) -> Option:
+    text = "" if action.help in (None, argparse.SUPPRESS) else str(action.help) % _values_of(action)
+    metavar = action.metavar if isinstance(action.metavar, str) else " ".join(action.metavar or ())
+    takes_value = action.nargs != 0
+    return Option(
+        tuple(action.option_strings),
+        takes_value,
+        tuple(map(str, action.choices or ())),
+        metavar or ("" if not takes_value else action.dest.upper()),
+        text,
+    )
+
+
+def _values_of(action: argparse.Action) -> dict[str, object]:
+    """Return what the help of an option may name, as argparse has it."""
+    return {**vars(action), "prog": "automax"}
