@@ -5,12 +5,13 @@ file and the tasks' sources as JSON), ``backplane`` (automax_msgs/CommonWrite), 
 (automax_msgs/CommonImage, latched, sent again to each late joiner of either), ``common/NAME`` (std_msgs, latched) for
 each variable with ``ros: out`` or ``ros: in``.
 
-Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, and for no other.
+Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, and for no other;
+``JOINT_velocity_controller/commands`` and ``JOINT_effort_controller/commands`` (std_msgs/Float64MultiArray) where a
+plant's joint is commanded (``nodes/ros2_control.py``).
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from std_msgs.msg import String
@@ -19,10 +20,11 @@ from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
 from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.ros2_control import joint_inlets
+from automax_ros.nodes.scaled import ScaledInput
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.ros_names import set_topic
-from automax_ros.rack.scale import Scale
 from automax_ros.rack.writers import ROS_WRITER
 from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED
@@ -51,6 +53,7 @@ class CommonMemoryNode(ModuleNode):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
                 _ValueInlet(self, view, variable, topic)
+        joint_inlets(self)
         stream.add_sink(outlets.get)
 
     def _with_files(self, publish: Take) -> Take:
@@ -75,36 +78,19 @@ class _ValueInlet:
 
     def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
         self._node, self._view, self._variable = node, view, variable
-        self._name, self._has_clamped = set_topic(topic.name), False
-        self._inlet = Inlet(node, self._name, message_class(topic.type_name), self._write)
+        name, scale = set_topic(topic.name), variable.scale
+        self._scaled = None if scale is None else ScaledInput(node, name, variable, scale, variable.unit)
+        self._inlet = Inlet(node, name, message_class(topic.type_name), self._write)
 
     def _write(self, message: Any) -> None:
-        rack, scale = self._node.site.rack, self._variable.scale
+        rack, scaled = self._node.site.rack, self._scaled
         try:
             if not rack.operations.powered and not rack.config.is_input(self._variable):
                 raise MemoryValueError(f"the power is off, and {self._variable.name} is not an input")
-            values = _elements(self._variable, message) if scale is None else [(0, self._counts(scale, message.data))]
+            values = _elements(self._variable, message) if scaled is None else [(0, scaled.counts(message.data))]
             rack.write_view(self._view, values, ROS_WRITER)
         except MemoryValueError as error:
             self._inlet.refuse(self._variable.name, error)
-
-    def _counts(self, scale: Scale, value: float) -> int:
-        """Return the counts of a value in the engineer's unit; one beyond their range is clamped, and told once.
-
-        Raises:
-            MemoryValueError: not a finite number.
-        """
-        if not math.isfinite(value):
-            raise MemoryValueError(f"{value!r} is not a value for {self._variable.name}")
-        counts, clamped = scale.counts_of(value)
-        if clamped:
-            text = f"{self._name}: {value:.8g} {self._variable.unit}".rstrip()
-            text += f" lies beyond the scale: {self._variable.name} is {counts} counts"
-            self._node.site.health.note("clamped value", self._variable.name, lambda: text)
-            if not self._has_clamped:
-                self._has_clamped = True
-                self._node.get_logger().warning(text)
-        return counts
 
 
 def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:

@@ -15,7 +15,7 @@ from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.modules.kind import ModuleConfig, Registers
-from automax_ros.rack.plants.config import FeedConfig, PlantConfig
+from automax_ros.rack.plants.config import FeedConfig, JointCommand, PlantConfig
 from automax_ros.rack.scale import Scale
 from automax_ros.rack.task_config import TaskConfig
 
@@ -113,7 +113,7 @@ class RackConfig:
     stand in the order of slots, variables in the order of the file; after them the registers of the modules that have
     some, each as one variable with a ``bank``. ``executive`` is the version of the Programming Executive in tenths (42
     is 4.2), ``auto_run`` whether the tasks that ran are put into RUN after a power cycle. ``plants`` stand in the order
-    of the file, ``feeds`` in that of their plants.
+    of the file, ``feeds`` and ``joint_commands`` in that of their plants.
     """
 
     name: str
@@ -129,6 +129,7 @@ class RackConfig:
     on_module_loss: ModuleLoss = ModuleLoss.STOP_ALL
     plants: tuple[PlantConfig, ...] = ()
     feeds: tuple[FeedConfig, ...] = ()
+    joint_commands: tuple[JointCommand, ...] = ()
 
     @cached_property
     def by_name(self) -> Mapping[str, CommonVariable]:

@@ -19,6 +19,7 @@ from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.names import RACK_NAME, is_rack_name
 from automax_ros.rack.plants.feeds import read_feeds
+from automax_ros.rack.plants.joints import read_commands
 from automax_ros.rack.plants.reading import SCHEMA as PLANTS_SCHEMA
 from automax_ros.rack.plants.reading import Plants, read_plants
 from automax_ros.rack.ros_names import namespace
@@ -134,6 +135,7 @@ class _RackReader:
         if common is not None:
             self._check_size(variables, modules, section.key_span("common"))
         feeds = read_feeds(plants.feeds, variables, modules, self._findings)
+        commands = read_commands(plants.joints, variables, self._findings)
         if name is None or self._findings.errors:
             return None
         return RackConfig(
@@ -150,6 +152,7 @@ class _RackReader:
             on_module_loss=loss,
             plants=tuple(plants.known.values()),
             feeds=feeds,
+            joint_commands=commands,
         )
 
     def _name(self, node: Node | None) -> str | None:

@@ -7,7 +7,8 @@ it can never make two names equal:
   ``rack_`` in front (decision: a rack's name has no underscore, so no other looks like it);
 - the topic of a variable is its name without the type character: ``common/LINE_SPEED``;
 - commons that differ only in type get the type's word: ``common/SPEED_int`` and ``common/SPEED_bool``;
-- the topic of a plant is its name: ``plants/UNWIND``;
+- the topic of a plant is its name: ``plants/UNWIND``; that which commands its joint is a controller's:
+  ``UNWIND_velocity_controller/commands``;
 - a name that begins with an underscore gets ``u`` in front, since ROS tools hide such topics: ``common/u_SPARE``
   (decision). Repeated underscores, which the ROS design page advises against and ROS accepts, stay as they are.
 """
@@ -62,6 +63,11 @@ def plant_topic(name: str) -> str:
 def load_topic(name: str) -> str:
     """Return the topic on which the load torque of a plant with ``ros: in`` is set."""
     return set_topic(f"{plant_topic(name)}/load_torque")
+
+
+def command_topic(joint: str, interface: str) -> str:
+    """Return the topic that commands a joint, named as a controller of ros2_control names its own (decision)."""
+    return f"{joint}_{interface}_controller/commands"
 
 
 def _word(name: str, shared: bool) -> str:

@@ -114,6 +114,6 @@ def state_message(driven: DrivenPlant, plant: DrivePlant, stamp: int) -> PlantSt
 
 
 def joint_message(driven: DrivenPlant, plant: DrivePlant, stamp: int) -> JointState:
-    """Return the shaft of a plant as a joint with the plant's name: angle in rad, rad/s, torque of the motor in N m."""
-    motor = plant.motor
-    return JointState(Header(stamp, ""), (driven.name,), (motor.angle_rad,), (motor.speed_rad_s,), (motor.torque_n_m,))
+    """Return the shaft of a plant as a joint: angle in rad, rad/s, torque of the motor in N m."""
+    motor, name = plant.motor, driven.config.joint_name
+    return JointState(Header(stamp, ""), (name,), (motor.angle_rad,), (motor.speed_rad_s,), (motor.torque_n_m,))

@@ -44,7 +44,7 @@ common:
 
 
 OPERATION = {"execution", "executive", "auto_run", "on_module_loss", "critical"}
-PLANT = ("plant", "drive", "line", "load", "inertia", "couple", "feeds")
+PLANT = ("plant", "drive", "line", "load", "inertia", "couple", "feeds", "joint")
 UDC = {"drive", "plants", "motor", "motor_overload_ratio"}
 """Keys of UDC modules and what they drive; ``modules/test_udc_rules.py`` tries them."""
 

@@ -79,6 +79,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6477", "line, load or inertia of a plant"),
     Problem("AMX6478", "coupling of two plants"),
     Problem("AMX6479", "feed of a plant"),
+    Problem("AMX6310", "joint of a plant"),
     Problem("AMX6500", "common that a plant feeds and a task writes"),
     Problem("AMX6501", "too many plants"),
     Problem("AMX6520", "drive of a 57C405"),

@@ -84,6 +84,7 @@ class PlantConfig:
         load: what the motor turns.
         inertia: inertia of motor and load over the motor's own.
         couple: what its shaft is coupled to, None for nothing, or where the other plant says so.
+        joint: what ROS calls its shaft; "" where that is the plant's name.
     """
 
     name: str
@@ -94,6 +95,12 @@ class PlantConfig:
     load: LoadConfig = field(default_factory=LoadConfig)
     inertia: float = 1.0
     couple: CoupleConfig | None = None
+    joint: str = ""
+
+    @property
+    def joint_name(self) -> str:
+        """What ROS calls its shaft."""
+        return self.joint or self.name
 
     @property
     def plate(self) -> NamePlate | None:
@@ -101,6 +108,27 @@ class PlantConfig:
         if self.motor is None:
             return None
         return self.motor if isinstance(self.motor, NamePlate) else EXAMPLES[MOTORS[self.motor]]
+
+
+@dataclass(frozen=True)
+class JointCommand:
+    """A common that commands of ros2_control write.
+
+    Attributes:
+        plant: the plant's name.
+        joint: the name of its joint.
+        interface: ``velocity`` or ``effort``.
+        common: the variable's full name.
+        scale: what counts of an INTEGER mean, in rpm or N m; None for a REAL, which has these itself.
+        line: the line of the file.
+    """
+
+    plant: str
+    joint: str
+    interface: str
+    common: str
+    scale: Scale | None = None
+    line: int = 0
 
 
 @dataclass(frozen=True)

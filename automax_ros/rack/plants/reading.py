@@ -20,6 +20,8 @@ from automax_ros.rack.plants.config import MOTORS, PLANT_NAME, LoadConfig, Plant
 from automax_ros.rack.plants.couples import SCHEMA as COUPLE_SCHEMA
 from automax_ros.rack.plants.couples import check_couples, read_couple
 from automax_ros.rack.plants.feed_keys import SCHEMA as FEEDS_SCHEMA
+from automax_ros.rack.plants.joint_keys import SCHEMA as JOINT_SCHEMA
+from automax_ros.rack.plants.joint_keys import GivenJoint, check_joint_names, read_joint
 from automax_ros.rack.plants.keys import (
     INERTIA_SCHEMA,
     LOAD_SCHEMA,
@@ -52,6 +54,7 @@ _SIMULATED: Keys = {
     "inertia": INERTIA_SCHEMA,
     "couple": COUPLE_SCHEMA,
     "feeds": FEEDS_SCHEMA,
+    "joint": JOINT_SCHEMA,
 }
 KEYS: Keys = {
     "motor": either(
@@ -77,12 +80,13 @@ _LIMIT = 100
 
 @dataclass
 class Plants:
-    """The plants of one rack file, and who has claimed them; ``feeds`` are those of each, read with the commons."""
+    """The plants of one rack file, and who has claimed them; ``feeds`` and ``joints`` are read on with the commons."""
 
     findings: Findings
     known: dict[str, PlantConfig] = field(default_factory=dict)
     complete: bool = True
     feeds: list[tuple[str, Node]] = field(default_factory=list)
+    joints: list[GivenJoint] = field(default_factory=list)
     _claimed: dict[str, tuple[str, Span]] = field(default_factory=dict)
 
     def claim(self, node: Node, what: str) -> PlantConfig | None:
@@ -130,6 +134,7 @@ def read_plants(node: Node | None, findings: Findings) -> Plants:
             plants.known[name] = _plant(name, key, value, plants)
     if plants.complete:
         check_couples(plants.known, findings)
+        check_joint_names({name: (plant.joint_name, places[name]) for name, plant in plants.known.items()}, findings)
     return plants
 
 
@@ -138,12 +143,14 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
     what = f"plant {name}"
     section = Section(entries_of(node, what, findings) or (), what, KEYS, findings)
     ratio, motor = section.get("motor_overload_ratio"), section.get("motor")
-    line, load, inertia, couple, feeds = (section.get(option) for option in _SIMULATED)
+    line, load, inertia, couple, feeds, joint = (section.get(option) for option in _SIMULATED)
     needless = next((option for option in _SIMULATED if option in section), "")
     if motor is None and needless:
         findings.add("AMX6009", f"{what} has {needless} and no motor: it is not simulated", section.key_span(needless))
     if feeds is not None:
         plants.feeds.append((name, feeds))
+    if joint is not None:
+        plants.joints.append(read_joint(joint, name, findings))
     config = PlantConfig(
         name,
         _motor(motor, f"motor of {what}", findings) if motor else None,
@@ -153,6 +160,7 @@ def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
         read_load(load, what, findings) if load else LoadConfig(),
         read_inertia(inertia, what, findings) if inertia else 1.0,
         read_couple(couple, what, findings) if couple else None,
+        plants.joints[-1].name if joint else "",
     )
     if not findings.errors:
         _check_data(config, key.span, findings)
