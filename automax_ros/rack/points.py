@@ -16,6 +16,7 @@ from automax_ros.rack.sections import Section
 
 KEYS: Keys = {
     "slot": whole("Slot of the module that the point belongs to.", 0, MAX_SLOT),
+    "drop": whole("Drop of a 57C404 whose register it is; 0 is the module's status.", 0, 55),
     "register": whole("Register of the module; a DOUBLE INTEGER takes this one and the next.", 0, 65535),
     "bit": whole("Bit of the register, for a BOOLEAN; 0 is the lowest.", 0, 15),
 }
@@ -39,7 +40,7 @@ class PointReader:
         if not given:
             return None
         what = f"I/O point {declared.name}"
-        wanted = KEYS if declared.type is DataType.BOOLEAN else ("slot", "register")
+        wanted = ("slot", "register", "bit") if declared.type is DataType.BOOLEAN else ("slot", "register")
         if not section.require(wanted, what, span, self._findings) or not self._is_possible(section, declared):
             return None
         slot = self._number(section, "slot", what, 0, 15)
@@ -47,24 +48,49 @@ class PointReader:
         if slot is None or module is None:
             return None
         words = -(-_SIZES[declared.type] // 16)
-        last = module.registers.count - words
-        if last < 0:
+        if module.registers.count < words:
             self._findings.add("AMX6421", f"{what} takes two registers; the {module.model} has one", span)
             return None
-        register = self._number(section, "register", what, 0, last)
-        bit = self._number(section, "bit", what, 0, 15) if "bit" in section else None
-        if register is None or (bit is None and "bit" in section):
+        first = self._first_register(section, module, what, span)
+        if first is None:
             return None
+        number = self._number(section, "register", what, 0, (module.registers.area or module.registers.count) - words)
+        bit = self._number(section, "bit", what, 0, 15) if "bit" in section else None
+        if number is None or (bit is None and "bit" in section):
+            return None
+        register = first + number
         if not self._suits(declared, module, range(register, register + words), section):
             return None
         point = Point(slot, register, bit)
         return point if self._is_free(point, declared, span) else None
 
+    def _first_register(self, section: Section, module: ModuleConfig, what: str, span: Span) -> int | None:
+        """Return the first register of the drop that a point names, 0 for a module without drops."""
+        registers, place = module.registers, f"the {module.model} in slot {module.slot}"
+        if "drop" not in section:
+            if registers.area:
+                hint = f"{place} has an area for each drop: write drop: 0 for its status"
+                self._findings.add("AMX6562", f"{what} lacks the key 'drop'", span, hint)
+            return None if registers.area else 0
+        if not registers.area:
+            self._findings.add("AMX6562", f"{what} has a drop; {place} has none", section.key_span("drop"))
+            return None
+        node = section.get("drop")
+        assert node is not None
+        low, high = min(registers.areas), max(registers.areas)
+        drop = integer_value(node, f"drop of {what}", self._findings, low=low, high=high, code="AMX6562")
+        if drop is not None and drop not in registers.areas:
+            drops = ", ".join(map(str, sorted(registers.areas)))
+            self._findings.add("AMX6562", f"drop of {what} is {drop}; {place} has {drops}", node.span)
+            return None
+        return None if drop is None else drop * registers.area
+
     def check_input(self, point: Point, declared: VariableName, span: Span) -> None:
         """Report a point that the process shall write and its module alone does."""
         module = self._modules[point.slot]
         if point.register in module.registers.shown:
-            message = f"{declared.name} cannot be ros: in: the {module.model} writes register {point.register} itself"
+            place = module.registers.place(point.register)
+            message = f"{declared.name} cannot be ros: in: the {module.model} writes {place} itself"
             self._findings.add("AMX6550", message, span, "leave out ros, or write ros: out")
 
     def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
@@ -72,9 +98,11 @@ class PointReader:
         message, place = "", section.key_span("register")
         own = [register for register in taken if register in module.registers.reserved]
         if own:
-            message = f"{declared.name}: register {own[0]} of the {module.model} belongs to the module itself"
+            place_of = module.registers.place(own[0])
+            message = f"{declared.name}: {place_of} of the {module.model} belongs to the module itself"
         elif len({module.registers.direction(register) for register in taken}) > 1:
-            message = f"{declared.name} takes the registers {taken[0]} and {taken[-1]} of the {module.model}"
+            both = f"{module.registers.place(taken[0])} and {module.registers.place(taken[-1])}"
+            message = f"{declared.name} takes {both} of the {module.model}"
             message += f": an {' and an '.join(map(module.registers.direction, taken))}"
         elif declared.type is DataType.REAL and any(register not in module.registers.reals for register in taken):
             self._report_impossible(f"{declared.name} cannot be an I/O point: it is REAL", place)
@@ -130,7 +158,7 @@ class PointReader:
                 other = self._named.get((point.slot, bit, other_size))
                 if other is not None and (other_size == size or 1 not in (size, other_size)):
                     notes = (Note(f"{other[0]} is defined here", other[1]),)
-                    place = f"slot {point.slot} register {point.register}"
+                    place = f"slot {point.slot} {self._modules[point.slot].registers.place(point.register)}"
                     self._findings.add(
                         "AMX6423", f"{declared.name} is at {place}, which {other[0]} names already", span, notes=notes
                     )

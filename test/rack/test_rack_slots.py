@@ -42,7 +42,7 @@ def test_all_processors_are_known(tmp_path, model):
     [
         ("57C430", "AMX6204"),
         ("57C552", "AMX6202"),
-        ("57C404", "AMX6203"),
+        ("57C414", "AMX6203"),
         ("57C416B", "AMX6203"),
         ("57E435", "AMX6202"),
         ("'57C435 '", None),

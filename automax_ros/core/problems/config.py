@@ -100,6 +100,11 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6491", "no interrupt line for a current minor loop"),
     Problem("AMX6492", "task that goes before a current minor loop", Severity.WARNING),
     Problem("AMX6493", "register of a 57C406 in a control-block task", Severity.WARNING),
+    # rack files: networks
+    Problem("AMX6560", "name of a network"),
+    Problem("AMX6561", "drop or depth of a network module"),
+    Problem("AMX6562", "drop of an I/O point"),
+    Problem("AMX6563", "two network modules with one drop"),
     # recordings
     # rack files: operation
     Problem("AMX6701", "version of the Programming Executive"),

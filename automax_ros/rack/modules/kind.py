@@ -62,6 +62,7 @@ class Registers:
     ``clock_status`` pairs of an input and the bits that are set while there is a common
     clock; ``counters`` are the first of two registers that count 24 bits. ``by_itself``: the module writes registers
     without an interrupt too. ``shown`` are inputs that the module alone writes: neither ROS 2 nor a feed may.
+    A module with drops has ``area`` registers for each, 0 being none, and points may stand on those of ``areas``.
     """
 
     count: int = 0
@@ -75,6 +76,8 @@ class Registers:
     counters: tuple[int, ...] = ()
     by_itself: bool = False
     shown: Collection[int] = range(0)
+    area: int = 0
+    areas: Collection[int] = range(0)
 
     @property
     def writes(self) -> bool:
@@ -93,6 +96,12 @@ class Registers:
         if register in self.either:
             return "either"
         return "output" if register in self.outputs else "input"
+
+    def place(self, register: int) -> str:
+        """Return how messages name a register: by its number, or by its drop and its number there."""
+        if not self.area:
+            return f"register {register}"
+        return f"drop {register // self.area} register {register % self.area}"
 
 
 NO_REGISTERS = Registers()
@@ -215,8 +224,8 @@ class ModuleKind(Protocol):
         """The keys of its section with the schemas of their values, ``module`` left out."""
         ...
 
-    def read(self, found: FoundModule) -> ModuleConfig:
-        """Read a module's section; what is wrong goes to the findings."""
+    def read(self, found: FoundModule) -> ModuleConfig | None:
+        """Read a module's section; what is wrong goes to the findings, None where no module can be made of it."""
         ...
 
     def check_places(self, rack: Arrangement) -> None:

@@ -15,6 +15,7 @@ from automax_ros.rack.modules.digital_io import DIGITAL_IO
 from automax_ros.rack.modules.drive_analog import DRIVE_ANALOG
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
 from automax_ros.rack.modules.kind import ModuleKind
+from automax_ros.rack.modules.network_config import NETWORK
 from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.modules.pulsetach import PULSETACH
@@ -31,6 +32,7 @@ KINDS: tuple[ModuleKind, ...] = (
     PULSETACH,
     DRIVE_CONTROLLER,
     DRIVE_ANALOG,
+    NETWORK,
     UDC,
 )
 """All kinds of modules: whoever wants a module finds it here."""
@@ -38,7 +40,6 @@ SUPPORTED: dict[str, ModuleKind] = {model: kind for kind in KINDS for model in k
 """The kind of each number that a rack file may name."""
 
 NOT_YET = {
-    "57C404": "DCS-NET network module",
     "57C414": "Modbus interface module",
     "57C416": "remote I/O module",
     "57C417": "R-Net module",
