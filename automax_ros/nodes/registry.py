@@ -11,6 +11,7 @@ from automax_ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.nodes.drive_plant import DrivePlantNode
 from automax_ros.nodes.io_module import IoModuleNode
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.network import NetworkNode
 from automax_ros.nodes.operator import OperatorNode
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.nodes.udc import UdcNode
@@ -20,6 +21,7 @@ from automax_ros.rack.modules.digital_io import DIGITAL_IO
 from automax_ros.rack.modules.drive_analog import DRIVE_ANALOG
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
 from automax_ros.rack.modules.kind import Module, ModuleKind
+from automax_ros.rack.modules.network_config import NETWORK
 from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.modules.pulsetach import PULSETACH
@@ -37,6 +39,7 @@ NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
     PULSETACH: IoModuleNode,
     DRIVE_CONTROLLER: IoModuleNode,
     DRIVE_ANALOG: IoModuleNode,
+    NETWORK: NetworkNode,
     UDC: UdcNode,
 }
 """The node of each kind of module; None where the rack's common memory node is enough."""

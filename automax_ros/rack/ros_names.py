@@ -9,6 +9,7 @@ it can never make two names equal:
 - commons that differ only in type get the type's word: ``common/SPEED_int`` and ``common/SPEED_bool``;
 - the topic of a plant is its name: ``plants/UNWIND``; that which commands its joint is a controller's:
   ``UNWIND_velocity_controller/commands``;
+- the topic of a network of racks is ``/dcsnet/PAPER``, next to their namespaces and in none of them (decision);
 - a name that begins with an underscore gets ``u`` in front, since ROS tools hide such topics: ``common/u_SPARE``
   (decision). Repeated underscores, which the ROS design page advises against and ROS accepts, stay as they are.
 """
@@ -68,6 +69,15 @@ def load_topic(name: str) -> str:
 def command_topic(joint: str, interface: str) -> str:
     """Return the topic that commands a joint, named as a controller of ros2_control names its own (decision)."""
     return f"{joint}_{interface}_controller/commands"
+
+
+def network_topic(namespace: str, network: str) -> str:
+    """Return the full name of the topic that is a network's cable: ``/dcsnet/PAPER``.
+
+    It is nobody's own: it stands where the racks' namespaces stand. For ``plant/line1`` it is ``/plant/dcsnet/PAPER``.
+    """
+    outside = namespace.rpartition("/")[0]
+    return f"/{outside}/dcsnet/{network}" if outside else f"/dcsnet/{network}"
 
 
 def _word(name: str, shared: bool) -> str:

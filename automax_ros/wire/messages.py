@@ -148,6 +148,21 @@ class PlantState(NamedTuple):
     shaft_j: float
 
 
+class NetworkDrop(NamedTuple):
+    """What a module sends of one drop of a network of racks: 32 registers."""
+
+    stamp: int
+    run_id: int
+    rack: str
+    slot: int
+    station: int
+    depth: int
+    defined: bool
+    sequence: int
+    drop: int
+    registers: Sequence[int]
+
+
 class Header(NamedTuple):
     """std_msgs/Header."""
 
@@ -254,6 +269,7 @@ _OWN = (
     BusWrite,
     CommonImage,
     CommonWrite,
+    NetworkDrop,
     Operation,
     PlantState,
     Presence,

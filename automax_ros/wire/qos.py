@@ -40,5 +40,7 @@ OPERATION = QosProfile("reliable", "transient_local", "keep_last", 100)
 """What was done last waits for late joiners, oldest first (decision: 100 operations)."""
 SCAN = QosProfile("reliable", "volatile", "keep_last", 1000)
 """A stream of which every message counts."""
+NETWORK = QosProfile("best_effort", "volatile", "keep_last", 256)
+"""What comes again in 5.5 ms: one that is lost is not sent again, nobody waits for a slow reader (decision)."""
 PLANT = QosProfile("reliable", "volatile", "keep_last", 100)
 """A second of a plant's samples (decision)."""

@@ -1,0 +1,145 @@
+"""The node ``network_SLOT``: a network module 57C404, whose cable is a topic.
+
+Publishes: ``/dcsnet/NETWORK`` (automax_msgs/NetworkDrop), one message for each drop that the module sends, once per
+cycle of 5.5 ms; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second, and at once when a drop is lost or
+heard again, or another module uses its drops.
+
+Subscribes: ``/dcsnet/NETWORK``. Messages wait as bytes, the last ``MOST_WAITING``; once per cycle those that wait are
+read, longer ones than any of a station unread, and given to the module between two scans.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.topics import message_class, ros_qos
+from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.network import CYCLE_NS
+from automax_ros.rack.modules.network_port import Frame, NetworkStatus, Sender, Station
+from automax_ros.rack.modules.network_registers import HALF
+from automax_ros.rack.names import is_rack_name
+from automax_ros.rack.ros_names import network_topic
+from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.wire.cdr import CdrError, decode, encode
+from automax_ros.wire.messages import NetworkDrop
+from automax_ros.wire.qos import NETWORK
+from automax_ros.wire.topics import Topic
+
+TYPE = "automax_msgs/msg/NetworkDrop"
+MOST_WAITING = NETWORK.depth
+"""Messages that wait for the next cycle; of more the oldest are lost, as they would be on DDS's side."""
+MOST_BYTES = len(encode(NetworkDrop(0, 0, "R" * 8, 0, 0, 0, False, 0, 0, (0,) * HALF)))
+"""Length of the longest message that a station sends."""
+
+
+class NetworkNode(ModuleNode):
+    """Serves one network module."""
+
+    def __init__(self, site: Site, module: Module) -> None:
+        """Join the network."""
+        super().__init__(site, module.config.name)
+        assert isinstance(module, Station)
+        self._module, self._slot, self._model = module, module.config.slot, module.config.model
+        name = network_topic(site.rack.config.namespace, module.network)
+        self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
+        self._told: tuple[object, ...] = ("", (), ())
+        self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
+        self.create_subscription(message_class(TYPE), name, self._hear, ros_qos(NETWORK), raw=True)
+        module.connect(self._send)
+        scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
+        scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda now, _: self._look(now))
+        self.diagnose(self._health)
+
+    def _hear(self, payload: bytes) -> None:
+        self._waiting.append(payload if len(payload) <= MOST_BYTES else b"")
+
+    def _send(self, now_ns: int, frames: Sequence[Frame]) -> None:
+        stream, rack = self.site.stream, self.site.rack.config.name
+        stamp = stream.stamp(now_ns)
+        for item in frames:
+            message = NetworkDrop(
+                stamp,
+                stream.run_id,
+                rack,
+                self._slot,
+                item.station,
+                item.depth,
+                item.defined,
+                item.sequence,
+                item.drop,
+                item.words,
+            )
+            self._publish(stamp, encode(message))
+
+    def _look(self, now_ns: int) -> None:
+        """Give the module what has come, and tell how it stands where that has changed."""
+        waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        if waiting:
+            arrived = [_read(payload) for payload in waiting]
+            own = (self.site.stream.run_id, self._slot)
+            known = [item for item in arrived if item is not None and (item[0].run_id, item[0].slot) != own]
+            self._module.receive(known, damaged=arrived.count(None))
+        status = self._module.status()
+        told = (status.code, status.lost, status.rivals)
+        if told != self._told:
+            self._told = told
+            self._tell(status)
+            self.publish_diagnostics(now_ns)
+
+    def _tell(self, status: NetworkStatus) -> None:
+        network, log = self._module.network, self.get_logger()
+        for rival in status.rivals:
+            text = f"network {network}: {rival} uses a drop that is another's: give each module drops of its own"
+            self.site.health.note("two modules with one drop", rival, lambda text=text: text)  # type: ignore[misc]
+            log.error(text)
+        if status.lost:
+            log.warning(f"network {network}: {_sentence(status)}")
+        elif not status.rivals:
+            log.info(f"network {network}: {_sentence(status)}")
+
+    def _health(self, _: int) -> list[DiagnosticStatus]:
+        """Return the module's health: ERROR where two modules have one drop, WARN with the code C, else OK."""
+        status = self._module.status()
+        level = DiagnosticStatus.WARN if status.code else DiagnosticStatus.OK
+        text = _sentence(status)
+        if status.rivals:
+            level = DiagnosticStatus.ERROR
+            text = f"drops of another module are used by {', '.join(map(str, status.rivals))}; {text}"
+        values = {
+            "network": self._module.network,
+            "drop": str(status.drop),
+            "depth": str(status.depth),
+            "depth_defined": str(status.defined).lower(),
+            "heard": _listed(status.heard),
+            "lost": _listed(status.lost),
+            "code": status.code,
+            **{name: str(count) for name, count in status.counters},
+        }
+        return [self.status(self._model, level, text, self._slot, values)]
+
+
+def _read(payload: bytes) -> tuple[Sender, Frame] | None:
+    """Return what a message says, None where it says nothing."""
+    try:
+        found = decode(TYPE, payload)
+    except CdrError:
+        return None
+    assert isinstance(found, NetworkDrop)
+    rack = found.rack if is_rack_name(found.rack) else ""
+    words = tuple(found.registers)
+    frame = Frame(found.station, found.depth, found.defined, found.drop, found.sequence, words)
+    return Sender(found.run_id, found.slot, rack), frame
+
+
+def _sentence(status: NetworkStatus) -> str:
+    if status.lost:
+        return f"code {status.code}: nothing comes from drops {_listed(status.lost)}"
+    return f"hears drops {_listed(status.heard)}" if status.heard else "hears nobody yet"
+
+
+def _listed(drops: Sequence[int]) -> str:
+    return ", ".join(map(str, drops))
