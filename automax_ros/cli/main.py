@@ -30,6 +30,7 @@ SUBCOMMANDS: dict[str, str] = {
     "import": "make a rack file from a configuration task",
     "convert": "make tasks of an old plant acceptable",
     "run": "run a rack",
+    "node": "run one process of a rack that is distributed",
     "step": "step a rack: a tick, a scan, a BASIC line at a time",
     "record": "record a rack that runs",
     "ctl": "operate a rack that runs: RUN, STOP, force, set, tune",

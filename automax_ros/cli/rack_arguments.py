@@ -17,14 +17,17 @@ from automax_ros.rack.settings import setting
 from automax_ros.rack.tasks_check import check_tasks
 
 
-def config_of(path: Path, *, allow_outside: bool) -> RackConfig | None:
+def config_of(path: Path, *, allow_outside: bool, quiet: bool = False) -> RackConfig | None:
     """Return a rack's configuration; what is wrong with its file is printed, and None returned where it has errors.
+
+    ``quiet``: of a file that can be used nothing is printed, since another process has told its warnings.
 
     Raises:
         UsageError: the file cannot be read.
     """
     result = load_rack_file(path, allow_outside=allow_outside)
-    print_diagnostics(result.diagnostics, result.source, sys.stderr)
+    if not quiet or has_errors(result.diagnostics):
+        print_diagnostics(result.diagnostics, result.source, sys.stderr)
     if not is_text(result):
         raise UsageError(f"{path} cannot be used")
     return result.config if not has_errors(result.diagnostics) else None

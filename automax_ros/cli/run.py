@@ -42,6 +42,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--simulated", action="store_true", help="simulated time, as fast as the machine can, without ROS"
     )
     parser.add_argument(
+        "--distributed",
+        action="store_true",
+        help="on the wall clock: each module in a process of its own (docs/distributed.md)",
+    )
+    parser.add_argument(
+        "--no-restart",
+        dest="restart",
+        action="store_false",
+        help="with --distributed: do not start a process again that has died",
+    )
+    parser.add_argument(
         "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
     )
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
@@ -50,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_watch_argument(parser, "the first published ones")
     parser.add_argument(
         "--state",
-        type=_folder,
+        type=folder,
         metavar="DIR",
         help="keep what outlives a power cycle in this folder from run to run (default on the wall clock: "
         ".automax/RACK next to the rack file; simulated: nowhere)",
@@ -68,7 +79,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_ros_arguments(parser)
 
 
-def _folder(text: str) -> Path:
+def folder(text: str) -> Path:
+    """Return the folder that an option names."""
     if not text:
         raise argparse.ArgumentTypeError("names no folder")
     return Path(text)
@@ -81,7 +93,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
     if arguments.simulated and arguments.ros is not None and arguments.ros.given:
         raise UsageError("--ros-args: with --simulated nothing of ROS is started", "leave one of them out")
-    _check_files(arguments)
+    if arguments.simulated and arguments.distributed:
+        raise UsageError("--distributed needs the wall clock, by which its processes agree", "leave out --simulated")
+    if not (arguments.distributed or arguments.restart):
+        raise UsageError("--no-restart belongs to --distributed")
+    check_files(arguments)
     with stop_signals() as stop, held_for_writing(arguments.report):
         if not arguments.simulated:
             prepare_ros(arguments, WITHOUT_ROS)
@@ -96,7 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.record,
             recording_options(arguments, config),
             tuple(settings_of(config, arguments.settings)),
-            tuple(_watched(config, arguments.watch)),
+            tuple(watched_commons(config, arguments.watch)),
             arguments.state,
             arguments.stimuli,
             arguments.report,
@@ -106,6 +122,10 @@ def run(arguments: argparse.Namespace) -> int:
         try:
             if arguments.simulated:
                 return run_simulated(plan, stop)
+            if arguments.distributed:
+                from automax_ros.cli.run_distributed import run_distributed
+
+                return run_distributed(plan, arguments, stop)
             from automax_ros.cli.run_live import run_live
 
             return run_live(plan, stop)
@@ -118,7 +138,7 @@ def run(arguments: argparse.Namespace) -> int:
             return 2
 
 
-def _check_files(arguments: argparse.Namespace) -> None:
+def check_files(arguments: argparse.Namespace) -> None:
     """Refuse a report that cannot be written, or that would be written over what is read, and a state's folder."""
     if arguments.state is not None:
         require_folder("--state", arguments.state)
@@ -129,7 +149,12 @@ def _check_files(arguments: argparse.Namespace) -> None:
         require_different_files(given, {"--report": arguments.report})
 
 
-def _watched(config: RackConfig, texts: list[str] | None) -> list[CommonElement]:
+def watched_commons(config: RackConfig, texts: list[str] | None) -> list[CommonElement]:
+    """Return what ``--watch`` names, or what is shown without it.
+
+    Raises:
+        UsageError: the rack has no such variable.
+    """
     try:
         return watched(config, watch_list(texts))
     except Fault as error:

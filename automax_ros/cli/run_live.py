@@ -18,7 +18,6 @@ from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import RackLock, domain_id
 from automax_ros.rack.operation_log import OperationLog
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.retention import default_folder
 from automax_ros.rack.standing import StopCause
 
 SWITCH_S = 0.0005
@@ -28,21 +27,22 @@ SWITCH_S = 0.0005
 def run_live(plan: RunPlan, stop: StopRequest) -> int:
     """Run until the duration has passed or a stop is requested; return the exit code."""
     domain = domain_id()
-    with RackLock(plan.config.namespace, domain):
+    with RackLock(plan.config.namespace, domain, None if plan.seat is None else plan.seat.seat.name):
         return _run_locked(plan, stop, domain)
 
 
 def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
-    rack = Rack(plan.config, stopwatch=time.monotonic_ns)
-    warn(rack)
+    rack = Rack(plan.config, stopwatch=time.monotonic_ns, local=plan.slots)
+    if not plan.is_watched:
+        warn(rack)
     stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
-    state = StateKeeping(rack, plan.state or default_folder(plan.config))
+    state = StateKeeping(rack, plan.state_folder)
     live = LiveRack(rack, plan.ros)
     services = OperationLog(lambda: stimulation.is_acting)
     rack.observers.add(services)
     recorder: Recorder | None = None
     sync: DiskSync | None = None
-    display = StatusDisplay(rack, plan.watch, live=True, health=live.health)
+    display = StatusDisplay(rack, plan.watch, live=True, health=live.health, screen=plan.screen)
     recording = RecordingWatch(None, display)
     told: StopCause | None = None
 
@@ -70,7 +70,8 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         # What is there now stays: a look of the collector at all of it would hold up scans by tens of ms.
         gc.collect()
         gc.freeze()
-        display.message(_opening(rack, domain))
+        if not plan.is_watched:
+            display.message(_opening(plan, rack, domain))
         live.start([*state.settings, *plan.settings])
         stimulation.begin()
         live.run(plan.duration_ns, on_idle)
@@ -96,13 +97,16 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     return conclude(rack, plan, report, failed=failed)
 
 
-def _opening(rack: Rack, domain: int) -> str:
+def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:
     config = rack.config
     modules = ", ".join(
         f"{module.config.model} in slot {module.config.slot} ({' '.join(item.task.name for item in module.tasks)})"
         for module in rack.task_modules
     )
+    head = f"rack {config.name}: {modules}"
+    if plan.seat is not None:
+        head = f"{plan.seat.seat.words} of rack {config.name}"
     return (
-        f"rack {config.name}: {modules}; {len(config.declared)} common variables\n"
+        f"{head}; {len(config.declared)} common variables\n"
         f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"
     )

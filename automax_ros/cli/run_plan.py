@@ -10,15 +10,31 @@ from typing import Any
 
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.cli.output_files import write_report
+from automax_ros.cli.seat_talk import ToldScreen, tell_report
+from automax_ros.cli.status import Person, Screen
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.core.types import Value
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.report import report_of
+from automax_ros.rack.retention import default_folder
+from automax_ros.rack.seating import Seat
 from automax_ros.rack.settings import CommonElement
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.stage import Happened
+
+
+@dataclass(frozen=True)
+class SeatPlan:
+    """The part of a run of a distributed rack that is in this process.
+
+    ``run_id`` is the number of the run, None to take that of the processes that are there, or a new one.
+    """
+
+    seat: Seat
+    run_id: int | None = None
+    watched: bool = False
 
 
 @dataclass(frozen=True)
@@ -28,7 +44,7 @@ class RunPlan:
     ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the one that was
     named for values that outlive the run, if any. ``stimuli`` is the file of what happens to the rack, ``report`` that
     in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
-    command line says to ROS.
+    command line says to ROS. ``seat`` is the part of the rack that is run, None for all of it.
     """
 
     config: RackConfig
@@ -42,6 +58,30 @@ class RunPlan:
     report: Path | None = None
     allow_outside: bool = False
     ros: RosArguments = NO_ARGUMENTS
+    seat: SeatPlan | None = None
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether another process has started this one, and tells the person what it says."""
+        return self.seat is not None and self.seat.watched
+
+    @property
+    def slots(self) -> tuple[int, ...] | None:
+        """The slots whose modules are run, None for all."""
+        return None if self.seat is None else self.seat.seat.slots
+
+    @property
+    def state_folder(self) -> Path:
+        """Where a run on the wall clock keeps what outlives it; processes of one rack have a folder each."""
+        if self.state is not None:
+            return self.state
+        whole = default_folder(self.config)
+        return whole if self.seat is None else whole / self.seat.seat.name
+
+    @property
+    def screen(self) -> Screen:
+        """Where the run is shown."""
+        return ToldScreen() if self.is_watched else Person()
 
 
 def warn(rack: Rack) -> None:
@@ -64,7 +104,9 @@ def conclude(rack: Rack, plan: RunPlan, report: dict[str, Any] | None, *, failed
     if plan.report is not None and report is not None:
         write_report(plan.report, report)
     stopped = rack.operations.stopped
-    if stopped is not None:
+    if plan.is_watched:
+        tell_report(report or {})
+    elif stopped is not None:
         print(f"automax run: STOP ALL: {stopped.reason}", file=sys.stderr)
     fault = stopped is not None and stopped.is_fault
     return 1 if fault or failed else 0

@@ -73,6 +73,14 @@ class RosArguments:
         """
         return [BEGIN, "--disable-stdout-logs", *(word for rule in self.rules for word in rule)]
 
+    @property
+    def command_line(self) -> list[str]:
+        """The words that say the same to another program."""
+        names = (f"{node}:__node:={name}".removeprefix(":") for node, name in self.names.items())
+        space = [f"__ns:=/{self.namespace}"] if self.namespace else []
+        rules = [*((REMAP, rule) for rule in (*space, *names)), *self.rules]
+        return [BEGIN, *(word for rule in rules for word in rule), END] if rules else []
+
     def checked(self) -> RosArguments:
         """Return itself, where rcl takes the words; ROS must be usable.
 

@@ -78,6 +78,11 @@ class Installation:
             if here is None or task.name in here:
                 self._compiled[task.name] = self._compile(task.name, result.program)
 
+    @property
+    def programs(self) -> Mapping[str, Program]:
+        """The programs of all tasks, by name."""
+        return self._programs
+
     def compiled(self, task: str) -> CompiledTask:
         """Return a task of the rack's file."""
         return self._compiled[task]

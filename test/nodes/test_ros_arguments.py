@@ -58,6 +58,14 @@ def test_names_of_nodes():
     assert ros.rules == ()
 
 
+def test_another_program_can_be_told_the_same():
+    words = ["--ros-args", "-r", "__ns:=/plant/a", "-r", "__node:=line", "-r", "udc_3:__node:=drive", "-p", "A:=1"]
+    words += ["-r", "common/A:=/x", "--enable-rosout-logs", "--", "--ros-args", "--params-file", "p.yaml"]
+    _, given = split_arguments(words, {})
+    assert split_arguments(given.command_line, {"ROS_NAMESPACE": "other"}) == ([], given)
+    assert split_arguments([], {})[1].command_line == []
+
+
 def test_remaps_of_topics_go_on_to_rcl():
     _, ros = split("run --ros-args -r common/REF:=/x/ref -r processor_1:scans:=/x/scans")
     assert ros.words[2:] == ["--remap", "common/REF:=/x/ref", "--remap", "processor_1:scans:=/x/scans"]

@@ -1,0 +1,34 @@
+"""The report of a distributed rack: each process tells its part, and they are put together as if it had been one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+
+def merged_report(parts: Mapping[str, Mapping[str, Any]], names: Sequence[str]) -> dict[str, Any]:
+    """Return the report of a rack, from those of its processes by name.
+
+    ``names`` are those of all processes, that of common memory first. Commons, forces and time are the first's; tasks
+    are of their own processes; what was done in several processes at one instant was done once, and is refused where
+    one of them has refused it. ``lost`` names processes that have told nothing at their end (decision).
+    """
+    there = [parts[name] for name in names if name in parts]
+    first = there[0] if there else {}
+    stops = [part["stopped"] for part in there if part["stopped"] is not None]
+    return {
+        **first,
+        "stopped": min(stops, key=lambda stop: stop["time_s"]) if stops else None,
+        "tasks": {task: told for part in there for task, told in part["tasks"].items()},
+        "operations": _operations(item for part in there for item in part["operations"]),
+        "lost": [name for name in names if name not in parts],
+    }
+
+
+def _operations(told: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    found: dict[tuple[Any, ...], Mapping[str, Any]] = {}
+    for item in told:
+        key = item["at"], item["what"], item.get("of")
+        if key not in found or not item["ok"]:
+            found[key] = item
+    return sorted(found.values(), key=lambda item: float(item["at"]))
