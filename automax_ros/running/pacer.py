@@ -28,6 +28,9 @@ CHORE_PERIOD_NS = 100 * NS_PER_MS
 """How often the loop calls ``on_idle``."""
 CHORE_ROOM_NS = 2 * NS_PER_MS
 """``on_idle`` is put off, by another period at most, while the next event is nearer than this."""
+WALL_CLOCK: Callable[[], int] = time.monotonic_ns
+WALL_WAIT: Callable[[float], object] = time.sleep
+"""The wall clock, for those who keep time otherwise and look after a person meanwhile."""
 
 
 class Pacer:
@@ -52,11 +55,12 @@ class Pacer:
         self.halted = False
         self.while_halted: Callable[[], object] = _nothing
 
-    def begin(self, lead_ns: int = 0) -> None:
-        """Let the scheduler's present be ``lead_ns`` from now on the wall clock."""
+    def begin(self, lead_ns: int = 0) -> int:
+        """Let the scheduler's present be ``lead_ns`` from now on the wall clock; return the time of day then, ns."""
         self._zero_ns = self._clock() + lead_ns - self._scheduler.now_ns
         if not self.halted:
             self._scheduler.zero_ns = self._zero_ns
+        return time.time_ns() + lead_ns
 
     def halt(self) -> None:
         """Let time stand still from now on; ``while_halted`` is called every now and then, 20 times per second."""

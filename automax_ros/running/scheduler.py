@@ -153,6 +153,12 @@ class Scheduler:
             event.action(instant, 0)
         self.now_ns = max(self.now_ns, end_ns)
 
+    def run_through(self, time_ns: int) -> None:
+        """Let simulated time pass as ``run_until``, with what happens at ``time_ns`` itself; then it is ``time_ns``."""
+        if time_ns >= self.now_ns:
+            self.run_until(time_ns + 1)
+            self.now_ns = time_ns
+
     def step(self, end_ns: int) -> bool:
         """Carry out the next event before ``end_ns``, alone; where there is none it is ``end_ns``, and FALSE."""
         due = self.next_ns
