@@ -40,7 +40,11 @@ class Guard:
     def services(self, node: Node) -> None:
         """Let no exception leave the services that a node has now; a request that fails is refused."""
         for service in node.services:
-            service.callback = self._answering(service.callback, service.srv_type, service.srv_name)
+            self.service(service)
+
+    def service(self, service: Any) -> None:
+        """Let no exception leave a service; a request that fails is refused."""
+        service.callback = self._answering(service.callback, service.srv_type, service.srv_name)
 
     def serve(self, executor: Any, context: Context, seconds: float) -> None:
         """Let an executor carry out what has come, or wait for it at most a time (s).

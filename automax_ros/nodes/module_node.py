@@ -10,7 +10,6 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
 from rclpy.event_handler import (
     PublisherEventCallbacks,
@@ -18,12 +17,10 @@ from rclpy.event_handler import (
     QoSPublisherMatchedInfo,
     QoSRequestedIncompatibleQoSInfo,
 )
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import qos_policy_name_from_kind
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.nodes.guard import Guard
+from automax_ros.nodes.guarded_node import GuardedNode
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.rack import Rack
@@ -34,9 +31,6 @@ from automax_ros.wire.stream import RackStream
 from automax_ros.wire.topics import Take, Topic
 
 DIAGNOSTICS_PERIOD_NS = NS_PER_S
-MAIN_NODE = "rack"
-"""The node that ``__node`` without a name means."""
-_SIM_TIME = "use_sim_time"
 
 
 @dataclass(frozen=True)
@@ -69,22 +63,13 @@ class Site:
             yield
 
 
-class ModuleNode(Node):  # type: ignore[misc]
+class ModuleNode(GuardedNode):
     """A module's node: in the rack's namespace, on its time, and safe from what clients ask of its parameters."""
 
     def __init__(self, site: Site, name: str) -> None:
         """Join the graph."""
-        # The rack is the clock: its stamps are the grid's, whatever a launch file says to all nodes.
-        own_time = [Parameter(_SIM_TIME, value=False)]
-        space = f"/{site.rack.config.namespace}"
-        name = site.arguments.name_of(name, main=name == MAIN_NODE)
-        # Rules of a foreign context that are for all nodes must not put the rack elsewhere, or give all one name.
-        own_place = ["--ros-args", "-r", f"__ns:={space}", "-r", f"__node:={name}"]
-        super().__init__(name, namespace=space, context=site.context, cli_args=own_place, parameter_overrides=own_time)
+        super().__init__(name, site.rack.config.namespace, site.context, site.health, site.arguments)
         self.site = site
-        self.add_on_set_parameters_callback(_refuse_simulated_time)
-        self.guard = Guard(site.health, self.get_logger().error)
-        self.guard.services(self)
 
     def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Take:
         """Return what publishes the messages of a topic. ``joined`` is called for each reader that comes."""
@@ -146,10 +131,3 @@ class ModuleNode(Node):  # type: ignore[misc]
                     self.guard.report(what, error)
 
         return entered
-
-
-def _refuse_simulated_time(parameters: list[Parameter[Any]]) -> SetParametersResult:
-    """Refuse ``use_sim_time``: the rack's own time is what its messages are stamped with."""
-    wanted = any(parameter.name == _SIM_TIME and parameter.value for parameter in parameters)
-    reason = "the rack keeps its own time; use_sim_time cannot be set on its nodes" if wanted else ""
-    return SetParametersResult(successful=not wanted, reason=reason)

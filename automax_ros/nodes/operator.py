@@ -15,7 +15,6 @@ can ask for at once).
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from automax_msgs.msg import LoggedError, TaskInfo
@@ -32,9 +31,9 @@ from automax_msgs.srv import (
 )
 from std_srvs.srv import Trigger
 
-from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.nodes.background import Background
 from automax_ros.nodes.later import Later, Respond, allow_later
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.rack.installation import Prepared
@@ -67,8 +66,8 @@ class OperatorNode(ModuleNode):
         self._serve(Unforce, "unforce", lambda request, _: orders.unforce(list(request.names)))
         self._serve(OperateControl, "module", lambda request, _: orders.module(*_moved(request)))
         self._serve(OperateControl, "plant", lambda request, _: orders.plant(*_moved(request)))
-        self._compiler = ThreadPoolExecutor(max_workers=1, thread_name_prefix="reload")
-        self._reloading, self._closed = "", False
+        self._work = Background(self)
+        self._reloading = ""
         allow_later(self.create_service(Reload, "reload", self._reload))
         self._serve(ReadValues, "get", self._get)
         self._serve(ReadValues, "forces", self._forces)
@@ -103,32 +102,28 @@ class OperatorNode(ModuleNode):
             return self._refused("reload", response, error)
 
         def begin(respond: Respond) -> None:
-            self._prepare(name, source, lambda prepared: finish(prepared, respond))
+            self._work.do(
+                lambda: self._orders.prepare(name, source), lambda found, error: finish(found, error, respond)
+            )
 
-        def finish(prepared: Future[Prepared], respond: Respond) -> None:
-            if self._closed:
-                return
+        def finish(prepared: Prepared, error: Exception | None, respond: Respond) -> None:
             try:
                 with self.site.present():
-                    if not self._orders.is_current(prepared.result()):
+                    if error is not None:
+                        raise error
+                    if not self._orders.is_current(prepared):
                         begin(respond)
                         return
                     self._reloading = ""
-                    self._orders.install(prepared.result(), keep_state=request.keep_state)
-            except Exception as error:
+                    self._orders.install(prepared, keep_state=request.keep_state)
+            except Exception as fault:
                 self._reloading = ""
-                response.findings = list(error.findings) if isinstance(error, ReloadRefused) else []
-                respond(self._refused("reload", response, error))
+                response.findings = list(fault.findings) if isinstance(fault, ReloadRefused) else []
+                respond(self._refused("reload", response, fault))
             else:
                 respond(_concluded(response, ok=True, reason=""))
 
         return Later(begin)
-
-    def _prepare(self, name: str, source: SourceText, finish: Callable[[Future[Prepared]], None]) -> None:
-        """Prepare a source on the thread for it; then the executor calls ``finish``."""
-        executor = self.executor
-        working = self._compiler.submit(self._orders.prepare, name, source)
-        working.add_done_callback(lambda prepared: executor.create_task(finish, prepared))
 
     def _refuse_second(self, task: str) -> None:
         if self._reloading:
@@ -137,8 +132,7 @@ class OperatorNode(ModuleNode):
 
     def destroy_node(self) -> None:
         """Leave the graph; a source that is being compiled is not installed."""
-        self._closed = True
-        self._compiler.shutdown(wait=False, cancel_futures=True)
+        self._work.close()
         super().destroy_node()
 
     def _get(self, request: Any, response: Any) -> None:

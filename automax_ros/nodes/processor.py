@@ -7,7 +7,7 @@ when a task's state changes.
 Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the
 task.
 
-Its tasks' run-time errors and PRINT lines go to /rosout.
+Its tasks' run-time errors and PRINT lines go to /rosout. It is a managed node (``managed_module``).
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.managed_module import ManagedModuleNode
+from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.tunables import Tunable, tunables_of
 from automax_ros.rack.modules.kind import Module
@@ -36,12 +37,12 @@ ERRORS_SHOWN = 5
 """... and then this many of one scan."""
 
 
-class ProcessorNode(ModuleNode):
+class ProcessorNode(ManagedModuleNode):
     """Serves one Processor; the scheduler of the rack scans its tasks."""
 
     def __init__(self, site: Site, processor: Module) -> None:
         """Create publishers and parameters, and observe the rack."""
-        super().__init__(site, processor.config.name)
+        super().__init__(site, processor)
         rack, stream = site.rack, site.stream
         self._rack = rack
         self._slot, self._tasks = processor.config.slot, [item.task for item in processor.tasks]
@@ -92,6 +93,8 @@ class ProcessorNode(ModuleNode):
         concerned = [task for task in self._tasks if operation.concerns(task.name)]
         if operation.ok and operation.what in ("reload", "power_on"):
             self._declare(concerned)
+        if operation.ok:
+            self.follow_tasks()
         if concerned:
             self.publish_diagnostics(operation.at_ns)
 

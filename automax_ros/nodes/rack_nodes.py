@@ -25,7 +25,11 @@ from rclpy.context import Context
 from rclpy.utilities import get_default_context
 
 from automax_ros.core.types import Value
+from automax_ros.nodes.managed import ACTIVE, INACTIVE
+from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
+from automax_ros.nodes.rack_duties import HeldRack
+from automax_ros.nodes.rack_node import Follower, RackNode
 from automax_ros.nodes.registry import nodes_of
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.installation import RackError
@@ -48,10 +52,16 @@ class RackNodes:
         stream: its messages, for a recorder.
         health: what went wrong so far.
         nodes: the node of each module.
+        manager: the node ``rack``; None where common memory is in another process.
     """
 
     def __init__(
-        self, rack: Rack | Path | str, *, context: Context | None = None, arguments: RosArguments = NO_ARGUMENTS
+        self,
+        rack: Rack | Path | str,
+        *,
+        context: Context | None = None,
+        arguments: RosArguments = NO_ARGUMENTS,
+        manager: RackNode | None = None,
     ) -> None:
         """Create the nodes; nothing runs yet.
 
@@ -60,6 +70,7 @@ class RackNodes:
             context: the context of all nodes, initialised; rclpy's default one if None.
             arguments: what the nodes are told besides what the context knows: names, the namespace of a rack that is
                 given by its file.
+            manager: the node ``rack`` where the caller has one, who then sees to its state; else one is made here.
 
         Raises:
             RackError: the YAML file or a task has errors, which ``findings`` holds.
@@ -75,6 +86,16 @@ class RackNodes:
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._site)
+        self._own: tuple[RackNode, ...] = ()
+        if manager is None and self.rack.part.is_home:
+            manager = RackNode(
+                self.rack.config.namespace, self._context, self.health, HeldRack(self), self._enter, arguments
+            )
+            manager.follow(INACTIVE)
+            self._own = (manager,)
+        self.manager = manager
+        if manager is not None:
+            self.rack.observers.add(Follower(manager))
 
     @property
     def lock(self) -> AbstractContextManager[None]:
@@ -84,7 +105,7 @@ class RackNodes:
     def add_to(self, executor: Any) -> None:
         """Let an executor of rclpy serve the nodes: any kind, alone or with nodes of your own."""
         self._executor = executor
-        for node in self.nodes:
+        for node in (*self.nodes, *self._own):
             executor.add_node(node)
 
     def start(self, settings: Sequence[tuple[str, Value]] = (), *, paced: bool = True) -> None:
@@ -99,9 +120,36 @@ class RackNodes:
             self.stream.begin(time.time_ns() + START_LEAD_NS)
             self._begun = True
             self.rack.start(settings)
+            for node in (*self._own, *self._managed()):
+                node.follow(ACTIVE)
         if paced:
             self._thread = threading.Thread(target=self._keep_pace, name=self.rack.config.namespace, daemon=True)
             self._thread.start()
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether ``start`` was called."""
+        return self._begun
+
+    def activate(self) -> None:
+        """Put all tasks that rest into RUN.
+
+        Raises:
+            OperationRefused: the rack refuses it (``Operations.run_all``).
+        """
+        with self._site.present():
+            self.rack.operations.run_all()
+
+    def deactivate(self) -> None:
+        """STOP ALL, and let the modules' nodes be inactive too.
+
+        Raises:
+            OperationRefused: the power is off.
+        """
+        with self._site.present():
+            self.rack.operations.stop_all("the node rack was deactivated")
+            for node in self._managed():
+                node.follow(INACTIVE)
 
     def run(
         self,
@@ -126,7 +174,7 @@ class RackNodes:
             self.rack.operations.stop_tasks()
             if self._begun:
                 self.stream.end()
-        for node in self.nodes:
+        for node in (*self.nodes, *self._own):
             if self._executor is not None:
                 self._executor.remove_node(node)
             node.destroy_node()
@@ -140,6 +188,13 @@ class RackNodes:
     ) -> None:
         """Close."""
         self.close()
+
+    def _managed(self) -> list[ManagedModuleNode]:
+        return [node for node in self.nodes if isinstance(node, ManagedModuleNode)]
+
+    def _enter(self, action: Callable[[], None]) -> None:
+        with self._site.present():
+            action()
 
     def _keep_pace(self) -> None:
         try:

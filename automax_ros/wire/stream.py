@@ -88,6 +88,11 @@ class RackStream:
         self._begun = False
 
     @property
+    def has_begun(self) -> bool:
+        """Whether messages flow."""
+        return self._begun
+
+    @property
     def topics(self) -> list[Topic]:
         """All topics of the stream."""
         rack = [self.variables_topic, self.snapshot_topic, self.backplane_topic, self.operations_topic]

@@ -1,0 +1,69 @@
+"""The node ``rack``: a whole rack as one managed node, which ROS 2 lifecycle managers configure and activate.
+
+Services, as every lifecycle node has them: ``~/change_state``, ``~/get_state``, ``~/get_available_states``,
+``~/get_available_transitions``, ``~/get_transition_graph`` (lifecycle_msgs). Publishes ``~/transition_event``.
+
+*configure* reads the rack's YAML file and compiles its tasks; *activate* puts all tasks into RUN; *deactivate* is STOP
+ALL between two scans, which makes all outputs 0; *cleanup* lets the nodes of the modules leave the graph;
+*shutdown* ends the program as SIGTERM does.
+
+A rack that a fault has stopped stays active (decision): a manager that finds a node inactive that it has not
+deactivated brings the whole system down, and ``/diagnostics`` tell of the fault. ``deactivate`` and ``activate`` put
+its tasks into RUN again, once the error log of the faulted one is cleared. Who puts tasks into RUN otherwise, as an
+operator does, makes the node active (decision): what is inactive does not run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.context import Context
+
+from automax_ros.nodes.guarded_node import MAIN_NODE, GuardedNode
+from automax_ros.nodes.managed import ACTIVE, Duties, Managed
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.rack.observers import Operation
+from automax_ros.running.health import Health
+from automax_ros.running.task import ScanRecord, Task
+from automax_ros.running.views import Write
+
+_RUNS = ("run", "run_all")
+"""The operations that put tasks into RUN."""
+
+
+class RackNode(Managed, GuardedNode):
+    """The node of a whole rack."""
+
+    def __init__(
+        self,
+        namespace: str,
+        context: Context,
+        health: Health,
+        duties: Duties,
+        enter: Callable[[Callable[[], None]], None],
+        arguments: RosArguments = NO_ARGUMENTS,
+    ) -> None:
+        """Join the graph, unconfigured; the arguments are those of ``GuardedNode`` and ``Managed.manage``."""
+        GuardedNode.__init__(self, MAIN_NODE, namespace, context, health, arguments)
+        self.manage(duties, self.guard, enter)
+
+
+class Follower:
+    """Observes a rack, so that the node ``rack`` is active where somebody else has put tasks into RUN."""
+
+    def __init__(self, manager: Managed) -> None:
+        self._manager = manager
+
+    def operated(self, operation: Operation) -> None:
+        """Look whether it has put tasks into RUN."""
+        if operation.ok and operation.what in _RUNS:
+            self._manager.follow(ACTIVE)
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+        """Scans change no state."""
+
+    def written(self, writes: list[Write]) -> None:
+        """Writes change no state."""
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """Tunables change no state."""
