@@ -152,7 +152,7 @@ class _Watch:
         for name, deaths in supervisor.deaths.items():
             self.message(f"  {name} died {count_of(deaths, 'time')}")
         if self._reports:
-            report = merged_report(self._reports, self._names)
+            report = merged_report(self._reports, self._names, supervisor.deaths)
             if self._plan.report is not None:
                 write_report(self._plan.report, report)
             if report["stopped"] is not None:
