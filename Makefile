@@ -1,6 +1,7 @@
 # make setup   .venv with all dependencies, the package and its compiled messages   make run    the example rack
 # make test    style, types and tests; CI runs the same                            make soak   the long tests
 # make bench   measurements                     make format   rewrite the style    make clean  remove what was built
+# make docs    the site of docs/, into site/
 #
 # PYTHON=python3.12 chooses the interpreter of .venv (3.10 to 3.13); without it an existing .venv is kept.
 
@@ -17,7 +18,7 @@ endif
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH RMW_IMPLEMENTATION
 unexport PYTHONPATH PYTHONHOME PYTHONSTARTUP VIRTUAL_ENV _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: setup run test soak bench format clean
+.PHONY: setup run test soak bench docs format clean
 
 setup:
 	@tools/setup_environment.sh "$(PYTHON)"
@@ -41,10 +42,15 @@ soak: setup
 bench: setup
 	@set -e; for program in bench/[a-z]*.py; do echo "== $$program"; $(BIN)/python "$$program"; done
 
+# The build of the site and its links is a test too: test/docs/.
+docs: setup
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "site/index.html"
+
 format: setup
 	@$(BIN)/ruff check --fix . || true
 	@$(BIN)/ruff format .
 
 clean:
-	rm -rf .venv build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
