@@ -14,12 +14,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
 from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.rack_health import RackHealth
 from automax_ros.nodes.ros2_control import joint_inlets
 from automax_ros.nodes.scaled import ScaledInput
 from automax_ros.nodes.topics import message_class, ros_qos
@@ -55,6 +57,8 @@ class CommonMemoryNode(ModuleNode):
                 _ValueInlet(self, view, variable, topic)
         joint_inlets(self)
         stream.add_sink(outlets.get)
+        self.diagnose(RackHealth(site).statuses)
+        self.diagnose(self._module_health)
 
     def _with_files(self, publish: Take) -> Take:
         """Return what publishes an operation and, where it was a reload, the files that the rack runs from now."""
@@ -64,6 +68,17 @@ class CommonMemoryNode(ModuleNode):
             publish(stamp, payload)
 
         return take
+
+    def _module_health(self, _: int) -> list[DiagnosticStatus]:
+        """Return the health of the module that holds common memory; a lone Processor tells its own."""
+        rack = self.site.rack
+        module = next(item for item in rack.config.modules if item.slot == rack.config.home_slot)
+        if module.tick_ns:
+            return []
+        good = rack.operations.battery_good
+        values = {"variables": str(len(rack.config.declared)), "battery_good": str(good)}
+        level, text = (DiagnosticStatus.OK, "running") if good else (DiagnosticStatus.WARN, "the battery was bad")
+        return [self.status(module.model, level, text, module.slot, values)]
 
     def _offer_files(self) -> None:
         rack = self.site.rack

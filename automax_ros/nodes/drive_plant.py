@@ -1,8 +1,7 @@
 """The node ``drive_plant_SLOT`` (``drive_plant_SLOT_A`` and ``_B`` of a UDC): the plant that a drive turns.
 
 Publishes: ``joint_states`` (sensor_msgs/JointState), the shaft as a joint with the plant's name, and ``plants/NAME``
-(automax_msgs/PlantState), both 100 times per second of rack time; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray)
-once per second.
+(automax_msgs/PlantState), both 100 times per second of rack time; its part of ``/diagnostics``.
 
 Subscribes: ``plants/NAME/load_torque/set`` (std_msgs/Float64, N m) where the plant's load says ``ros: in``, and no
 other topic. A torque counts from the instant at which it comes. Observers are told of no operation: PlantState shows
@@ -39,7 +38,6 @@ class DrivePlantNode(ModuleNode):
         modules = {module.config.slot: module for module in site.rack.modules}
         module = modules[driven.slot]
         self._timing = module.timing if isinstance(module, Timed) else None
-        self._late_told = 0
         self._controls = Controls(site.rack)
         if driven.config.load.from_ros:
             self._inlet = Inlet(self, load_topic(driven.name), Float64, self._load)
@@ -67,7 +65,7 @@ class DrivePlantNode(ModuleNode):
         }
         timing = self._timing
         if timing is not None:
-            newly, self._late_told = timing.late - self._late_told, timing.late
+            newly = self.site.diagnostics.newly(f"{self._driven.name} late", timing.late)
             shown |= {
                 "interrupts": str(timing.interrupts),
                 "late": str(timing.late),

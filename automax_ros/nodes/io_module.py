@@ -1,7 +1,7 @@
 """The node of an I/O module: ``digital_io_SLOT``, ``analog_io_SLOT``, ``pulsetach_SLOT``, ``drive_SLOT`` and others.
 
-Publishes: ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second with its registers. Its points are common
-variables, which have topics of their own (``common_memory``).
+Publishes: its part of ``/diagnostics``, with its registers. Its points are common variables, which have topics of their
+own (``common_memory``).
 """
 
 from __future__ import annotations

@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
 from rclpy.event_handler import (
     PublisherEventCallbacks,
@@ -19,18 +18,15 @@ from rclpy.event_handler import (
 )
 from rclpy.qos import qos_policy_name_from_kind
 
-from automax_ros.core.ticks import NS_PER_S
+from automax_ros.nodes.diagnostics import Diagnostics, Source, status_of
 from automax_ros.nodes.guarded_node import GuardedNode
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import Pacer
-from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.wire.stream import RackStream
 from automax_ros.wire.topics import Take, Topic
-
-DIAGNOSTICS_PERIOD_NS = NS_PER_S
 
 
 @dataclass(frozen=True)
@@ -44,6 +40,7 @@ class Site:
         context: of all its nodes.
         health: where they report trouble.
         arguments: what they were told by the command line.
+        diagnostics: what they tell of their health.
         lock: held by whoever touches the rack; one thread at a time, between scans.
     """
 
@@ -53,6 +50,7 @@ class Site:
     context: Context
     health: Health
     arguments: RosArguments = NO_ARGUMENTS
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     @contextmanager
@@ -89,29 +87,18 @@ class ModuleNode(GuardedNode):
         publish = self.create_publisher(kind, topic.name, ros_qos(topic.qos), event_callbacks=events).publish
         return lambda _, payload: publish(payload)
 
-    def diagnose(self, statuses: Callable[[int], list[DiagnosticStatus]]) -> None:
-        """Publish ``/diagnostics`` once per second: what ``statuses`` returns for a rack time (ns)."""
-        self._statuses = statuses
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        scheduler, key = self.site.rack.scheduler, EventKey(EventClass.OBSERVE, 0, self.get_name())
-        scheduler.every(DIAGNOSTICS_PERIOD_NS, scheduler.now_ns, key, lambda now, _: self.publish_diagnostics(now))
-
-    def publish_diagnostics(self, now_ns: int) -> None:
-        """Publish the state at a rack time, with the stamp that all messages of that instant have."""
-        stamp = self.site.stream.stamp(now_ns)
-        message = DiagnosticArray(status=self._statuses(now_ns))
-        message.header.stamp = Time(sec=stamp // NS_PER_S, nanosec=stamp % NS_PER_S)
-        self._diagnostics.publish(message)
+    def diagnose(self, statuses: Source) -> None:
+        """Let ``/diagnostics`` have what ``statuses`` returns for a rack time (ns)."""
+        site = self.site
+        if not site.diagnostics.begun:
+            site.diagnostics.begin(site.rack, site.stream, site.pacer, self)
+        site.diagnostics.add(statuses)
 
     def status(self, part: str, level: bytes, text: str, slot: int, values: Mapping[str, str]) -> DiagnosticStatus:
-        """Return the health of a part of the module in a slot (REP-107)."""
-        return DiagnosticStatus(
-            level=level,
-            name=f"{self.get_name()}: {part}",
-            message=text,
-            hardware_id=f"{self.site.rack.config.name} slot {slot}",
-            values=[KeyValue(key=key, value=value) for key, value in values.items()],
-        )
+        """Return the health of a part of the module in a slot."""
+        config = self.site.rack.config
+        name = f"{config.namespace}/{self.get_name()}: {part}"
+        return status_of(name, f"{config.name} slot {slot}", level, text, values)
 
     def misfit(self, what: str, info: QoSOfferedIncompatibleQoSInfo | QoSRequestedIncompatibleQoSInfo) -> None:
         """Report a reader or writer with an incompatible quality of service; ``what`` says what is lost."""

@@ -51,7 +51,7 @@ class NetworkNode(ModuleNode):
         self.create_subscription(message_class(TYPE), name, self._hear, ros_qos(NETWORK), raw=True)
         module.connect(self._send)
         scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
-        scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda now, _: self._look(now))
+        scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._look())
         self.diagnose(self._health)
 
     def _hear(self, payload: bytes) -> None:
@@ -75,7 +75,7 @@ class NetworkNode(ModuleNode):
             )
             self._publish(stamp, encode(message))
 
-    def _look(self, now_ns: int) -> None:
+    def _look(self) -> None:
         """Give the module what has come, and tell how it stands where that has changed."""
         waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
         if waiting:
@@ -88,7 +88,7 @@ class NetworkNode(ModuleNode):
         if told != self._told:
             self._told = told
             self._tell(status)
-            self.publish_diagnostics(now_ns)
+            self.site.diagnostics.look()
 
     def _tell(self, status: NetworkStatus) -> None:
         network, log = self._module.network, self.get_logger()

@@ -1,8 +1,8 @@
 """The node ``processor_SLOT``: a Processor module with its tasks.
 
 Publishes: ``/RACK/scans`` (automax_msgs/Scan) and ``/RACK/states`` (automax_msgs/TaskState) of its tasks, with a state
-and a full Scan of each for whoever joins late; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second and
-when a task's state changes.
+and a full Scan of each for whoever joins late; its part of ``/diagnostics``: a status of
+its own and one of each task.
 
 Parameters: ``TASK.NAME`` for each tunable of a task, with limits and step in the descriptor; setting one tunes the
 task.
@@ -20,7 +20,9 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
+from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.nodes.diagnostics import worst
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.throttle import Throttle
@@ -44,7 +46,7 @@ class ProcessorNode(ManagedModuleNode):
         """Create publishers and parameters, and observe the rack."""
         super().__init__(site, processor)
         rack, stream = site.rack, site.stream
-        self._rack = rack
+        self._rack, self._module = rack, processor.config
         self._slot, self._tasks = processor.config.slot, [item.task for item in processor.tasks]
         outlets = {
             topic: self.outlet(topic, partial(stream.send_states, self._slot))
@@ -56,7 +58,6 @@ class ProcessorNode(ManagedModuleNode):
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._tune)
         self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in self._tasks}
-        self._skipped_reported = dict.fromkeys((task.name for task in self._tasks), 0)
         stream.add_sink(outlets.get)
         rack.observe(self)
         self.diagnose(self._health)
@@ -95,8 +96,6 @@ class ProcessorNode(ManagedModuleNode):
             self._declare(concerned)
         if operation.ok:
             self.follow_tasks()
-        if concerned:
-            self.publish_diagnostics(operation.at_ns)
 
     def _declare(self, tasks: Sequence[Task]) -> None:
         """Declare the tunables of tasks, as they are installed now, in place of those that they had."""
@@ -130,13 +129,30 @@ class ProcessorNode(ManagedModuleNode):
                 self._rack.tune(tunable.task, tunable.variable, value)
 
     def _health(self, now_ns: int) -> list[DiagnosticStatus]:
-        return [self._status(task, now_ns) for task in self._tasks]
+        tasks = [self._status(task, now_ns) for task in self._tasks]
+        return [self._module_status(tasks), *tasks]
+
+    def _module_status(self, tasks: list[DiagnosticStatus]) -> DiagnosticStatus:
+        """Return the health of the module itself: the worst of its tasks'."""
+        config, statistics = self._module, [self._rack.statistics[task.name] for task in self._tasks]
+        level, running = worst(tasks), sum(task.status is Status.RUNNING for task in self._tasks)
+        values = {
+            "tick_ms": f"{config.tick_ns / NS_PER_MS:g}",
+            "tasks": str(len(self._tasks)),
+            "running": str(running),
+            "skipped": str(sum(item.skipped for item in statistics)),
+            "errors": str(sum(task.errors.count for task in self._tasks)),
+        }
+        text = f"{running} of {count_of(len(self._tasks), 'task')} run"
+        if level != DiagnosticStatus.OK:
+            item = next(item for item in tasks if item.level == level)
+            text = f"{item.name.rpartition(': ')[2]}: {item.message}"
+        return self.status(config.model, level, text, config.slot, values)
 
     def _status(self, task: Task, now_ns: int) -> DiagnosticStatus:
         """Return a task's health: ERROR when faulted, WARN when stopped, erring or newly late, else OK (REP-107)."""
         statistics = self._rack.statistics[task.name]
-        newly_skipped = statistics.skipped - self._skipped_reported[task.name]
-        self._skipped_reported[task.name] = statistics.skipped
+        newly_skipped = self.site.diagnostics.newly(task.name, statistics.skipped)
         cause = self._rack.operations.stopped
         level, text = DiagnosticStatus.OK, task.status.value
         if task.status is Status.FAULTED:
@@ -148,7 +164,6 @@ class ProcessorNode(ManagedModuleNode):
             level, text = DiagnosticStatus.WARN, f"AMX7042 deadlines missed since the last report: {newly_skipped}"
         elif task.errors.last is not None:
             level, text = DiagnosticStatus.WARN, task.errors.last.describe()
-        mean_ns = statistics.total_ns / statistics.scans if statistics.scans else 0.0
         values = {
             "period_ms": task.period_ns / NS_PER_MS,
             "priority": task.priority,
@@ -156,8 +171,10 @@ class ProcessorNode(ManagedModuleNode):
             "skipped": statistics.skipped,
             "errors": task.errors.count,
             "load_percent": 100.0 * statistics.total_ns / now_ns if now_ns else 0.0,
-            "mean_us": mean_ns / 1000,
+            "mean_us": statistics.mean_ns / 1000,
             "longest_us": statistics.longest_ns / 1000,
+            "late_mean_us": statistics.mean_late_ns / 1000,
+            "late_longest_us": statistics.latest_ns / 1000,
         }
         shown = {key: f"{value:g}" for key, value in values.items()}
         if cause is not None:

@@ -6,7 +6,7 @@ and the scans per interrupt.
 
 from __future__ import annotations
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.processor import ProcessorNode
@@ -24,16 +24,14 @@ class UdcNode(ProcessorNode):
         self._udc = udc
         super().__init__(site, udc)
 
-    def _health(self, now_ns: int) -> list[DiagnosticStatus]:
-        return [self._module_status(), *super()._health(now_ns)]
-
-    def _module_status(self) -> DiagnosticStatus:
-        """Return the health of the module itself: WARN while its tasks wait for the common clock."""
+    def _module_status(self, tasks: list[DiagnosticStatus]) -> DiagnosticStatus:
+        """Return the health of the module itself: WARN, too, while its tasks wait for the common clock."""
         config, rack = self._udc.config, self.site.rack
         bank = rack.backplane.bank(config.slot)
         assert bank is not None
-        values = {name: str(rack.memory.read_now(bank.view, register)) for name, register in _SHOWN.items()}
-        level, text = DiagnosticStatus.OK, "the common clock runs"
-        if rack.clock_since_ns is None:
-            level, text = DiagnosticStatus.WARN, "tasks wait at SCAN_LOOP for the common clock"
-        return self.status(config.model, level, text, config.slot, values)
+        status = super()._module_status(tasks)
+        for name, register in _SHOWN.items():
+            status.values.append(KeyValue(key=name, value=str(rack.memory.read_now(bank.view, register))))
+        if rack.clock_since_ns is None and status.level == DiagnosticStatus.OK:
+            status.level, status.message = DiagnosticStatus.WARN, "tasks wait at SCAN_LOOP for the common clock"
+        return status

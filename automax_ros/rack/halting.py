@@ -26,9 +26,10 @@ DONE, TIME_OVER, STOPPED = "done", "the time is over", "STOP ALL"
 
 @runtime_checkable
 class Haltable(Protocol):
-    """What keeps pace and can let time stand still."""
+    """What keeps pace and can let time stand still; it calls ``while_halted`` every now and then meanwhile."""
 
     halted: bool
+    while_halted: Callable[[], object]
 
     def halt(self) -> None:
         """Let time stand still."""
@@ -70,7 +71,7 @@ class Halting:
         A rack of which this process holds a part is not halted: the others would go on (decision). One that follows
         another's clock is halted by that clock alone.
         """
-        if len(self._rack.modules) != len(self._rack.config.modules):
+        if not self._rack.part.is_whole:
             self._refuse(HALT, "the rack runs in several processes, which do not halt together")
         pace = self._haltable(HALT)
         if pace.halted:
@@ -83,8 +84,8 @@ class Halting:
         pace = self._haltable(RESUME)
         if not pace.halted:
             self._refuse(RESUME, "the rack is not halted")
-        self._tell(RESUME)
         pace.resume()
+        self._tell(RESUME)
 
     def step(self, what: str, task: str = "", count: int = 1, until_ns: int = 0) -> Stepped:
         """Go on by scans or ticks, or until a rack time: ``scan``, ``tick``, ``until``.

@@ -82,13 +82,13 @@ def test_shafts_and_states_are_heard_and_ros_loads_a_shaft(live, client):
     until(live, client, lambda: sent(float("nan")) or live.health.counts["refused write"] > 0)
     assert live.rack.plants["UNWIND"].load_torque_nm == -20.0
     assert any("write refused: load torque in N m" in text for text in live.health.news())
-    part = "drive_plant_7: plant UNWIND"
+    part = "wind/drive_plant_7: plant UNWIND"
     until(live, client, lambda: part in health and health[part].message == "turns")
     values = {item.key: item.value for item in health[part].values}
     assert (values["contactor"], values["line_hz"], values["faults"]) == ("open", "60", "")
     assert (values["interrupts"], values["late"]) == ("0", "0")
     assert health[part].hardware_id == "WIND slot 7"
-    assert "interrupts" not in {item.key for item in health["drive_plant_10_B: plant WINDER"].values}
+    assert "interrupts" not in {item.key for item in health["wind/drive_plant_10_B: plant WINDER"].values}
 
 
 def test_faults_and_switches_by_services(live, client):
@@ -130,7 +130,7 @@ def test_faults_and_switches_by_services(live, client):
         ("plant", False, "UNWIND short_scr 7"),
     ]
     until(live, client, lambda: states and list(states[-1].faults) == ["short_scr 3"])
-    part = "drive_plant_7: plant UNWIND"
+    part = "wind/drive_plant_7: plant UNWIND"
     until(live, client, lambda: part in health and health[part].level == DiagnosticStatus.WARN)
     assert health[part].message == "short_scr 3"
     assert asked("plant", "UNWIND", "repair", "all") == (True, "")

@@ -225,7 +225,7 @@ def test_digital_modules_show_their_registers(context, tmp_path):
     executor.add_node(button)
 
     def shown():
-        statuses = [status for array in arrays for status in array.status if status.name == "digital_io_5: 57C419"]
+        statuses = [status for array in arrays for status in array.status if status.name == "io/digital_io_5: 57C419"]
         return {pair.key: pair.value for status in statuses[-1:] for pair in status.values}
 
     nothing = {f"register_{number}": "0000H" for number in range(4)}

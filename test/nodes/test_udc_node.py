@@ -64,7 +64,7 @@ def test_a_udc_on_the_wall_clock(live, client):
     node.create_subscription(DiagnosticArray, "/diagnostics", note, 10)
     clock = node.create_publisher(Bool, "/wind/common/CCLK/set", 10)
     reference = node.create_publisher(Int16, "/wind/common/REF/set", 10)
-    rack, name = live.rack, "udc_10: 57552"
+    rack, name = live.rack, "wind/udc_10: 57552"
     until(live, client, lambda: name in health)
     assert health[name].level == DiagnosticStatus.WARN
     assert rack.task("WIND_A").scan_number == 0
@@ -80,7 +80,16 @@ def test_a_udc_on_the_wall_clock(live, client):
     until(live, client, lambda: rack.value("TWICE%") == 800)
     until(live, client, lambda: health[name].level == DiagnosticStatus.OK)
     values = {item.key: item.value for item in health[name].values}
-    assert values == {"iscr": "64", "scans_per_interrupt": "0", "scans_since_interrupt": "0"}
+    assert int(values.pop("skipped")) <= sum(item.skipped for item in rack.statistics.values())
+    assert values.pop("errors") == "0"
+    assert values == {
+        "tick_ms": "0.5",
+        "tasks": "2",
+        "running": "2",
+        "iscr": "64",
+        "scans_per_interrupt": "0",
+        "scans_since_interrupt": "0",
+    }
     node_names = {found for found, _ in node.get_node_names_and_namespaces()}
     assert "udc_10" in node_names
     assert abs(rack.task("WIND_A").scan_number - rack.task("WIND_B").scan_number) <= 1

@@ -385,13 +385,14 @@ def test_diagnostics_name_every_task(client):
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
     arrays = client.listen(DiagnosticArray, "/diagnostics")
-    wanted = {"processor_1: FAST", "processor_1: SLOW", "processor_2: COPY"}
+    modules = ("rack: TYPES", "common_memory: 57C413", "processor_1: 57C435", "processor_2: 57C431")
+    wanted = {f"types/{part}" for part in (*modules, "processor_1: FAST", "processor_1: SLOW", "processor_2: COPY")}
     client.until(lambda: wanted <= {status.name for array in arrays for status in array.status})
     statuses = [status for array in arrays for status in array.status]
     assert {status.name for status in statuses} == wanted
     for array in arrays:
         assert ns(array.header.stamp) > 0
-        assert len({status.name for status in array.status}) == len(array.status)
+        assert len({status.name for status in array.status}) == len(array.status) == len(wanted)
     calm = [status for status in statuses if status.name.endswith("FAST")]
     assert {status.level for status in calm} <= {DiagnosticStatus.OK, DiagnosticStatus.WARN}
     for status in calm:

@@ -174,8 +174,8 @@ def test_fault_stops_all_tasks(ros_domain_id):
         def levels() -> dict[str, bytes]:
             return {status.name: status.level for status in arrays[-1].status}
 
-        client.until(lambda: levels()["processor_0: LOOP"] == DiagnosticStatus.ERROR)
-        assert levels()["processor_0: OTHER"] == DiagnosticStatus.WARN
+        client.until(lambda: levels()["stuck/processor_0: LOOP"] == DiagnosticStatus.ERROR)
+        assert levels()["stuck/processor_0: OTHER"] == DiagnosticStatus.WARN
         client.until(lambda: counts[-1].data == 0)  # STOP ALL zeroes volatile commons
         process.wait_for_line("STOP ALL (code 14): task LOOP")
         ended = process.end(signal.SIGINT)
