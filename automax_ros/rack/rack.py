@@ -10,7 +10,7 @@ rack.operations.stop("SPEED")
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
@@ -181,12 +181,14 @@ class Rack:
         return self.scheduler.now_ns
 
     @property
+    def installed(self) -> int:
+        """A number of 63 bits for what is installed: the rack's file and all sources, those of other processes too."""
+        return _digest(self.config.text, self.operations.installation.sources)
+
+    @property
     def fingerprint(self) -> int:
         """A number of 63 bits that configuration and sources determine: the run's id where no other is given."""
-        digest = hashlib.sha256(self.config.text.encode())
-        for name, source in sorted(self.sources.items()):
-            digest.update(name.encode() + b"\0" + source.text.encode() + b"\0")
-        return int.from_bytes(digest.digest()[:8], "big") >> 1
+        return _digest(self.config.text, self.sources)
 
     def observe(self, observer: RackObserver) -> None:
         """Tell an observer everything from now on; records and the write log are kept from then on."""
@@ -212,13 +214,17 @@ class Rack:
         self.operations.start()
         self._begin_plants()
 
-    def join(self, now_ns: int) -> None:
-        """Take part in a rack that runs already: the first scans come at the next ticks.
+    def join(self, now_ns: int, catch_up: Callable[[], None]) -> None:
+        """Take part in a rack that others run already: the first scans come at the next ticks.
 
-        Only for a rack that is distributed: what the others have written comes over the bus (``rack/bus``), which also
-        knows whether the tasks may run.
+        ``catch_up`` takes over what they hold, after the presets and before the tasks are put into RUN.
         """
         self.scheduler.pass_until(now_ns)
+        self.memory.now_ns = self.now_ns
+        begin_memory(self.config, self.inputs, self.memory)
+        self.operations.write_status()
+        self.observers.tell_writes()
+        catch_up()
         self.operations.start(joining=True)
         self._begin_plants()
 
@@ -386,3 +392,10 @@ class Rack:
 def scans_per_second(rack: Rack) -> float:
     """Return how many scans the rack's tasks execute in a second of rack time."""
     return sum(NS_PER_S / task.period_ns for task in rack.tasks if task.period_ns)
+
+
+def _digest(text: str, sources: Mapping[str, SourceText]) -> int:
+    digest = hashlib.sha256(text.encode())
+    for name, source in sorted(sources.items()):
+        digest.update(name.encode() + b"\0" + source.text.encode() + b"\0")
+    return int.from_bytes(digest.digest()[:8], "big") >> 1

@@ -1,0 +1,298 @@
+"""The bus of a distributed rack: what the processes of one rack tell each other in the graph.
+
+Each process publishes and hears ``bus`` (automax_msgs/BusWrite: its writes to common memory), ``bus/image``
+(automax_msgs/BusImage: all it holds, for one that asks) and ``bus/presence`` (automax_msgs/Presence each 20 ms, with
+liveliness by hand). The processes find each other by these topics in the rack's namespace; the home, where common
+memory is, gives the start when all are there. What is not of this run is refused and counted.
+
+``begin`` is called when the start is known; before it nothing is written to the rack.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from automax_msgs.msg import BusImage as BusImageClass
+from automax_msgs.msg import BusWrite as BusWriteClass
+from automax_msgs.msg import Presence as PresenceClass
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.qos import LivelinessPolicy, QoSProfile, ReliabilityPolicy
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.types import DataType
+from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.topics import ros_qos
+from automax_ros.rack.bus.link import Batch, BusLink
+from automax_ros.rack.bus.part_name import part_name
+from automax_ros.rack.config import ModuleLoss
+from automax_ros.wire.bus import BUS, batch_of, image_message, picture_of, standing_of, with_standing, write_message
+from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
+from automax_ros.wire.bus_peers import BEAT_NS, SILENCE_NS, Heard, Peer, Peers
+from automax_ros.wire.cdr import CdrError, decode, encode
+
+LEASE_NS = 100 * NS_PER_MS
+"""Liveliness of a process's presence, for whoever looks from outside."""
+ALONE_NS = 3500 * NS_PER_MS
+"""A home that was not told of a run begins one when it has seen nobody for so long: discovery takes up to 3 s."""
+LEAD_NS = 400 * NS_PER_MS
+"""The start lies so far ahead of the moment at which all are there, so that all hear of it before."""
+ANSWER_NS = 100 * NS_PER_MS
+"""The same process gets an image at most this often."""
+MOST_BYTES = 64 << 20
+"""Longest image that is read; writes and presences may be a hundredth of it."""
+MODULE_LOST = "31"
+"""The hardware's code when a module does not answer on the backplane: bus error (decision: so is one that is lost)."""
+_PRESENCE = "bus/presence"
+
+
+class SeatTaken(Fault):
+    """Another process of this run has the same modules."""
+
+
+class RackBus:
+    """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot.
+
+    ``is_common`` says whether what happens now happens in every process by itself, as stimuli do.
+    """
+
+    def __init__(
+        self,
+        site: Site,
+        node: ModuleNode,
+        seats: Sequence[tuple[int, ...]],
+        run_id: int = 0,
+        is_common: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Join the bus; ``seats`` are the slots of all processes, ``run_id`` 0 joins the run that is there.
+
+        Raises:
+            ValueError: the rack's part is not one of the seats.
+        """
+        rack = site.rack
+        own = next((slots for slots in seats if set(slots) == rack.part.slots), None)
+        if own is None:
+            raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
+        self._site, self._rack, self._node = site, rack, node
+        self._seats = {min(slots): tuple(slots) for slots in seats}
+        process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        self.peers = Peers(process, min(own), own, rack.installed, run_id)
+        self.link = BusLink(rack, min(own), self._send, is_common)
+        self.stage, self.joining = Stage.JOINING, False
+        self.fault: SeatTaken | None = None
+        self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
+        self._begun = self._has_image = False
+        self._waiting: list[Callable[[], None]] = []
+        self._answered: dict[int, int] = {}
+        self._since_ns = time.monotonic_ns()
+        qos = ros_qos(BUS)
+        self._writes = node.create_publisher(BusWriteClass, "bus", qos)
+        self._images = node.create_publisher(BusImageClass, "bus/image", qos)
+        self._presences = node.create_publisher(PresenceClass, _PRESENCE, _presence_qos())
+        self._hear(BusWriteClass, "bus", qos, BusWrite, self._take_write, MOST_BYTES // 100)
+        self._hear(BusImageClass, "bus/image", qos, BusImage, self._take_image, MOST_BYTES)
+        self._hear(PresenceClass, _PRESENCE, _presence_qos(), Presence, self._take_presence, MOST_BYTES // 100)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(BEAT_NS / NS_PER_S, node.inside("the bus", self._beat), clock=steady)
+
+    @property
+    def run_id(self) -> int:
+        """The number of the run, 0 while none is known."""
+        return self.peers.run_id
+
+    @property
+    def epoch_ns(self) -> int:
+        """The wall clock at rack time 0, ns; 0 while the start is not known."""
+        return self.peers.epoch_ns if self.stage is Stage.RUNNING else 0
+
+    @property
+    def missing(self) -> list[str]:
+        """The processes that are not there, by their first modules."""
+        there = {*self.peers.by_seat, self.peers.seat}
+        return [part_name(self._rack.config, slots) for seat, slots in self._seats.items() if seat not in there]
+
+    @property
+    def lost(self) -> list[str]:
+        """The processes that were lost and have not come back."""
+        return [part_name(self._rack.config, self._seats[seat]) for seat in sorted(self.peers.lost & set(self._seats))]
+
+    def begin(self) -> None:
+        """Take up what has come before the start: to be called as soon as the rack was started."""
+        self.link.starting = False
+        self._begun = True
+        waiting, self._waiting = self._waiting, []
+        for take in waiting:
+            take()
+
+    def catch_up(self) -> None:
+        """Take over the image and the standing of a rack that runs: between presets and the start of tasks."""
+        waiting, self._waiting = self._waiting, []
+        for take in waiting:
+            take()
+        for peer in self.peers.running():
+            self.link.adopt(standing_of(peer.presence))
+
+    def leave(self) -> None:
+        """Tell the others that this process ends in order."""
+        self.stage = Stage.LEAVING
+        self._tell()
+
+    # what goes out
+
+    def _send(self, batch: Batch) -> None:
+        self._writes.publish(encode(write_message(batch, self.run_id, self.peers.process)))
+
+    def _tell(self, asks: int = 0) -> None:
+        peers = self.peers
+        presence = Presence(
+            time.time_ns(),
+            self._rack.config.name,
+            peers.run_id,
+            peers.process,
+            peers.seat,
+            tuple(sorted(peers.slots)),
+            peers.fingerprint,
+            int(self.stage),
+            self.epoch_ns,
+            self.link.sequence,
+            asks,
+        )
+        self._presences.publish(encode(with_standing(presence, self.link.standing)))
+
+    def _answer(self, asked_by: int) -> None:
+        now = time.monotonic_ns()
+        if not self._begun or now - self._answered.get(asked_by, -ANSWER_NS) < ANSWER_NS:
+            return
+        self._answered = {process: at for process, at in self._answered.items() if now - at < ANSWER_NS}
+        self._answered[asked_by] = now
+        picture = self.link.picture()
+        message = image_message(picture, self._rack.now_ns, self.run_id, self.peers.process, asked_by)
+        self._images.publish(encode(message))
+
+    # the beat
+
+    def _beat(self) -> None:
+        now = time.monotonic_ns()
+        for peer in self.peers.look(now):
+            self._lost(peer)
+        if self.stage in (Stage.JOINING, Stage.READY):
+            self._advance(now)
+        self._tell(self._asks())
+
+    def _advance(self, now: int) -> None:
+        peers = self.peers
+        if not peers.run_id and self._rack.part.is_home and not peers.by_seat and now - self._since_ns > ALONE_NS:
+            peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        if not peers.run_id and self._rack.part.is_home and peers.by_seat and not any(peers.running()):
+            peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        starting = peers.epoch_ns > time.time_ns()
+        if any(peers.running()):
+            if starting and self.stage is Stage.READY:
+                self.stage = Stage.RUNNING
+            elif self._has_image:
+                self.joining, self.stage = True, Stage.RUNNING
+        elif not self.missing and peers.run_id:
+            self.stage = Stage.READY
+            others = [peer.stage == Stage.READY for peer in peers.by_seat.values()]
+            if self._rack.part.is_home and all(others):
+                peers.epoch_ns = time.time_ns() + LEAD_NS
+                self.stage = Stage.RUNNING
+
+    def _asks(self) -> int:
+        """Return the process whose image is wanted, 0 for none."""
+        running = next(self.peers.running(), None)
+        if self.stage is Stage.JOINING and running is not None and not self._has_image:
+            return running.process
+        owing = self.peers.owing() if self._begun else None
+        return owing.process if owing is not None else 0
+
+    def _lost(self, peer: Peer) -> None:
+        name = part_name(self._rack.config, peer.presence.slots)
+        text = f"{name} is lost: no sign of life for {SILENCE_NS // NS_PER_MS} ms"
+        self._site.health.note("lost process", (name, peer.process), lambda: text)
+        self._node.get_logger().error(text)
+        operations = self._rack.operations
+        stops = self._rack.config.on_module_loss is ModuleLoss.STOP_ALL
+        if stops and self._begun and operations.powered and operations.stopped is None:
+            operations.stop_all(text, MODULE_LOST)
+
+    # what comes in
+
+    def _hear(self, cls: Any, topic: str, qos: QoSProfile, kind: Any, take: Callable[[Any], None], most: int) -> None:
+        type_name = f"automax_msgs/msg/{kind.__name__}"
+
+        def heard(payload: bytes) -> None:
+            if len(payload) > most:
+                self._refuse(topic, f"a message of {len(payload)} bytes")
+                return
+            try:
+                take(decode(type_name, payload))
+            except CdrError as error:
+                self._refuse(topic, str(error))
+
+        self._node.create_subscription(cls, topic, self._node.inside(topic, heard), qos, raw=True)
+
+    def _refuse(self, topic: str, what: str) -> None:
+        self._site.health.note("refused bus message", (topic, what[:40]), lambda: f"{topic}: {what} was refused")
+
+    def _take_write(self, message: BusWrite) -> None:
+        peer = self.peers.of(message.process) if message.run_id == self.run_id else None
+        if message.process == self.peers.process:
+            return
+        if peer is None or message.seat != peer.presence.seat:
+            self._refuse("bus", "a write of a process that is not of this run")
+            return
+        peer.got(message.sequence)
+        batch = batch_of(message, self._texts)
+        self._when_begun(lambda: self.link.receive(batch))
+
+    def _take_image(self, message: BusImage) -> None:
+        peer = self.peers.of(message.process) if message.run_id == self.run_id else None
+        if peer is None or message.asked_by != self.peers.process:
+            return
+        peer.caught_up(message.sequence)
+        picture = picture_of(message, self._texts)
+        self._has_image = True
+        self._when_begun(lambda: self.link.merge(picture))
+
+    def _take_presence(self, presence: Presence) -> None:
+        found = self.peers.heard(presence, time.monotonic_ns())
+        if found is Heard.OWN:
+            return
+        if found not in (Heard.KNOWN, Heard.NEW):
+            self._strange(found, presence)
+            return
+        if presence.asks == self.peers.process:
+            self._answer(presence.process)
+        if self._begun and presence.run_id == self.run_id:
+            self.link.adopt(standing_of(presence))
+
+    def _strange(self, found: Heard, presence: Presence) -> None:
+        name = part_name(self._rack.config, presence.slots)
+        if found is Heard.SEAT_TAKEN and self.stage is Stage.JOINING and presence.state == Stage.RUNNING:
+            self.fault = SeatTaken(f"{name} of this run is there already", "stop it first, or leave it as it is")
+        texts = {
+            Heard.OTHER_RUN: f"another rack is called {self._rack.config.name}: its {name} is not of this run",
+            Heard.OTHER_FILE: f"{name} has another rack file or other sources: it is not of this run",
+            Heard.SEAT_TAKEN: f"a second process has {name}",
+        }
+        self._site.health.note("other rack", (found, presence.process), lambda: texts[found])
+
+    def _when_begun(self, take: Callable[[], None]) -> None:
+        if self._begun:
+            take()
+        else:
+            self._waiting.append(take)
+
+
+def _presence_qos() -> QoSProfile:
+    return QoSProfile(
+        depth=10,
+        reliability=ReliabilityPolicy.RELIABLE,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+        liveliness_lease_duration=Duration(nanoseconds=LEASE_NS),
+    )
