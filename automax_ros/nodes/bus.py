@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from automax_msgs.msg import BusImage as BusImageClass
@@ -26,13 +27,14 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.process_watch import ProcessWatch, this_host
 from automax_ros.nodes.topics import ros_qos
 from automax_ros.rack.bus.link import Batch, BusLink
 from automax_ros.rack.bus.part_name import part_name
 from automax_ros.rack.config import ModuleLoss
 from automax_ros.wire.bus import BUS, batch_of, image_message, picture_of, standing_of, with_standing, write_message
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
-from automax_ros.wire.bus_peers import BEAT_NS, SILENCE_NS, Heard, Peer, Peers
+from automax_ros.wire.bus_peers import BEAT_NS, Heard, Peer, Peers
 from automax_ros.wire.cdr import CdrError, decode, encode
 
 LEASE_NS = 100 * NS_PER_MS
@@ -54,34 +56,38 @@ class SeatTaken(Fault):
     """Another process of this run has the same modules."""
 
 
-class RackBus:
-    """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot.
+@dataclass(frozen=True)
+class Seating:
+    """How a rack is cut into processes.
 
-    ``is_common`` says whether what happens now happens in every process by itself, as stimuli do.
+    ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the one that is there. ``is_common``
+    says whether what happens now happens in every process by itself, as stimuli do.
     """
 
-    def __init__(
-        self,
-        site: Site,
-        node: ModuleNode,
-        seats: Sequence[tuple[int, ...]],
-        run_id: int = 0,
-        is_common: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """Join the bus; ``seats`` are the slots of all processes, ``run_id`` 0 joins the run that is there.
+    seats: Sequence[tuple[int, ...]]
+    run_id: int = 0
+    is_common: Callable[[], bool] = lambda: False
+
+
+class RackBus:
+    """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot."""
+
+    def __init__(self, site: Site, node: ModuleNode, seating: Seating) -> None:
+        """Join the bus.
 
         Raises:
             ValueError: the rack's part is not one of the seats.
         """
-        rack = site.rack
+        rack, seats = site.rack, seating.seats
         own = next((slots for slots in seats if set(slots) == rack.part.slots), None)
         if own is None:
             raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
         self._site, self._rack, self._node = site, rack, node
         self._seats = {min(slots): tuple(slots) for slots in seats}
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
-        self.peers = Peers(process, min(own), own, rack.installed, run_id)
-        self.link = BusLink(rack, min(own), self._send, is_common)
+        self._watch = ProcessWatch()
+        self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
+        self.link = BusLink(rack, min(own), self._send, seating.is_common)
         self.stage, self.joining = Stage.JOINING, False
         self.fault: SeatTaken | None = None
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
@@ -140,6 +146,7 @@ class RackBus:
         """Tell the others that this process ends in order."""
         self.stage = Stage.LEAVING
         self._tell()
+        self._watch.close()
 
     # what goes out
 
@@ -161,6 +168,7 @@ class RackBus:
             self.link.sequence,
             asks,
         )
+        presence = presence._replace(host=this_host(), pid=os.getpid())
         self._presences.publish(encode(with_standing(presence, self.link.standing)))
 
     def _answer(self, asked_by: int) -> None:
@@ -211,8 +219,9 @@ class RackBus:
         return owing.process if owing is not None else 0
 
     def _lost(self, peer: Peer) -> None:
+        self._watch.forget(peer.process)
         name = part_name(self._rack.config, peer.presence.slots)
-        text = f"{name} is lost: no sign of life for {SILENCE_NS // NS_PER_MS} ms"
+        text = f"{name} is lost: its process has ended, or gives no sign of life"
         self._site.health.note("lost process", (name, peer.process), lambda: text)
         self._node.get_logger().error(text)
         operations = self._rack.operations

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from automax_ros.core.types import Value
+from automax_ros.nodes.bus import Seating
 from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.executor import make_executor
 from automax_ros.nodes.rack_nodes import RackNodes
@@ -23,8 +24,8 @@ class LiveRack:
     Make it, ``start`` it, then ``run``; ``close`` in any case. ``on_idle`` or a callback sets ``stopping``.
     """
 
-    def __init__(self, rack: Rack, arguments: RosArguments = NO_ARGUMENTS) -> None:
-        """Initialise ROS for this process and create all nodes.
+    def __init__(self, rack: Rack, arguments: RosArguments = NO_ARGUMENTS, seating: Seating | None = None) -> None:
+        """Initialise ROS for this process and create all nodes; ``seating`` is that of ``RackNodes``.
 
         Raises:
             RosUnavailable: ROS cannot be initialised.
@@ -33,9 +34,17 @@ class LiveRack:
         self.stopping = False
         self._context = joined_context(arguments)
         self._executor = make_executor(self._context)
-        self._nodes = RackNodes(rack, context=self._context, arguments=arguments)
+        self._nodes = RackNodes(rack, context=self._context, arguments=arguments, seating=seating)
         self._nodes.add_to(self._executor)
-        self.stream, self.health = self._nodes.stream, self._nodes.health
+        self.stream, self.health, self.bus = self._nodes.stream, self._nodes.health, self._nodes.bus
+
+    def await_others(self) -> bool:
+        """Wait for the other processes of a distributed rack; FALSE where ``stopping`` was set meanwhile.
+
+        Raises:
+            SeatTaken: another process of this run has the same modules.
+        """
+        return self._nodes.await_others(lambda: self.stopping)
 
     def start(self, settings: list[tuple[str, Value]]) -> None:
         """Begin the stream and put the rack into RUN; rack time starts in a moment."""

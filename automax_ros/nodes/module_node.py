@@ -53,6 +53,11 @@ class Site:
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
+    @property
+    def is_home(self) -> bool:
+        """Whether common memory is in this process."""
+        return self.rack.part.is_home
+
     @contextmanager
     def present(self) -> Iterator[None]:
         """Enter the rack from outside: between two scans, and what happens is stamped with its own instant."""

@@ -25,6 +25,7 @@ from rclpy.context import Context
 from rclpy.utilities import get_default_context
 
 from automax_ros.core.types import Value
+from automax_ros.nodes.bus import RackBus, Seating
 from automax_ros.nodes.managed import ACTIVE, INACTIVE
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
@@ -38,6 +39,9 @@ from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import START_LEAD_NS, Pacer
 from automax_ros.wire.stream import RackStream
+
+LOOK_S = 0.02
+"""How often it is looked whether the other processes are there."""
 
 
 class RackNodes:
@@ -62,6 +66,7 @@ class RackNodes:
         context: Context | None = None,
         arguments: RosArguments = NO_ARGUMENTS,
         manager: RackNode | None = None,
+        seating: Seating | None = None,
     ) -> None:
         """Create the nodes; nothing runs yet.
 
@@ -71,6 +76,7 @@ class RackNodes:
             arguments: what the nodes are told besides what the context knows: names, the namespace of a rack that is
                 given by its file.
             manager: the node ``rack`` where the caller has one, who then sees to its state; else one is made here.
+            seating: the processes of a distributed rack; ``rack`` is the part of this one.
 
         Raises:
             RackError: the YAML file or a task has errors, which ``findings`` holds.
@@ -96,6 +102,7 @@ class RackNodes:
         self.manager = manager
         if manager is not None:
             self.rack.observers.add(Follower(manager))
+        self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
 
     @property
     def lock(self) -> AbstractContextManager[None]:
@@ -116,10 +123,13 @@ class RackNodes:
             paced: whether a thread scans from then on; without one, ``run`` does.
         """
         with self._site.lock:
-            self._pacer.begin(START_LEAD_NS)
-            self.stream.begin(time.time_ns() + START_LEAD_NS)
-            self._begun = True
-            self.rack.start(settings)
+            if self.bus is None:
+                self._pacer.begin(START_LEAD_NS)
+                self.stream.begin(time.time_ns() + START_LEAD_NS)
+                self._begun = True
+                self.rack.start(settings)
+            else:
+                self._start_together(self.bus, settings)
             for node in (*self._own, *self._managed()):
                 node.follow(ACTIVE)
         if paced:
@@ -151,6 +161,34 @@ class RackNodes:
             for node in self._managed():
                 node.follow(INACTIVE)
 
+    def await_others(self, should_stop: Callable[[], bool]) -> bool:
+        """Serve the nodes until the other processes of a distributed rack are there; FALSE where asked to stop.
+
+        Raises:
+            SeatTaken: another process of this run has the same modules.
+        """
+        bus = self.bus
+        while bus is not None and not bus.epoch_ns:
+            if bus.fault is not None:
+                raise bus.fault
+            if should_stop():
+                return False
+            self._serve(LOOK_S)
+        return True
+
+    def _start_together(self, bus: RackBus, settings: Sequence[tuple[str, Value]]) -> None:
+        """Start at the instant that all processes know, or join those that run already."""
+        self._pacer.begin(bus.epoch_ns - time.time_ns())
+        self.stream.in_run(bus.run_id)
+        self.stream.begin(bus.epoch_ns)
+        self._begun = True
+        bus.link.begin()
+        if bus.joining:
+            self.rack.join(max(0, self._pacer.now_ns), bus.catch_up)
+        else:
+            self.rack.start(settings)
+        bus.begin()
+
     def run(
         self,
         until_ns: int | None = None,
@@ -171,6 +209,8 @@ class RackNodes:
         if self._thread is not None:
             self._thread.join()
         with self._site.lock:
+            if self.bus is not None:
+                self.bus.leave()
             self.rack.operations.stop_tasks()
             if self._begun:
                 self.stream.end()

@@ -46,13 +46,17 @@ NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
 
 
 def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
-    """Create the nodes of a rack: that of common memory, an operator's if it has one, those of its modules by slot.
+    """Create the nodes of a rack's part: those of its modules by slot.
 
-    After them stand those of the plants that drives turn, by slot and drive.
+    Where common memory is, its node and, if the rack has one, the operator's stand first.
+
+    After the modules stand those of the plants that drives turn, by slot and drive.
     """
-    made: list[ModuleNode] = [CommonMemoryNode(site)]
-    if site.rack.config.operator:
-        made.append(OperatorNode(site))
+    made: list[ModuleNode] = []
+    if site.is_home:
+        made.append(CommonMemoryNode(site))
+        if site.rack.config.operator:
+            made.append(OperatorNode(site))
     for module in site.rack.modules:
         node = NODES[SUPPORTED[module.config.model]]
         if node is not None:

@@ -76,3 +76,5 @@ class Presence(NamedTuple):
     stopped_code: str = ""
     stopped_task: str = ""
     stopped_reason: str = ""
+    host: str = ""
+    pid: int = 0

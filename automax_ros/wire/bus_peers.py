@@ -6,7 +6,7 @@ No clock and no ROS: whoever hears a ``Presence`` tells it with the time (ns, mo
 from __future__ import annotations
 
 import enum
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 
 from automax_ros.core.ticks import NS_PER_MS
@@ -15,7 +15,9 @@ from automax_ros.wire.bus_messages import Presence, Stage
 BEAT_NS = 20 * NS_PER_MS
 """How often a process says that it lives."""
 SILENCE_NS = 75 * NS_PER_MS
-"""A process that has said nothing for so long is lost (decision: with one beat more it is noticed within 100 ms)."""
+"""A process of another host that has said nothing for so long is lost (decision: it is noticed within 100 ms)."""
+HUNG_NS = 1000 * NS_PER_MS
+"""One of this host that lives by the kernel's word may be held up for so long (decision): a busy host is no fault."""
 HELD_UP_NS = 45 * NS_PER_MS
 """Who was held up for so long itself judges nobody until it has heard what came meanwhile."""
 
@@ -72,7 +74,8 @@ class Peers:
 
     ``process``, ``seat`` and ``slots`` are this process's own, ``fingerprint`` that of its rack file and sources;
     ``run_id`` is 0 while it knows of no run: then it joins the one that it hears of. ``lost`` are seats whose process
-    has gone without a word and has not come back.
+    has gone without a word and has not come back. ``lives`` tells of a process of this host whether it lives, and None
+    of others.
     """
 
     process: int
@@ -83,6 +86,7 @@ class Peers:
     epoch_ns: int = 0
     by_seat: dict[int, Peer] = field(default_factory=dict)
     lost: set[int] = field(default_factory=set)
+    lives: Callable[[Presence], bool | None] = lambda _: None
     _looked_ns: int = 0
 
     def heard(self, presence: Presence, now_ns: int) -> Heard:
@@ -121,14 +125,18 @@ class Peers:
         """Return those that are lost since the last look: they leave the list. To be called at each beat."""
         held_up = now_ns - self._looked_ns > HELD_UP_NS
         self._looked_ns = now_ns
-        if held_up:
-            return []
-        gone = [peer for peer in self.by_seat.values() if now_ns - peer.heard_ns > SILENCE_NS]
+        gone = [peer for peer in self.by_seat.values() if self._is_gone(peer, now_ns, held_up=held_up)]
         for peer in gone:
             del self.by_seat[peer.presence.seat]
             if peer.stage != Stage.LEAVING:
                 self.lost.add(peer.presence.seat)
         return [peer for peer in gone if peer.stage != Stage.LEAVING]
+
+    def _is_gone(self, peer: Peer, now_ns: int, *, held_up: bool) -> bool:
+        lives = self.lives(peer.presence)
+        if lives is False:
+            return True
+        return not held_up and now_ns - peer.heard_ns > (HUNG_NS if lives else SILENCE_NS)
 
     def of(self, process: int) -> Peer | None:
         """Return the process of a number, None where it is not of this run."""

@@ -145,7 +145,7 @@ class RackMessages:
     def __init__(self, rack: Rack, run_id: int) -> None:
         """Begin with the numbering of the write log."""
         self._rack = rack
-        self._run_id = run_id
+        self.run_id = run_id
         self.epoch_ns = 0
         self._sequence = 0
         self._slots = {writer.id: writer.slot for writer in rack.writers}
@@ -187,7 +187,7 @@ class RackMessages:
             for number, variable in enumerate(config.variables)
         ]
         writers = [Writer(writer.id, writer.name, writer.kind, writer.slot) for writer in self._rack.writers]
-        return VariableTable(self.stamp(0), config.name, self._run_id, variables, writers)
+        return VariableTable(self.stamp(0), config.name, self.run_id, variables, writers)
 
     def image(self, now_ns: int) -> CommonImage:
         """Return all of common memory as it is."""
@@ -202,7 +202,7 @@ class RackMessages:
         for position in self._text_positions:
             values[position] = 0.0
         image = Values(self._image_variables, self._image_elements, values, texts)
-        return CommonImage(self.stamp(now_ns), self._run_id, self._sequence, image)
+        return CommonImage(self.stamp(now_ns), self.run_id, self._sequence, image)
 
     def forces(self, now_ns: int) -> CommonWrite | None:
         """Return what is forced as a further entry of the write log, None if nothing is: an image does not tell it."""
@@ -224,7 +224,7 @@ class RackMessages:
         variables, elements, values = zip(*entries, strict=True)
         fields = (
             self.epoch_ns + time_ns,
-            self._run_id,
+            self.run_id,
             writer,
             self._slots[writer],
             int(kind),
@@ -272,7 +272,7 @@ class RackMessages:
         """Return what was done to the rack."""
         return Operation(
             self.stamp(operation.at_ns),
-            self._run_id,
+            self.run_id,
             operation.what,
             operation.task,
             operation.ok,

@@ -69,9 +69,11 @@ class RackStream:
         self._messages = RackMessages(rack, run_id)
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
-        self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION)
-        self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
         slots = [module.config.slot for module in rack.task_modules]
+        # Where common memory is in another process the first module with tasks tells what is done here.
+        teller = None if rack.part.is_home else next(iter(slots), None)
+        self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION, teller)
+        self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
         self.scans_topics = {slot: Topic(f"{space}/scans", "automax_msgs/msg/Scan", SCAN, slot) for slot in slots}
         self.states_topics = {
             slot: Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN, slot) for slot in slots
@@ -94,15 +96,18 @@ class RackStream:
 
     @property
     def topics(self) -> list[Topic]:
-        """All topics of the stream."""
+        """All topics of the stream: of the part of the rack that is in this process."""
+        if not self._rack.part.is_home:
+            return [*self.module_topics, *self.plants.topics]
         rack = [self.variables_topic, self.snapshot_topic, self.backplane_topic, self.operations_topic]
         values = (value.topic for value in self._values.values())
         return [*rack, *self.module_topics, *values, *self.plants.topics]
 
     @property
     def module_topics(self) -> list[Topic]:
-        """The topics that Processors send on."""
-        return [*self.scans_topics.values(), *self.states_topics.values()]
+        """The topics that modules with tasks send on."""
+        own = [*self.scans_topics.values(), *self.states_topics.values()]
+        return own if self.operations_topic.slot is None else [*own, self.operations_topic]
 
     def value_topic(self, view: int) -> Topic | None:
         """Return the topic of a variable by its index in the rack's table, None if it has none."""
@@ -138,6 +143,10 @@ class RackStream:
     def stamp(self, now_ns: int) -> int:
         """Return the stamp of an instant of rack time."""
         return self._messages.stamp(now_ns)
+
+    def in_run(self, run_id: int) -> None:
+        """Be the stream of a run whose number was not known before; to be called before ``begin``."""
+        self.run_id = self._messages.run_id = run_id
 
     def begin(self, epoch_ns: int = 0) -> None:
         """Send the facts that stand at the start, and observe the rack: to be called just before ``Rack.start``.
