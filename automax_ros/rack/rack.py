@@ -9,8 +9,7 @@ rack.operations.stop("SPEED")
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
@@ -19,6 +18,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.adjusting import Adjustments
 from automax_ros.rack.beginning import begin_memory
 from automax_ros.rack.config import RackConfig, Timing
+from automax_ros.rack.digest import digest_of
 from automax_ros.rack.forcing import Force, Forcing
 from automax_ros.rack.installation import Finding, Installation
 from automax_ros.rack.installer import Installer
@@ -183,12 +183,12 @@ class Rack:
     @property
     def installed(self) -> int:
         """A number of 63 bits for what is installed: the rack's file and all sources, those of other processes too."""
-        return _digest(self.config.text, self.operations.installation.sources)
+        return digest_of(self.config.text, self.operations.installation.sources)
 
     @property
     def fingerprint(self) -> int:
         """A number of 63 bits that configuration and sources determine: the run's id where no other is given."""
-        return _digest(self.config.text, self.sources)
+        return digest_of(self.config.text, self.sources)
 
     def observe(self, observer: RackObserver) -> None:
         """Tell an observer everything from now on; records and the write log are kept from then on."""
@@ -219,7 +219,7 @@ class Rack:
 
         ``catch_up`` takes over what they hold, after the presets and before the tasks are put into RUN.
         """
-        self.scheduler.pass_until(now_ns)
+        self.scheduler.run_due(now_ns)
         self.memory.now_ns = self.now_ns
         begin_memory(self.config, self.inputs, self.memory)
         self.operations.write_status()
@@ -392,10 +392,3 @@ class Rack:
 def scans_per_second(rack: Rack) -> float:
     """Return how many scans the rack's tasks execute in a second of rack time."""
     return sum(NS_PER_S / task.period_ns for task in rack.tasks if task.period_ns)
-
-
-def _digest(text: str, sources: Mapping[str, SourceText]) -> int:
-    digest = hashlib.sha256(text.encode())
-    for name, source in sorted(sources.items()):
-        digest.update(name.encode() + b"\0" + source.text.encode() + b"\0")
-    return int.from_bytes(digest.digest()[:8], "big") >> 1
