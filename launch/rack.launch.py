@@ -1,71 +1,136 @@
-"""Start one rack: ros2 launch automax_ros rack.launch.py [config:=FILE] [simulated:=true] [duration:=SECONDS] ...
+"""Start one rack: ros2 launch automax_ros rack.launch.py [config:=FILE] [mode:=distributed] [namespace:=plant] ...
 
-The launch arguments are those of `automax run`; `ros2 launch automax_ros rack.launch.py --show-args` lists them.
+Every option of `automax run` is a launch argument; `ros2 launch automax_ros rack.launch.py --show-args` lists them.
+PushRosNamespace, SetParameter and SetRemap of a launch file that includes this one hold for the rack's nodes. A
+STOP ALL is the event `RackStopped` (automax_ros/nodes/launch_events.py); the end of the rack ends the launch.
 """
 
 import shlex
 
-from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler, Shutdown
+from launch.event_handler import EventHandler
+from launch.event_handlers import OnProcessIO
+from launch.events.process import ProcessIO
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
+
+from automax_ros.cli.arguments import Option, commands
+from automax_ros.nodes.launch_events import RackStopped, stops_of
 
 PACKAGE = "automax_ros"
-SWITCHES = {
-    "simulated": "simulated time, as fast as it goes",
-    "allow_outside": "let the rack file name task sources outside its own folder",
-    "record_locals": "record locals and block states after every scan",
-}
-VALUES = {
-    "duration": "seconds to run; empty: until Ctrl-C",
-    "state": "folder that keeps non-volatile values; empty: next to the rack file",
-    "stimuli": "file of what operator and process do, by rack time; empty: none",
-    "report": "JSON file that says how the run ended; empty: none",
-    "record": "bag folder to record into; empty: none",
-    "record_split_mb": "megabytes after which the recording begins a new file; empty: one file",
-    "record_split_s": "seconds after which the recording begins a new file; empty: one file",
-    "record_compression": "zstd, lz4 or none; empty: zstd",
-    "record_tasks": "tasks whose scans are recorded, such as SPEED,LINE; empty: all",
-    "watch": "variables of the status line, such as REF%,RUN@; empty: the first published ones",
-}
+YES_NO = ["true", "false"]
+NEGATED = "--no-"
+"""An option `--no-restart` is the argument `restart`, true unless somebody says false."""
+OTHERWISE = {"--help", "--distributed", "--set"}
+"""Options that are not an argument of their own name and kind."""
 
 
-def start_rack(context: LaunchContext) -> list[ExecuteProcess]:
-    """`automax run` with the arguments that were given; an empty one is left to the program's own default."""
+def run_options() -> list[Option]:
+    """The options of `automax run` that are launch arguments as they stand."""
+    (run,) = (command for command in commands() if command.words == ("run",))
+    return [option for option in run.options if option.names[-1] not in OTHERWISE]
+
+
+def name_of(option: Option) -> str:
+    """The launch argument of an option."""
+    return option.names[-1].removeprefix(NEGATED).removeprefix("--").replace("-", "_")
+
+
+def usual(option: Option) -> str:
+    """What the launch argument is until somebody says more: false or true for a switch, else empty."""
+    return "" if option.takes_value else str(option.names[-1].startswith(NEGATED)).lower()
+
+
+def argument_of(option: Option) -> DeclareLaunchArgument:
+    """The declaration of an option's launch argument."""
+    words = ["", *option.values] if option.values else []
+    choices = words if option.takes_value else YES_NO
+    return DeclareLaunchArgument(
+        name_of(option), default_value=usual(option), choices=choices or None, description=option.text
+    )
+
+
+def words_of(context: LaunchContext) -> list[str]:
+    """The command line after `automax`; what was not given is left to the program's own default."""
 
     def value(name: str) -> str:
         return LaunchConfiguration(name).perform(context)
 
-    command = [ExecutableInPackage(package=PACKAGE, executable="automax"), "run", value("config")]
-    command += [_option(name) for name in SWITCHES if value(name) == "true"]
-    for name in VALUES:
-        if value(name):
-            command += [_option(name), value(name)]
+    words = ["run", value("config")]
+    if value("mode") == "distributed":
+        words.append("--distributed")
+    for option in run_options():
+        given, flag = value(name_of(option)), option.names[-1]
+        if given != usual(option):
+            words += [flag, given] if option.takes_value else [flag]
     for setting in shlex.split(value("set")):
-        command += ["--set", setting]
-    # An emulated rack that has ended, by itself or by a fault, ends the launch.
-    return [ExecuteProcess(cmd=command, name="rack", output="screen", on_exit=Shutdown())]
+        words += ["--set", setting]
+    return words
 
 
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+def tell_stops(event: ProcessIO) -> list[Action]:
+    """An event for each STOP ALL in what the rack has printed."""
+    return [EmitEvent(event=stop) for stop in stops_of(event.text)]
+
+
+def start_rack(context: LaunchContext) -> list[Action]:
+    """The rack as one node, and what happens when it stops."""
+
+    def value(name: str) -> str:
+        return LaunchConfiguration(name).perform(context)
+
+    parameters = [value("params_file")] if value("params_file") else []
+    if value("use_sim_time") == "true":
+        parameters.append({"use_sim_time": True})
+    rack = Node(
+        package=PACKAGE,
+        executable="automax",
+        arguments=words_of(context),
+        namespace=value("namespace") or None,
+        parameters=parameters or None,
+        ros_arguments=["--log-level", value("log_level")] if value("log_level") else None,
+        output="screen",
+        on_exit=Shutdown(reason="the rack has ended"),
+    )
+    told = OnProcessIO(target_action=rack, on_stdout=tell_stops, on_stderr=tell_stops)
+    actions: list[Action] = [RegisterEventHandler(told), rack]
+    if value("on_stop_all") == "shutdown":
+        end = Shutdown(reason="the rack's tasks were stopped")
+        actions.insert(0, RegisterEventHandler(EventHandler(matcher=RackStopped.is_event, entities=[end])))
+    return actions
 
 
 def generate_launch_description() -> LaunchDescription:
     """The launch arguments, then the rack."""
     example = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", "section_drive", "rack.yaml"])
-    yes_no = ["true", "false"]
+    texts = {
+        "namespace": "ROS namespace that the rack's own goes into, such as plant for /plant/pm1",
+        "params_file": "parameters of the rack's nodes: tunables TASK.NAME; empty: none",
+        "log_level": "log level of the rack's nodes, such as debug or rclpy:=warn; empty: info",
+        "set": "common variables to write first, such as 'REF%=5 RUN@=1'",
+    }
     return LaunchDescription(
         [
             DeclareLaunchArgument("config", default_value=example, description="rack YAML file"),
             DeclareLaunchArgument(
-                "set", default_value="", description="common variables to write first, such as 'REF%=5 RUN@=1'"
+                "mode",
+                default_value="composed",
+                choices=["composed", "distributed"],
+                description="composed: one process; distributed: each module in a process of its own",
             ),
-            *(
-                DeclareLaunchArgument(name, default_value="false", choices=yes_no, description=text)
-                for name, text in SWITCHES.items()
+            DeclareLaunchArgument(
+                "use_sim_time", default_value="false", choices=YES_NO, description="follow /clock, scan by scan"
             ),
-            *(DeclareLaunchArgument(name, default_value="", description=text) for name, text in VALUES.items()),
+            DeclareLaunchArgument(
+                "on_stop_all",
+                default_value="keep",
+                choices=["keep", "shutdown"],
+                description="what a STOP ALL does to the launch: the nodes stay to be looked at, or all ends",
+            ),
+            *(DeclareLaunchArgument(name, default_value="", description=text) for name, text in texts.items()),
+            *(argument_of(option) for option in run_options()),
             OpaqueFunction(function=start_rack),
         ]
     )

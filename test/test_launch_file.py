@@ -1,6 +1,5 @@
-"""launch/rack.launch.py without ROS's launch packages: stand-ins keep what the file makes of them."""
+"""launch/rack.launch.py: with launch_ros where it is installed, elsewhere with stand-ins for it."""
 
-import argparse
 import runpy
 import sys
 from pathlib import Path
@@ -8,9 +7,12 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from automax_ros.cli import run
+from automax_ros.cli.arguments import commands
+from automax_ros.rack.standing import StopCause
 
 FILE = Path(__file__).parent.parent / "launch" / "rack.launch.py"
+NOT_OPTIONS = {"config", "mode", "namespace", "params_file", "use_sim_time", "log_level", "set", "on_stop_all"}
+EVENTS = "automax_ros.nodes.launch_events"
 
 
 def kept(name: str):
@@ -27,20 +29,26 @@ class Configuration:
 
 @pytest.fixture
 def launch_file(monkeypatch) -> dict:
+    actions = ("DeclareLaunchArgument", "EmitEvent", "OpaqueFunction", "RegisterEventHandler", "Shutdown")
     contents = {
-        "launch": {"LaunchContext": dict, "LaunchDescription": list},
-        "launch.actions": {
-            name: kept(name) for name in ("DeclareLaunchArgument", "ExecuteProcess", "OpaqueFunction", "Shutdown")
-        },
+        "launch": {"Action": object, "Event": object, "LaunchContext": dict, "LaunchDescription": list},
+        "launch.actions": {name: kept(name) for name in actions},
+        "launch.event_handler": {"EventHandler": kept("EventHandler")},
+        "launch.event_handlers": {"OnProcessIO": kept("OnProcessIO")},
+        "launch.events": {},
+        "launch.events.process": {"ProcessIO": object},
         "launch.substitutions": {"LaunchConfiguration": Configuration, "PathJoinSubstitution": kept("path")},
         "launch_ros": {},
-        "launch_ros.substitutions": {"ExecutableInPackage": kept("executable"), "FindPackageShare": kept("share")},
+        "launch_ros.actions": {"Node": kept("Node")},
+        "launch_ros.substitutions": {"FindPackageShare": kept("share")},
     }
     for name, members in contents.items():
         module = ModuleType(name)
         vars(module).update(members)
         monkeypatch.setitem(sys.modules, name, module)
-    return runpy.run_path(str(FILE))
+    monkeypatch.delitem(sys.modules, EVENTS, raising=False)
+    yield runpy.run_path(str(FILE))
+    sys.modules.pop(EVENTS, None)
 
 
 def declared(launch_file) -> dict[str, str]:
@@ -48,27 +56,88 @@ def declared(launch_file) -> dict[str, str]:
     return {item.args[0]: item.default_value for item in actions if item.kind == "DeclareLaunchArgument"}
 
 
-def command(launch_file, **given) -> list:
-    (process,) = launch_file["start_rack"]({**declared(launch_file), **given})
-    assert process.on_exit.kind == "Shutdown"
-    return process.cmd[1:]
+def started(launch_file, **given) -> list:
+    return launch_file["start_rack"]({**declared(launch_file), "config": "rack.yaml", **given})
+
+
+def node(launch_file, **given) -> SimpleNamespace:
+    (found,) = [item for item in started(launch_file, **given) if item.kind == "Node"]
+    assert (found.package, found.executable, found.on_exit.kind) == ("automax_ros", "automax", "Shutdown")
+    return found
 
 
 def test_only_what_was_given_is_passed_on(launch_file):
-    assert command(launch_file, config="rack.yaml") == ["run", "rack.yaml"]
-    given = {"simulated": "true", "allow_outside": "true", "duration": "5", "watch": "A%", "set": "A%=1 N$='a b'"}
-    assert command(launch_file, config="rack.yaml", **given) == [
-        "run", "rack.yaml", "--simulated", "--allow-outside", "--duration", "5", "--watch", "A%",
-        "--set", "A%=1", "--set", "N$=a b",
-    ]  # fmt: skip
+    bare = node(launch_file)
+    assert bare.arguments == ["run", "rack.yaml"]
+    assert (bare.namespace, bare.parameters, bare.ros_arguments) == (None, None, None)
+    given = {
+        "mode": "distributed", "allow_outside": "true", "duration": "5", "watch": "A%", "set": "A%=1 N$='a b'",
+        "restart": "false", "record": "out", "range": "subnet",
+    }  # fmt: skip
+    words = node(launch_file, **given).arguments
+    assert words[:3] == ["run", "rack.yaml", "--distributed"]
+    assert words[-4:] == ["--set", "A%=1", "--set", "N$=a b"]
+    assert sorted(words[3:-4]) == sorted(
+        ["--no-restart", "--duration", "5", "--record", "out", "--watch", "A%", "--allow-outside", "--range", "subnet"]
+    )
 
 
-def test_every_option_of_run_is_a_launch_argument(launch_file):
-    parser = argparse.ArgumentParser(add_help=False)
-    run.add_arguments(parser)
-    options = {
-        action.option_strings[0].removeprefix("--").replace("-", "_")
-        for action in parser._actions
-        if action.option_strings
-    }
-    assert declared(launch_file).keys() == options | {"config"}
+def test_what_ros_is_told_goes_the_way_of_ros(launch_file):
+    """launch_ros makes --ros-args of it: __ns, parameters, log level."""
+    found = node(launch_file, namespace="plant", params_file="p.yaml", use_sim_time="true", log_level="debug")
+    assert found.namespace == "plant"
+    assert found.parameters == ["p.yaml", {"use_sim_time": True}]
+    assert found.ros_arguments == ["--log-level", "debug"]
+    assert found.arguments == ["run", "rack.yaml"]
+
+
+def test_every_option_of_run_is_a_launch_argument_that_names_it(launch_file):
+    (run,) = (command for command in commands() if command.words == ("run",))
+    flags = {option.names[-1]: option for option in run.options if option.names[-1] != "--help"}
+    arguments = declared(launch_file)
+    unusual = {"true": "false", "false": "true", "": "5"}
+    reached = set()
+    for name in arguments.keys() - NOT_OPTIONS:
+        words = node(launch_file, **{name: unusual[arguments[name]]}).arguments[2:]
+        assert len(words) == 1 + flags[words[0]].takes_value, words
+        reached.add(words[0])
+    assert reached | {"--distributed", "--set"} == flags.keys()
+
+
+def test_a_stop_all_is_an_event(launch_file):
+    """As `automax run` shows it, one process or many; other lines are not."""
+    handler, _ = started(launch_file)
+    (told,) = handler.args
+    shown = f"{StopCause(0, 'overlap', '14').title}: overlap"
+    output = f"rack PM1\n{shown}\nprocessor_1: {shown}\nno STOP ALL today\n".encode()
+    for way in (told.on_stdout, told.on_stderr):
+        emitted = way(SimpleNamespace(text=output))
+        assert [item.event.text for item in emitted] == [shown, f"processor_1: {shown}"]
+        assert all(type(item.event).is_event(item.event) for item in emitted)
+        assert way(SimpleNamespace(text=b"\xff\n")) == []
+
+
+def test_a_stop_all_ends_the_launch_where_that_is_wanted(launch_file):
+    ends, *_ = started(launch_file, on_stop_all="shutdown")
+    (handler,) = ends.args
+    (event,) = launch_file["stops_of"](b"STOP ALL: operator\n")
+    assert handler.matcher(event)
+    assert not handler.matcher(SimpleNamespace())
+    assert [item.kind for item in handler.entities] == ["Shutdown"]
+
+
+def test_launch_itself_runs_the_rack(tmp_path, ros_domain_id):
+    """Where launch_ros is installed: a rack runs in another namespace, and its end is that of the launch."""
+    pytest.importorskip("launch_ros")
+    from launch import LaunchDescription, LaunchService
+    from launch.actions import IncludeLaunchDescription
+    from launch.launch_description_sources import PythonLaunchDescriptionSource
+
+    source = PythonLaunchDescriptionSource(str(FILE))
+    given = {"duration": "1", "namespace": "plant", "report": str(tmp_path / "report.json")}
+    service = LaunchService()
+    service.include_launch_description(
+        LaunchDescription([IncludeLaunchDescription(source, launch_arguments=given.items())])
+    )
+    assert service.run() == 0
+    assert (tmp_path / "report.json").is_file()

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+STOP_ALL = "STOP ALL"
+"""How the line of a stop begins."""
+
 
 @dataclass(frozen=True)
 class StopCause:
@@ -17,7 +20,7 @@ class StopCause:
     @property
     def title(self) -> str:
         """What stands on a status line: STOP ALL, with the hardware's code where one is known."""
-        return "STOP ALL" if self.code is None else f"STOP ALL (code {self.code})"
+        return STOP_ALL if self.code is None else f"{STOP_ALL} (code {self.code})"
 
     @property
     def is_fault(self) -> bool:
