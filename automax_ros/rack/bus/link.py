@@ -241,6 +241,8 @@ class BusLink:
         common = preset or self._is_common()
         if not common:
             self.sequence += 1
+        if self._adopting:  # what a STOP ALL clears here is not older than the STOP ALL
+            time_ns = max(time_ns, self.standing.at_ns)
         home = self._rack.config.home_slot
         version = AS_INSTALLED if preset else (time_ns, home, 0) if common else (time_ns, self.seat, self.sequence)
         repairs: list[Part | Held] = []
