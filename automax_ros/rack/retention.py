@@ -7,7 +7,8 @@ The folder holds one file, ``state.json``, replaced as a whole.
 To start from it is a power-up: what a module loses without power is lost. A task whose source was edited begins as
 installed, since to load it again is an installation (decision). With ``auto_run`` the tasks that ran are put into RUN;
 without it all are: whoever starts the emulator does what RUN ALL does (decision). Values of commons come back as writes
-at the start, after the presets, so that recordings have them (decision).
+at the start, after the presets, so that recordings have them (decision). Of a rack that is distributed each process
+keeps what its own modules and tasks have, and that of common memory the commons with their forces (decision).
 """
 
 from __future__ import annotations
@@ -70,7 +71,8 @@ class Retention:
         """Take a rack that was not started; nothing is read or written yet."""
         self._rack = rack
         self.path = folder / _FILE
-        self._views = [view for view, variable in enumerate(rack.config.variables) if variable.non_volatile]
+        volatile = (not variable.non_volatile or not rack.part.is_home for variable in rack.config.variables)
+        self._views = [view for view, lost in enumerate(volatile) if not lost]
         self._registers = list(_kept_registers(rack))
         self._saved: Document = self._installed()
 
@@ -106,7 +108,8 @@ class Retention:
         tasks = {item.name: kept_task(item.task, hash_of(item.source.text)) for item in rack.scheduled}
         document: Document = {"format": FORMAT, "rack": rack.config.name, "commons": commons}
         document["registers"] = {name: value for name, value in self._present_registers() if value}
-        document |= {"forced": {item.name: item.value for item in rack.forces()}, "tasks": tasks}
+        own = (item for item in rack.forces() if rack.part.is_home or "." in item.name)
+        document |= {"forced": {item.name: item.value for item in own}, "tasks": tasks}
         if rack.config.auto_run:
             document["status"] = self._statuses()
         return document

@@ -350,3 +350,32 @@ def test_any_change_of_the_file_is_read_or_refused(tmp_path_factory, data):
     rack.start(restored.settings)
     retention.save()
     json.loads(path.read_bytes())
+
+
+PARTS = RACK.replace(
+    "  0: {module: 57C435, tasks: {T: {priority: 5}}}\n",
+    """\
+  0: {module: 57C413}
+  1: {module: 57C435, tasks: {T: {priority: 5}}}
+  2: {module: 57C435, tasks: {U: {priority: 5}}}
+""",
+)
+
+
+def test_each_process_of_a_rack_keeps_what_is_its_own(folder):
+    (folder / "rack.yaml").write_text(PARTS)
+    (folder / "U.BLK").write_text("10 LOCAL OWN%\n100 CALL SCAN_LOOP(TICKS=1)\n110 OWN% = OWN% + 1\n120 END\n")
+    kept = {}
+    for slot in (0, 1, 2):
+        rack = Rack(load(folder / "rack.yaml").config, local={slot})
+        retention = Retention(rack, folder / f"state_{slot}")
+        rack.start()
+        rack.run(0.1)
+        rack.force("LOST%", 5)
+        if slot == 2:
+            rack.force("U.OWN%", 6)
+        kept[slot] = retention.present()
+    assert [sorted(item["tasks"]) for item in kept.values()] == [[], ["T"], ["U"]]
+    assert [item["forced"] for item in kept.values()] == [{"LOST%": 5}, {}, {"U.OWN%": 6}]
+    assert [bool(item["commons"]) for item in kept.values()] == [True, False, False]
+    assert "COUNT%" in kept[0]["commons"]
