@@ -12,6 +12,7 @@ from automax_ros.language.program import Program
 from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.modules.kind import ModuleConfig, cost_model
+from automax_ros.rack.seating import seats_of
 from automax_ros.rack.task_rules import findings_by_task
 from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of, with_findings
 
@@ -77,6 +78,8 @@ class Installation:
                 self.warnings.append((source, result.diagnostics))
             if here is None or task.name in here:
                 self._compiled[task.name] = self._compile(task.name, result.program)
+        distributed = len(self._compiled) < len(checked)
+        self._cut = seats_of(config, self._programs.values()) if distributed else ()
 
     @property
     def programs(self) -> Mapping[str, Program]:
@@ -122,6 +125,7 @@ class Installation:
             self._refuse_misfit(task, source, found)
         if result.program is None or has_errors(result.diagnostics):
             raise RackError(f"{source.name} has errors: task {task} stays as it is", [(source, result.diagnostics)])
+        self._refuse_bonds(task, source, {**among, task: result.program})
         before = self._compiled[task].program
         if _kind(result.program) != _kind(before):
             what = _kind(before)
@@ -133,6 +137,13 @@ class Installation:
         wrong = [(self.sources[name], list(items)) for name, items in found.items() if has_errors(items)]
         if wrong:
             raise RackError(f"{source.name} does not fit the other tasks: task {task} stays as it is", wrong)
+
+    def _refuse_bonds(self, task: str, source: SourceText, programs: Mapping[str, Program]) -> None:
+        """Refuse a source with which modules of other processes would have to share this one (decision)."""
+        for seat in seats_of(self._config, programs.values()) if self._cut else ():
+            if not any({*seat.slots} <= {*process.slots} for process in self._cut):
+                why = f"{seat.reasons[-1]}, so {' and '.join(seat.modules)} would have to share a process"
+                raise RackError(f"{source.name}: {why}: restart the rack with it; task {task} stays as it is")
 
     def _compile(self, task: str, program: Program) -> CompiledTask:
         modeled = self._config.execution is Timing.MODELED

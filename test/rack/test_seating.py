@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack
 from automax_ros.rack.seating import HOME, NoSuchSeat, _groups, seat_named, seats_of
 
 from .drive_tasks import CML, folder_of
@@ -127,6 +129,20 @@ def test_a_task_with_errors_joins_nothing(tmp_path):
     slots = processors(ONE="ONE.BAS", TWO="TWO.BAS")
     config = config_of(tmp_path, slots, ONE=SETS, TWO=WAITS.replace("STOP", "STOPS"))
     assert slots_of(config) == [(0,), (1,), (2,)]
+
+
+def test_a_reload_that_would_join_processes_is_refused(tmp_path):
+    slots = processors(ONE="ONE.BAS", TWO="TWO.BAS")
+    config = config_of(tmp_path, slots, ONE=SETS, TWO=WAITS.replace("GO", "ON_ITS_OWN"))
+    whole, part = Rack(config).operations.installation, Rack(config, local={2}).operations.installation
+    waits = SourceText("TWO.BAS", WAITS)
+    assert whole.prepare("TWO", waits).fault is None
+    fault = part.prepare("TWO", waits).fault
+    assert str(fault) == (
+        "TWO.BAS: tasks ONE and TWO share the event GO, so processor_1 and processor_2 would have to share a process: "
+        "restart the rack with it; task TWO stays as it is"
+    )
+    assert part.prepare("TWO", SourceText("TWO.BAS", WAITS.replace("GO", "OTHER"))).fault is None
 
 
 @pytest.mark.parametrize("text", ["3", "processor_3", " PROCESSOR_3 ", "10", "udc_10"])
