@@ -46,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--run-id",
         type=_run_id,
+        default=0,
         metavar="N",
         help="number of the run, the same for all its processes (default: that of those that are there)",
     )
@@ -88,10 +89,11 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.module is None:
             _print_seats(seats)
             return 0
-        return _run(arguments, config, seat_named(seats, arguments.module), stop)
+        return _run(arguments, config, seats, stop)
 
 
-def _run(arguments: argparse.Namespace, config: RackConfig, seat: Seat, stop: StopRequest) -> int:
+def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, ...], stop: StopRequest) -> int:
+    seat = seat_named(seats, arguments.module)
     if arguments.settings and not seat.is_home:
         raise UsageError("--set belongs to the process of common memory", "give it to `--module common_memory`")
     ros = ros_arguments(arguments)
@@ -108,7 +110,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seat: Seat, stop: St
         arguments.report,
         arguments.allow_outside,
         ros,
-        SeatPlan(seat, arguments.run_id, arguments.watched),
+        SeatPlan(seat, seats, arguments.run_id, arguments.watched),
     )
     try:
         from automax_ros.cli.run_live import run_live

@@ -128,7 +128,8 @@ class _Watch:
             self.message(f"{name}: {told.text}")
         elif isinstance(told, Progress):
             self._progress[name] = told
-            if self._home in self._progress and self._screen.due():
+            home = self._progress.get(self._home)
+            if home is not None and home.now_ns >= NS_PER_S and self._screen.due():
                 self._screen.progress(merged_progress(_in_order(self._names, self._progress)))
         elif isinstance(told, Summary):
             self._summaries[name] = told

@@ -13,15 +13,21 @@ from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.stimuli_file import stimulation as stimulation_of
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.nodes.bus import Seating
 from automax_ros.nodes.discovery_range import range_text
 from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.lock import RackLock, domain_id
 from automax_ros.rack.operation_log import OperationLog
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.standing import StopCause
+from automax_ros.rack.stimuli.player import Stimulation
 
 SWITCH_S = 0.0005
 """How long a thread that saves or sends may keep the interpreter from the scans, s (5 ms is Python's own)."""
+PATIENCE_NS = 5 * NS_PER_S
+"""After this time a process says for which others it waits (decision)."""
+_NEVER_NS = 1 << 63
 
 
 def run_live(plan: RunPlan, stop: StopRequest) -> int:
@@ -37,7 +43,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         warn(rack)
     stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     state = StateKeeping(rack, plan.state_folder)
-    live = LiveRack(rack, plan.ros)
+    live = LiveRack(rack, plan.ros, _seating(plan, stimulation))
     services = OperationLog(lambda: stimulation.is_acting)
     rack.observers.add(services)
     recorder: Recorder | None = None
@@ -72,9 +78,10 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         gc.freeze()
         if not plan.is_watched:
             display.message(_opening(plan, rack, domain))
-        live.start([*state.settings, *plan.settings])
-        stimulation.begin()
-        live.run(plan.duration_ns, on_idle)
+        if _all_are_there(live, display, stop):
+            live.start([*state.settings, *plan.settings])
+            stimulation.begin(joining=live.is_joining)
+            live.run(plan.duration_ns, on_idle)
         report = report_at_end(rack, stimulation, services.happened)
     finally:
         gc.unfreeze()
@@ -95,6 +102,27 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
     display.finish(plan.record, complete=not recording.failed)
     failed = recording.failed or (state.failed and plan.state is not None) or stimulation.refused > 0
     return conclude(rack, plan, report, failed=failed)
+
+
+def _seating(plan: RunPlan, stimulation: Stimulation) -> Seating | None:
+    if plan.seat is None:
+        return None
+    slots = [seat.slots for seat in plan.seat.seats]
+    return Seating(slots, plan.seat.run_id, lambda: stimulation.is_acting)
+
+
+def _all_are_there(live: LiveRack, display: StatusDisplay, stop: StopRequest) -> bool:
+    """Wait for the other processes of a distributed rack; FALSE where a stop is requested first."""
+    told_ns = time.monotonic_ns() + PATIENCE_NS
+
+    def look() -> bool:
+        nonlocal told_ns
+        if live.missing and time.monotonic_ns() > told_ns:
+            told_ns = _NEVER_NS
+            display.message(f"waiting for {', '.join(live.missing)}")
+        return stop.requested
+
+    return live.await_others(look)
 
 
 def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:

@@ -29,11 +29,13 @@ from automax_ros.rack.stimuli.stage import Happened
 class SeatPlan:
     """The part of a run of a distributed rack that is in this process.
 
-    ``run_id`` is the number of the run, None to take that of the processes that are there, or a new one.
+    ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 to take that of the processes that
+    are there, or a new one. ``watched``: another process has started this one.
     """
 
     seat: Seat
-    run_id: int | None = None
+    seats: tuple[Seat, ...]
+    run_id: int = 0
     watched: bool = False
 
 

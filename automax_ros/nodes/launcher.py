@@ -38,13 +38,23 @@ class LiveRack:
         self._nodes.add_to(self._executor)
         self.stream, self.health, self.bus = self._nodes.stream, self._nodes.health, self._nodes.bus
 
-    def await_others(self) -> bool:
-        """Wait for the other processes of a distributed rack; FALSE where ``stopping`` was set meanwhile.
+    @property
+    def missing(self) -> list[str]:
+        """The other processes of a distributed rack that are not there."""
+        return self.bus.missing if self.bus is not None else []
+
+    @property
+    def is_joining(self) -> bool:
+        """Whether the rack ran already in other processes when this one began."""
+        return self.bus is not None and self.bus.joining
+
+    def await_others(self, should_stop: Callable[[], bool]) -> bool:
+        """Wait for the other processes of a distributed rack; FALSE where asked to stop meanwhile.
 
         Raises:
             SeatTaken: another process of this run has the same modules.
         """
-        return self._nodes.await_others(lambda: self.stopping)
+        return self._nodes.await_others(should_stop)
 
     def start(self, settings: list[tuple[str, Value]]) -> None:
         """Begin the stream and put the rack into RUN; rack time starts in a moment."""

@@ -5,7 +5,8 @@ batches, one for each scan and writer; what comes from another process is writte
 newer. A scan that the host has made late writes with the instant of its deadline: where another process wrote the same
 after that, the other's value is put back (decision).
 
-Not sent is what every process does by itself at the same rack time: presets, and what stimuli do (``is_common``).
+Presets are not sent, since every process writes them by itself. Neither is what stimuli do at the same rack time in
+every process (``is_common``), but for the home: a process that joins in the middle of a wave has it from there.
 """
 
 from __future__ import annotations
@@ -239,7 +240,8 @@ class BusLink:
     def _note(self, time_ns: int, writer: int, kind: WriteKind, entries: Iterable[tuple[int, int, Value]]) -> None:
         preset = self.starting and writer == PRESET_WRITER
         common = preset or self._is_common()
-        if not common:
+        sends = not preset and (not common or self._rack.part.is_home)
+        if sends:
             self.sequence += 1
         if self._adopting:  # what a STOP ALL clears here is not older than the STOP ALL
             time_ns = max(time_ns, self.standing.at_ns)
@@ -254,7 +256,7 @@ class BusLink:
             sent.append((view, element, value))
             if fit is not TAKEN:
                 repairs += self._versions.newest(view, element, value)
-        if not common:
+        if sends:
             self._send(Batch(self.seat, self.sequence, time_ns, writer, kind, tuple(sent)))
         if repairs:
             self._repair(repairs)

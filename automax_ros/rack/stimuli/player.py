@@ -28,8 +28,14 @@ class Stimulation:
         self.is_acting = False
         self._told = 0
 
-    def begin(self) -> None:
-        """Begin; entries of times that have passed happen at the present, in their order."""
+    def begin(self, *, joining: bool = False) -> None:
+        """Begin; entries of times that have passed happen at the present, in their order.
+
+        With ``joining`` they have happened already in the rack's other processes, which know what came of them.
+        """
+        now_ns = self._stage.scheduler.now_ns
+        while joining and self._waiting and self._waiting[0].at_ns <= now_ns:
+            self._waiting.popleft()
         self._post()
 
     @property
