@@ -25,6 +25,8 @@ STANDARD = (
     "std_msgs/msg/Bool",
     "std_msgs/msg/Float32",
     "std_msgs/msg/Float32MultiArray",
+    "std_msgs/msg/Float64",
+    "std_msgs/msg/Float64MultiArray",
     "std_msgs/msg/Header",
     "std_msgs/msg/Int16",
     "std_msgs/msg/Int16MultiArray",

@@ -24,7 +24,7 @@ from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.rack_health import RackHealth
 from automax_ros.nodes.ros2_control import joint_inlets
 from automax_ros.nodes.scaled import ScaledInput
-from automax_ros.nodes.topics import message_class, ros_qos
+from automax_ros.nodes.topics import ros_qos
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.writers import ROS_WRITER
@@ -32,6 +32,10 @@ from automax_ros.running.views import MemoryValueError
 from automax_ros.wire.qos import LATCHED
 from automax_ros.wire.rack_files import RackFile, files_of, files_text
 from automax_ros.wire.topics import Take, Topic
+
+_NUMBER_BYTES = 8
+_LAYOUT_BYTES = 1024
+"""Longest layout of an array's message that is read (decision)."""
 
 
 class CommonMemoryNode(ModuleNode):
@@ -95,7 +99,7 @@ class _ValueInlet:
         self._node, self._view, self._variable = node, view, variable
         name, scale = set_topic(topic.name), variable.scale
         self._scaled = None if scale is None else ScaledInput(node, name, variable, scale, variable.unit)
-        self._inlet = Inlet(node, name, message_class(topic.type_name), self._write)
+        self._inlet = Inlet(node, name, topic.type_name, self._write, _most_bytes(variable))
 
     def _write(self, message: Any) -> None:
         rack, scaled = self._node.site.rack, self._scaled
@@ -106,6 +110,14 @@ class _ValueInlet:
             rack.write_view(self._view, values, ROS_WRITER)
         except MemoryValueError as error:
             self._inlet.refuse(self._variable.name, error)
+
+
+def _most_bytes(variable: CommonVariable) -> int:
+    """Return how long a message with a whole variable can be, bytes.
+
+    8 for each element are the most of any type, 4 for each character; an array's layout may have names of its own.
+    """
+    return _LAYOUT_BYTES * variable.is_array + variable.elements * (_NUMBER_BYTES + 4 * variable.length)
 
 
 def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:

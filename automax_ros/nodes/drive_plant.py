@@ -15,7 +15,6 @@ from __future__ import annotations
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from std_msgs.msg import Float64
 
 from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
@@ -40,7 +39,7 @@ class DrivePlantNode(ModuleNode):
         self._timing = module.timing if isinstance(module, Timed) else None
         self._controls = Controls(site.rack)
         if driven.config.load.from_ros:
-            self._inlet = Inlet(self, load_topic(driven.name), Float64, self._load)
+            self._inlet = Inlet(self, load_topic(driven.name), "std_msgs/msg/Float64", self._load, 8)
         self.diagnose(self._health)
 
     def _load(self, message: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,13 +14,16 @@ from rclpy.event_handler import (
     QoSOfferedIncompatibleQoSInfo,
     QoSPublisherMatchedInfo,
     QoSRequestedIncompatibleQoSInfo,
+    SubscriptionEventCallbacks,
 )
-from rclpy.qos import qos_policy_name_from_kind
+from rclpy.qos import QoSProfile, qos_policy_name_from_kind
 
 from automax_ros.nodes.diagnostics import Diagnostics, Source, status_of
+from automax_ros.nodes.door import Door
 from automax_ros.nodes.guarded_node import GuardedNode
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.topics import message_class, ros_qos
+from automax_ros.nodes.turns import Turns
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
 from automax_ros.running.pacer import Pacer
@@ -39,6 +41,7 @@ class Site:
         pacer: what keeps it on the wall clock.
         context: of all its nodes.
         health: where they report trouble.
+        door: where messages and requests come in.
         arguments: what they were told by the command line.
         diagnostics: what they tell of their health.
         lock: held by whoever touches the rack; one thread at a time, between scans.
@@ -49,9 +52,10 @@ class Site:
     pacer: Pacer
     context: Context
     health: Health
+    door: Door
     arguments: RosArguments = NO_ARGUMENTS
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
-    lock: threading.RLock = field(default_factory=threading.RLock)
+    lock: Turns = field(default_factory=Turns)
 
     @property
     def is_home(self) -> bool:
@@ -73,6 +77,17 @@ class ModuleNode(GuardedNode):
         """Join the graph."""
         super().__init__(name, site.rack.config.namespace, site.context, site.health, site.arguments)
         self.site = site
+
+    @property
+    def subscriptions(self) -> Iterator[Any]:
+        """What an executor serves: not what is taken at the rack's door."""
+        return (item for item in super().subscriptions if item.callback is not _at_the_door)
+
+    def own_subscription(
+        self, kind: Any, topic: str, qos: QoSProfile, events: SubscriptionEventCallbacks | None = None
+    ) -> Any:
+        """Return a subscription that no executor serves, for the rack's door; ``kind`` is the message's class."""
+        return self.create_subscription(kind, topic, _at_the_door, qos, event_callbacks=events, raw=True)
 
     def outlet(self, topic: Topic, joined: Callable[[], None] | None = None) -> Take:
         """Return what publishes the messages of a topic. ``joined`` is called for each reader that comes."""
@@ -123,3 +138,7 @@ class ModuleNode(GuardedNode):
                     self.guard.report(what, error)
 
         return entered
+
+
+def _at_the_door(_: Any) -> None:
+    """Stand in for the callback of a subscription that is taken from at the rack's door."""

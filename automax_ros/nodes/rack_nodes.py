@@ -26,6 +26,7 @@ from rclpy.utilities import get_default_context
 
 from automax_ros.core.types import Value
 from automax_ros.nodes.bus import RackBus, Seating
+from automax_ros.nodes.door import Door
 from automax_ros.nodes.managed import ACTIVE, INACTIVE
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
@@ -33,6 +34,7 @@ from automax_ros.nodes.rack_duties import HeldRack
 from automax_ros.nodes.rack_node import Follower, RackNode
 from automax_ros.nodes.registry import nodes_of
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.nodes.turns import Turns
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
@@ -47,9 +49,10 @@ LOOK_S = 0.02
 class RackNodes:
     """The nodes of one rack, and the rack in them.
 
-    ``add_to`` an executor and ``start``, then let it spin; or ``start`` with ``paced=False`` and ``run``, which spins
-    it between scans on one thread. ``close`` in any case (a ``with`` block does). Whoever touches ``rack`` meanwhile
-    holds ``lock``: scans and messages from outside do, so nothing ever falls into a scan.
+    ``add_to`` an executor and ``start``, then let it spin; ``start`` with ``paced=False`` and ``run`` scans on the
+    calling thread. Messages and requests come in on a thread of their own (``Door``), whatever the executor does.
+    ``close`` in any case (a ``with`` block does). Whoever touches ``rack`` meanwhile holds ``lock``: scans and messages
+    from outside do, so nothing ever falls into a scan.
 
     Attributes:
         rack: the rack.
@@ -86,9 +89,13 @@ class RackNodes:
         self.stream = RackStream(self.rack, run_id)
         self.health = Health()
         self._executor: Any = None
-        self._pacer = Pacer(self.rack.scheduler, wait=self._serve)
         self._context = get_default_context() if context is None else context
-        self._site = Site(self.rack, self.stream, self._pacer, self._context, self.health, arguments)
+        turns = Turns()
+        self._pacer = Pacer(self.rack.scheduler, turn=turns.scanner)
+        self._door = Door(self._report)
+        self._site = Site(
+            self.rack, self.stream, self._pacer, self._context, self.health, self._door, arguments, lock=turns
+        )
         self._begun = self._closed = False
         self._thread: threading.Thread | None = None
         self.nodes = nodes_of(self._site)
@@ -114,6 +121,7 @@ class RackNodes:
         self._executor = executor
         for node in (*self.nodes, *self._own):
             executor.add_node(node)
+        self._door.open()
 
     def start(self, settings: Sequence[tuple[str, Value]] = (), *, paced: bool = True) -> None:
         """Send what stands at the start and put the rack into RUN; rack time 0 comes in a moment.
@@ -122,6 +130,7 @@ class RackNodes:
             settings: those of ``Rack.start``, which raises what it says.
             paced: whether a thread scans from then on; without one, ``run`` does.
         """
+        self._door.open()
         with self._site.lock:
             if self.bus is None:
                 self._pacer.begin(START_LEAD_NS)
@@ -162,7 +171,7 @@ class RackNodes:
                 node.follow(INACTIVE)
 
     def await_others(self, should_stop: Callable[[], bool]) -> bool:
-        """Serve the nodes until the other processes of a distributed rack are there; FALSE where asked to stop.
+        """Wait until the other processes of a distributed rack are there; FALSE where asked to stop.
 
         Raises:
             SeatTaken: another process of this run has the same modules.
@@ -173,7 +182,7 @@ class RackNodes:
                 raise bus.fault
             if should_stop():
                 return False
-            self._serve(LOOK_S)
+            time.sleep(LOOK_S)
         return True
 
     def _start_together(self, bus: RackBus, settings: Sequence[tuple[str, Value]]) -> None:
@@ -195,10 +204,7 @@ class RackNodes:
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Scan, and spin the executor in between, until rack time ``until_ns``, or asked to stop (``Pacer.run``).
-
-        All on this thread. No exception of any callback ends it.
-        """
+        """Scan on this thread until rack time ``until_ns``, or asked to stop (``Pacer.run``)."""
         self._pacer.run(until_ns, on_idle, should_stop)
 
     def close(self) -> None:
@@ -208,6 +214,7 @@ class RackNodes:
         self._closed = True
         if self._thread is not None:
             self._thread.join()
+        self._door.stop()
         with self._site.lock:
             if self.bus is not None:
                 self.bus.leave()
@@ -218,6 +225,7 @@ class RackNodes:
             if self._executor is not None:
                 self._executor.remove_node(node)
             node.destroy_node()
+        self._door.close()
 
     def __enter__(self) -> RackNodes:
         """Return itself."""
@@ -239,17 +247,14 @@ class RackNodes:
     def _keep_pace(self) -> None:
         try:
             while not self._closed:
-                with self._site.lock:
+                with self._site.lock.scanner:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
-            self.nodes[0].guard.report(f"rack {self.rack.config.name} has ended", error)
+            self._report(f"rack {self.rack.config.name} has ended", error)
 
-    def _serve(self, seconds: float) -> None:
-        if self._executor is None:  # the nodes' owner serves them elsewhere, or nobody does
-            time.sleep(seconds)
-            return
-        self.nodes[0].guard.serve(self._executor, self._context, seconds)
+    def _report(self, what: str, error: Exception) -> None:
+        self.nodes[0].guard.report(what, error)
 
 
 def _loaded(path: Path, arguments: RosArguments) -> Rack:

@@ -11,8 +11,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from std_msgs.msg import Float64MultiArray
-
 from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.scaled import ScaledInput
@@ -22,6 +20,10 @@ from automax_ros.rack.plants.joint_keys import INTERFACES, UNITS
 from automax_ros.rack.ros_names import command_topic
 from automax_ros.rack.writers import ROS_WRITER
 from automax_ros.running.views import MemoryValueError
+
+TYPE = "std_msgs/msg/Float64MultiArray"
+MOST_BYTES = 1024
+"""Longest message that is read, bytes: one number, and a layout with its names (decision)."""
 
 
 class JointInlet:
@@ -35,7 +37,7 @@ class JointInlet:
         topic = f"/{node.site.rack.config.namespace}/{command_topic(command.joint, command.interface)}"
         unit = UNITS[command.interface]
         self._scaled = ScaledInput(node, topic, self._variable, command.scale, unit) if command.scale else None
-        self._inlet = Inlet(node, topic, Float64MultiArray, self._write)
+        self._inlet = Inlet(node, topic, TYPE, self._write, MOST_BYTES)
 
     def _write(self, message: Any) -> None:
         rack, variable = self._node.site.rack, self._variable

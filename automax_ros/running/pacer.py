@@ -5,8 +5,8 @@ Pacer(rack.scheduler).run(10 * NS_PER_S)      # ten seconds of the wall clock
 
 Every event stands on an absolute deadline. A periodic one that the host made the loop miss is skipped and counted, and
 the next stays on the grid (``Scheduler.run_due``); a drive's interrupts are all carried out, late ones in order. How
-the time to the next deadline is spent is the caller's: a library sleeps, ROS nodes let their executor serve messages,
-so what comes from outside falls between two events.
+the time to the next deadline is spent is the caller's. What other threads bring from outside falls between two events:
+they hold what ``turn`` holds.
 
 ``halt`` lets time stand still until ``resume``; nothing is late or skipped by that. Whoever steps a halted rack lets
 the scheduler's time go on by itself.
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.running.scheduler import Scheduler
@@ -42,6 +43,7 @@ class Pacer:
         *,
         clock: Callable[[], int] = time.monotonic_ns,
         wait: Callable[[float], object] = time.sleep,
+        turn: AbstractContextManager[object] | None = None,
     ) -> None:
         """Take a scheduler; its time passes from ``begin`` on.
 
@@ -49,8 +51,11 @@ class Pacer:
             scheduler: whose events are carried out.
             clock: the wall clock in ns, monotonic.
             wait: spends at most a time in s, 0 or more; it may return early, as when a message has come.
+            turn: held, again and again, while ``run`` carries out events or calls ``on_idle``: what keeps other threads
+                from the rack then.
         """
         self._scheduler, self._clock, self._wait = scheduler, clock, wait
+        self._turn: AbstractContextManager[object] = nullcontext() if turn is None else turn
         self._zero_ns: int | None = None
         self.halted = False
         self.while_halted: Callable[[], object] = _nothing
@@ -109,13 +114,16 @@ class Pacer:
         while not should_stop():
             now = self.now_ns
             if until_ns is not None and now >= until_ns:
-                self._scheduler.run_due(until_ns - 1)
-                self._scheduler.pass_until(until_ns)
+                with self._turn:
+                    self._scheduler.run_due(until_ns - 1)
+                    self._scheduler.pass_until(until_ns)
                 return
-            self._carry_out(now)
+            with self._turn:
+                self._carry_out(now)
             if on_idle is not None and self._is_chore_time(next_chore):
                 next_chore = self._clock() + CHORE_PERIOD_NS
-                on_idle(now)
+                with self._turn:
+                    on_idle(now)
             self._wait(self._idle_s(until_ns))
 
     def _carry_out(self, now_ns: int) -> None:

@@ -210,6 +210,12 @@ class Float32(NamedTuple):
     data: float
 
 
+class Float64(NamedTuple):
+    """std_msgs/Float64."""
+
+    data: float
+
+
 class String(NamedTuple):
     """std_msgs/String."""
 
@@ -255,6 +261,13 @@ class Float32MultiArray(NamedTuple):
     data: Sequence[float] = ()
 
 
+class Float64MultiArray(NamedTuple):
+    """std_msgs/Float64MultiArray."""
+
+    layout: MultiArrayLayout = NO_LAYOUT
+    data: Sequence[float] = ()
+
+
 class UInt8MultiArray(NamedTuple):
     """std_msgs/UInt8MultiArray."""
 
@@ -285,6 +298,8 @@ _STANDARD = (
     Bool,
     Float32,
     Float32MultiArray,
+    Float64,
+    Float64MultiArray,
     Header,
     Int16,
     Int16MultiArray,
