@@ -2,11 +2,10 @@
 
 What comes waits in DDS, as many of each topic or service as its quality of service keeps; older ones are dropped there.
 The thread is woken by counters that DDS's own threads count up (no Python runs for a message that only waits), takes at
-most ``MOST_A_ROUND`` in turn, lets scans go first (``Turns``), and rests a millisecond. Measured against two other
-forms, a rack of 2.5 ms under 10,000 messages per second on two cores: callbacks of EventsExecutor between scans on one
-thread queue an event for each message without bound, and a message of 10 MB, or a request with that many values, holds
-up the scans however it is taken on their thread or by rclpy; looking at all topics each millisecond costs 1.5 us for
-each of them, with 300 half a core. See docs/ros.md for the figures. (decision)
+most ``MOST_A_ROUND`` in turn, lets scans go first (``Turns``), and rests a millisecond. What comes is taken on a thread
+of its own, not by callbacks of an executor or by looks between scans (decision: EventsExecutor queues an event for each
+message without bound; a message of 10 MB holds up the thread that takes it for 10 to 70 ms; a look at a topic costs
+1.5 us, half a core with 300 topics each millisecond. All measured on two cores of a virtual machine, docs/ros.md).
 """
 
 from __future__ import annotations
