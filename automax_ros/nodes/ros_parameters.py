@@ -1,0 +1,157 @@
+"""Parameters that a command line gives nodes at the start: ``-p`` and ``--params-file``, in their order, the last wins.
+
+rcl gives them to the nodes, too, but tells nobody of a file's key that no node has, nor of a name that no node
+declares: both are lost without a word. So they are read here as well, in rcl's words, with their places.
+
+- A node's key is its full name, ``/pm1/processor_1``; ``*`` stands for one part of it, ``**`` for any number. One
+  without a slash in front means what ends so: ``processor_1`` (decision: rcl would look for ``/processor_1``).
+- What launch calls the program, ``/plant/NAME`` with ``-r __ns:=/plant -r __node:=NAME``, means its main node.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.text import quoted
+from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence, read_yaml
+from automax_ros.nodes.ros_arguments import BEGIN, PARAM, PARAMS_FILE, RosArguments, RosArgumentsError
+from automax_ros.rack.files import FileFault, read_bytes
+
+ParameterValue: TypeAlias = "bool | int | float | str | list[bool] | list[int] | list[float] | list[str] | None"
+MOST_PARAMETERS = 10_000
+"""Most parameters of a command line (decision: a rack has some hundred tunables)."""
+_PARAMETERS = "ros__parameters"
+_EVERY = "/**"
+_TRUE = frozenset("y Y yes Yes YES true True TRUE on On ON".split())
+_FALSE = frozenset("n N no No NO false False FALSE off Off OFF".split())
+_WHOLE = re.compile(r"[-+]?(0x[0-9a-fA-F]{1,16}|[0-9]{1,19})")
+_REAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+
+
+@dataclass(frozen=True)
+class GivenParameter:
+    """One parameter as it was given: the key of its nodes, its name, its value, and where it stands."""
+
+    key: str
+    name: str
+    value: ParameterValue
+    place: str
+
+    @property
+    def is_for_all(self) -> bool:
+        """Whether it names no node, so that it may be meant for another program's."""
+        return "*" in self.key
+
+    def means(self, node: str) -> bool:
+        """Return whether it is for a node, by its full name."""
+        pattern = self.key if self.key.startswith("/") else f"{_EVERY}/{self.key}"
+        parts = (".*" if part == "**" else "[^/]*" if part == "*" else re.escape(part) for part in pattern.split("/"))
+        # Between two slashes ** may stand for nothing at all.
+        return re.fullmatch("/".join(parts).replace("/.*/", "(/.*)?/"), node) is not None
+
+
+def given_parameters(arguments: RosArguments) -> list[GivenParameter]:
+    """Return what a command line gives, in its order.
+
+    Raises:
+        RosArgumentsError: a rule or a file cannot be read.
+    """
+    found: list[GivenParameter] = []
+    for option, *rest in arguments.rules:
+        if option == PARAM:
+            found.append(_rule(rest[0]))
+        elif option == PARAMS_FILE:
+            found += _file(Path(rest[0]))
+        if len(found) > MOST_PARAMETERS:
+            raise RosArgumentsError(f"{BEGIN}: more than {MOST_PARAMETERS} parameters")
+    return found
+
+
+def _rule(rule: str) -> GivenParameter:
+    place = f"-p {quoted(rule, marks='', limit=80)}"
+    source, sign, text = rule.partition(":=")
+    key, _, name = source.rpartition(":")
+    if not sign or not name:
+        raise RosArgumentsError(f"{BEGIN} {place}: not NAME:=VALUE or NODE:NAME:=VALUE")
+    value = _value(_tree(text, place), place)
+    return GivenParameter(key or _EVERY, name, value, place)
+
+
+def _file(path: Path) -> list[GivenParameter]:
+    try:
+        text = read_bytes(path).decode()
+    except UnicodeDecodeError as error:
+        raise RosArgumentsError("is not text in UTF-8", place=str(path)) from error
+    except FileFault as fault:
+        raise RosArgumentsError(f"{PARAMS_FILE}: {fault}", place=str(path)) from fault
+    root = _tree(text, str(path))
+    if isinstance(root, Scalar) and root.is_null:
+        return []
+    return list(_nodes(root, "", str(path)))
+
+
+def _tree(text: str, place: str) -> Node:
+    def report(_: Flaw, message: str, span: Span, hint: str | None) -> None:
+        raise RosArgumentsError(message, hint, place=f"{place}:{span.line}")
+
+    tree = read_yaml(text, report, "parameters")
+    assert tree is not None  # what is wrong was raised
+    return tree
+
+
+def _nodes(node: Node, key: str, path: str) -> Iterator[GivenParameter]:
+    if not isinstance(node, Mapping):
+        raise _fault(f"{key or 'it'} must hold {_PARAMETERS}", node, path)
+    for name, value in node.entries:
+        if name.text == _PARAMETERS:
+            yield from _parameters(value, key or _EVERY, "", path)
+        else:
+            yield from _nodes(value, f"{key}/{name.text.lstrip('/')}" if key else name.text, path)
+
+
+def _parameters(node: Node, key: str, prefix: str, path: str) -> Iterator[GivenParameter]:
+    if not isinstance(node, Mapping):
+        raise _fault(f"{_PARAMETERS} of {key} must be names and values", node, path)
+    for name, value in node.entries:
+        full = f"{prefix}{name.text}"
+        if isinstance(value, Mapping):
+            yield from _parameters(value, key, f"{full}.", path)
+        else:
+            place = f"{path}:{name.span.line}"
+            yield GivenParameter(key, full, _value(value, place), place)
+
+
+def _value(node: Node, place: str) -> ParameterValue:
+    if isinstance(node, Scalar):
+        return _scalar(node)
+    if isinstance(node, Sequence):
+        found = [_scalar(item) if isinstance(item, Scalar) else None for item in node.items]
+        for kind in (bool, int, float, str):
+            if all(type(item) is kind for item in found):
+                return found  # type: ignore[return-value]  # all are of one type
+    raise RosArgumentsError("a parameter's value is a single value, or a list of values of one type", place=place)
+
+
+def _scalar(node: Scalar) -> bool | int | float | str | None:
+    """Return a value as rcl reads it."""
+    text = node.text
+    if not node.plain:
+        return text
+    if node.is_null:
+        return None
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
+    if _WHOLE.fullmatch(text):
+        return int(text, 16 if "x" in text else 10)
+    if _REAL.fullmatch(text):
+        return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+    return text
+
+
+def _fault(message: str, node: Node, path: str) -> RosArgumentsError:
+    return RosArgumentsError(message, place=f"{path}:{node.span.line}")
