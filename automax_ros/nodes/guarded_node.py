@@ -28,6 +28,7 @@ class GuardedNode(Node):  # type: ignore[misc]
         # The rack is the clock: its stamps are the grid's, whatever a launch file says to all nodes.
         own_time = [Parameter(_SIM_TIME, value=False)]
         space = f"/{namespace}"
+        self.own_name = name
         name = arguments.name_of(name, main=name == MAIN_NODE)
         # Rules of a foreign context that are for all nodes must not put the rack elsewhere, or give all one name.
         own_place = ["--ros-args", "-r", f"__ns:={space}", "-r", f"__node:={name}"]

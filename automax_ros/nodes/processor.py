@@ -12,13 +12,9 @@ Its tasks' run-time errors and PRINT lines go to /rosout. It is a managed node (
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.parameter import Parameter
 
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_MS
@@ -26,7 +22,7 @@ from automax_ros.nodes.diagnostics import worst
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.throttle import Throttle
-from automax_ros.nodes.tunables import Tunable, tunables_of
+from automax_ros.nodes.tunable_parameters import TunableParameters
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.observers import Operation
 from automax_ros.running.error_log import LogEntry
@@ -53,10 +49,8 @@ class ProcessorNode(ManagedModuleNode):
             for topic in stream.module_topics
             if topic.slot == self._slot
         }
-        self._tunables: dict[str, Tunable] = {}
-        self._declare(self._tasks)
-        self.add_on_set_parameters_callback(self._check)
-        self.add_post_set_parameters_callback(self._tune)
+        self.tunables = TunableParameters(self, rack, site.present)
+        self.tunables.declare(self._tasks)
         self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in self._tasks}
         stream.add_sink(outlets.get)
         rack.observe(self)
@@ -84,8 +78,10 @@ class ProcessorNode(ManagedModuleNode):
     def written(self, writes: list[Write]) -> None:
         """Writes from outside do not concern a Processor."""
 
-    def tuned(self, task: Task, now_ns: int) -> None:
-        """Whoever tunes a task updates its parameter."""
+    def tuned(self, task: Task, now_ns: int) -> None:  # noqa: ARG002
+        """Let the parameters follow whoever has tuned a task otherwise."""
+        if task.slot == self._slot:
+            self.tunables.follow(task)
 
     def operated(self, operation: Operation) -> None:
         """Report a STOP ALL, and the health of the tasks after each operation on one of them."""
@@ -93,40 +89,9 @@ class ProcessorNode(ManagedModuleNode):
             self.get_logger().error(f"STOP ALL: {operation.reason}")
         concerned = [task for task in self._tasks if operation.concerns(task.name)]
         if operation.ok and operation.what in ("reload", "power_on"):
-            self._declare(concerned)
+            self.tunables.declare(concerned)
         if operation.ok:
             self.follow_tasks()
-
-    def _declare(self, tasks: Sequence[Task]) -> None:
-        """Declare the tunables of tasks, as they are installed now, in place of those that they had."""
-        for name in [name for name, item in self._tunables.items() if item.task in tasks]:
-            del self._tunables[name]
-            self.undeclare_parameter(name)
-        found = tunables_of(tasks)
-        for tunable in found:
-            self.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor())
-        self._tunables |= {item.parameter: item for item in found}
-
-    def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
-        """Refuse what a task would refuse, before any of the parameters is set; those that are not tunables pass."""
-        for parameter in parameters:
-            tunable = self._tunables.get(parameter.name)
-            if tunable is None:
-                continue
-            try:
-                tunable.task.tuning(tunable.variable, parameter.value)
-            except ValueError as error:
-                return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _tune(self, parameters: list[Parameter[Any]]) -> None:
-        """Tune tasks by the parameters that have been set."""
-        chosen = [(self._tunables[item.name], item.value) for item in parameters if item.name in self._tunables]
-        if not chosen:
-            return
-        with self.site.present():
-            for tunable, value in chosen:
-                self._rack.tune(tunable.task, tunable.variable, value)
 
     def _health(self, now_ns: int) -> list[DiagnosticStatus]:
         tasks = [self._status(task, now_ns) for task in self._tasks]

@@ -16,9 +16,10 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
-from automax_ros.core.faults import Fault
 from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.nodes.ros_parameters import GivenParameter, RosArgumentsError, parameter_of, parameters_of
 
 BEGIN, END = "--ros-args", "--"
 MOST_WORDS, LONGEST_WORD = 1000, 4000
@@ -36,10 +37,6 @@ _NAMES = ("__node", "__name")
 """Both words name a node, as in rcl."""
 
 
-class RosArgumentsError(Fault):
-    """What stands after ``--ros-args``, or ROS_NAMESPACE, cannot be used."""
-
-
 @dataclass(frozen=True)
 class RosArguments:
     """What was given.
@@ -48,12 +45,14 @@ class RosArguments:
         namespace: where the program's own namespace goes into, without slashes at its ends; mostly empty.
         names: other names of nodes by their own; that of the main node under the empty text.
         rules: option and value, or a switch alone, of all others in their order.
+        parameters: what the rules give nodes at the start, in their order: the last wins.
         given: whether ``--ros-args`` was there with anything after it.
     """
 
     namespace: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
     rules: tuple[tuple[str, ...], ...] = ()
+    parameters: tuple[GivenParameter, ...] = ()
     given: bool = False
 
     def placed(self, namespace: str) -> str:
@@ -63,6 +62,19 @@ class RosArguments:
     def name_of(self, node: str, *, main: bool = False) -> str:
         """Return what a node is to be called; ``main`` is the one that a rule without a node means."""
         return self.names.get(node) or (self.names.get("", node) if main else node)
+
+    def given_to(self, node: str, namespace: str, *, main: bool = False) -> dict[str, GivenParameter]:
+        """Return the parameters that a node is given, by their names.
+
+        Args:
+            node: its own name.
+            namespace: of the program's nodes, without slashes at its ends.
+            main: whether it is the main one, which launch knows by another name.
+        """
+        full = [f"/{namespace}/{self.name_of(node, main=main)}"]
+        if main and "" in self.names:
+            full.append(f"/{self.placed(self.names[''])}")
+        return {item.name: item for item in self.parameters if any(item.means(name) for name in full)}
 
     @property
     def words(self) -> list[str]:
@@ -124,6 +136,7 @@ class _Reader:
         self._namespace = _space_of(namespace, "ROS_NAMESPACE")
         self._names: dict[str, str] = {}
         self._rules: list[tuple[str, ...]] = []
+        self._parameters: list[GivenParameter] = []
 
     def read(self, words: list[str]) -> RosArguments:
         rest = iter(words)
@@ -139,7 +152,13 @@ class _Reader:
                 raise RosArgumentsError(f"{BEGIN}: {word} needs a value")
             if option != REMAP or not self._take_name(value):
                 self._rules.append((option, value))
-        return RosArguments(self._namespace, self._names, tuple(self._rules), bool(words))
+            if option == PARAM:
+                self._parameters.append(parameter_of(value))
+            elif option == PARAMS_FILE:
+                self._parameters += parameters_of(Path(value))
+        return RosArguments(
+            self._namespace, self._names, tuple(self._rules), tuple(self._parameters), given=bool(words)
+        )
 
     def _take_name(self, rule: str) -> bool:
         """Take a rule that names a namespace or a node; FALSE where it is for rcl."""

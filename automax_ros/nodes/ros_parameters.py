@@ -13,24 +13,29 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TypeAlias
 
 from automax_ros.core.diagnostics import Span
+from automax_ros.core.faults import Fault
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence, read_yaml
-from automax_ros.nodes.ros_arguments import BEGIN, PARAM, PARAMS_FILE, RosArguments, RosArgumentsError
 from automax_ros.rack.files import FileFault, read_bytes
 
 ParameterValue: TypeAlias = "bool | int | float | str | list[bool] | list[int] | list[float] | list[str] | None"
 MOST_PARAMETERS = 10_000
-"""Most parameters of a command line (decision: a rack has some hundred tunables)."""
+"""Most parameters of a file (decision: a rack has some hundred tunables)."""
 _PARAMETERS = "ros__parameters"
 _EVERY = "/**"
-_TRUE = frozenset("y Y yes Yes YES true True TRUE on On ON".split())
-_FALSE = frozenset("n N no No NO false False FALSE off Off OFF".split())
+_TRUE = frozenset(["y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
+_FALSE = frozenset(["n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
 _WHOLE = re.compile(r"[-+]?(0x[0-9a-fA-F]{1,16}|[0-9]{1,19})")
 _REAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+
+
+class RosArgumentsError(Fault):
+    """What stands after ``--ros-args``, a file that it names, or ROS_NAMESPACE cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -55,44 +60,40 @@ class GivenParameter:
         return re.fullmatch("/".join(parts).replace("/.*/", "(/.*)?/"), node) is not None
 
 
-def given_parameters(arguments: RosArguments) -> list[GivenParameter]:
-    """Return what a command line gives, in its order.
+def parameter_of(rule: str) -> GivenParameter:
+    """Return what a rule ``NAME:=VALUE`` or ``NODE:NAME:=VALUE`` gives.
 
     Raises:
-        RosArgumentsError: a rule or a file cannot be read.
+        RosArgumentsError: it cannot be read.
     """
-    found: list[GivenParameter] = []
-    for option, *rest in arguments.rules:
-        if option == PARAM:
-            found.append(_rule(rest[0]))
-        elif option == PARAMS_FILE:
-            found += _file(Path(rest[0]))
-        if len(found) > MOST_PARAMETERS:
-            raise RosArgumentsError(f"{BEGIN}: more than {MOST_PARAMETERS} parameters")
-    return found
-
-
-def _rule(rule: str) -> GivenParameter:
     place = f"-p {quoted(rule, marks='', limit=80)}"
     source, sign, text = rule.partition(":=")
     key, _, name = source.rpartition(":")
     if not sign or not name:
-        raise RosArgumentsError(f"{BEGIN} {place}: not NAME:=VALUE or NODE:NAME:=VALUE")
+        raise RosArgumentsError(f"{place}: not NAME:=VALUE or NODE:NAME:=VALUE")
     value = _value(_tree(text, place), place)
     return GivenParameter(key or _EVERY, name, value, place)
 
 
-def _file(path: Path) -> list[GivenParameter]:
+def parameters_of(path: Path) -> list[GivenParameter]:
+    """Return what a file of parameters gives.
+
+    Raises:
+        RosArgumentsError: it cannot be read, or has too many.
+    """
     try:
         text = read_bytes(path).decode()
     except UnicodeDecodeError as error:
         raise RosArgumentsError("is not text in UTF-8", place=str(path)) from error
     except FileFault as fault:
-        raise RosArgumentsError(f"{PARAMS_FILE}: {fault}", place=str(path)) from fault
+        raise RosArgumentsError(str(fault), place=str(path)) from fault
     root = _tree(text, str(path))
     if isinstance(root, Scalar) and root.is_null:
         return []
-    return list(_nodes(root, "", str(path)))
+    found = list(islice(_nodes(root, "", str(path)), MOST_PARAMETERS + 1))
+    if len(found) > MOST_PARAMETERS:
+        raise RosArgumentsError(f"more than {MOST_PARAMETERS} parameters", place=str(path))
+    return found
 
 
 def _tree(text: str, place: str) -> Node:

@@ -1,0 +1,99 @@
+"""The tunables of one node's tasks as its parameters: declared, checked, set, and following whoever tunes otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from automax_ros.core.types import DataType
+from automax_ros.nodes.ros_parameters import ParameterValue
+from automax_ros.nodes.tunables import Tunable, tunables_of
+from automax_ros.rack.rack import Rack
+from automax_ros.running.task import Task
+
+
+class TunableParameters:
+    """Keeps the parameters of a node equal to the tunables of its tasks."""
+
+    def __init__(self, node: Node, rack: Rack, present: Callable[[], AbstractContextManager[None]]) -> None:
+        """Take a node; ``present`` is entered while a task is tuned."""
+        self._node, self._rack, self._present = node, rack, present
+        self._tunables: dict[str, Tunable] = {}
+        self._is_following = False
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._tune)
+
+    @property
+    def names(self) -> Iterable[str]:
+        """The parameters."""
+        return self._tunables.keys()
+
+    def declare(self, tasks: Sequence[Task]) -> None:
+        """Declare the tunables of tasks, as they are installed now, in place of those that they had.
+
+        What the command line gives is not for rclpy to set: ``start_parameters`` does.
+        """
+        for name in [name for name, item in self._tunables.items() if item.task in tasks]:
+            del self._tunables[name]
+            self._node.undeclare_parameter(name)
+        found = tunables_of(tasks)
+        for tunable in found:
+            self._node.declare_parameter(
+                tunable.parameter, tunable.initial, tunable.descriptor(), ignore_override=True
+            )
+        self._tunables |= {item.parameter: item for item in found}
+
+    def begin_with(self, name: str, value: ParameterValue) -> str:
+        """Set a tunable as a client would; return why that is refused, empty where it is not."""
+        if self._tunables[name].type is DataType.REAL and type(value) is int:
+            value = float(value)
+        try:
+            (result,) = self._node.set_parameters([Parameter(name, value=value)])
+        except (InvalidParameterTypeException, TypeError, ValueError) as error:
+            return str(error)
+        return "" if result.successful else str(result.reason) or "refused"
+
+    def follow(self, task: Task) -> None:
+        """Let the parameters have the values of a task that somebody has tuned."""
+        changed = [
+            Parameter(name, value=item.initial)
+            for name, item in self._tunables.items()
+            if item.task is task and self._node.get_parameter(name).value != item.initial
+        ]
+        if changed and not self._is_following:
+            self._is_following = True
+            try:
+                self._node.set_parameters(changed)
+            finally:
+                self._is_following = False
+
+    def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
+        """Refuse what a task would refuse, before any of the parameters is set; those that are not tunables pass."""
+        for parameter in parameters:
+            tunable = self._tunables.get(parameter.name)
+            if tunable is None:
+                continue
+            try:
+                tunable.task.tuning(tunable.variable, parameter.value)
+            except ValueError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _tune(self, parameters: list[Parameter[Any]]) -> None:
+        """Tune tasks by the parameters that have been set."""
+        chosen = [(self._tunables[item.name], item.value) for item in parameters if item.name in self._tunables]
+        if not chosen or self._is_following:
+            return
+        self._is_following = True
+        try:
+            with self._present():
+                for tunable, value in chosen:
+                    self._rack.tune(tunable.task, tunable.variable, value)
+        finally:
+            self._is_following = False
