@@ -78,6 +78,8 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         gc.freeze()
         if not plan.is_watched:
             display.message(_opening(plan, rack, domain))
+        for text in live.notes:
+            display.message(f"warning: {text}")
         if _all_are_there(live, display, stop):
             live.start([*state.settings, *plan.settings])
             stimulation.begin(joining=live.is_joining)

@@ -42,8 +42,13 @@ class LiveRack:
         self.stopping = False
         self._context = joined_context(arguments)
         self._executor = make_executor(self._context)
-        self._nodes = RackNodes(rack, context=self._context, arguments=arguments, seating=seating)
+        try:
+            self._nodes = RackNodes(rack, context=self._context, arguments=arguments, seating=seating)
+        except Exception:
+            self._leave()
+            raise
         self._nodes.add_to(self._executor)
+        self.notes = self._nodes.notes
         self._closing = False
         self._spinning = threading.Thread(target=self._spin, name="executor", daemon=True)
         self._spinning.start()
@@ -80,6 +85,9 @@ class LiveRack:
         self._closing = True
         self._spinning.join()
         self._nodes.close()
+        self._leave()
+
+    def _leave(self) -> None:
         self._executor.shutdown()
         self._context.try_shutdown()
 

@@ -12,6 +12,7 @@ nodes.close()
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -30,10 +31,13 @@ from automax_ros.nodes.door import Door
 from automax_ros.nodes.managed import ACTIVE, INACTIVE
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
+from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.nodes.rack_duties import HeldRack
 from automax_ros.nodes.rack_node import Follower, RackNode
 from automax_ros.nodes.registry import nodes_of
-from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.nodes.ros_arguments import RosArguments, split_arguments
+from automax_ros.nodes.ros_parameters import RosArgumentsError
+from automax_ros.nodes.start_parameters import tune_at_start, without_use
 from automax_ros.nodes.turns import Turns
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
@@ -60,6 +64,7 @@ class RackNodes:
         health: what went wrong so far.
         nodes: the node of each module.
         manager: the node ``rack``; None where common memory is in another process.
+        notes: what the person should know of the command line.
     """
 
     def __init__(
@@ -67,7 +72,7 @@ class RackNodes:
         rack: Rack | Path | str,
         *,
         context: Context | None = None,
-        arguments: RosArguments = NO_ARGUMENTS,
+        arguments: RosArguments | None = None,
         manager: RackNode | None = None,
         seating: Seating | None = None,
     ) -> None:
@@ -76,14 +81,17 @@ class RackNodes:
         Args:
             rack: a rack that was not started, or the path of its YAML file.
             context: the context of all nodes, initialised; rclpy's default one if None.
-            arguments: what the nodes are told besides what the context knows: names, the namespace of a rack that is
-                given by its file.
+            arguments: what the nodes are told by the command line; this process's own one if None, as rclpy does. The
+                namespace is that of a rack that is given by its file; a rack that is given has its own.
             manager: the node ``rack`` where the caller has one, who then sees to its state; else one is made here.
             seating: the processes of a distributed rack; ``rack`` is the part of this one.
 
         Raises:
             RackError: the YAML file or a task has errors, which ``findings`` holds.
+            RosArgumentsError: the command line is not one, or gives a tunable a value that its task refuses.
         """
+        if arguments is None:
+            arguments = split_arguments(sys.argv)[1]
         self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
@@ -110,6 +118,21 @@ class RackNodes:
         if manager is not None:
             self.rack.observers.add(Follower(manager))
         self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
+        self.notes = self._begin_with(arguments)
+
+    def _begin_with(self, arguments: RosArguments) -> list[str]:
+        """Give tunables what the command line says, and return what of it reaches nobody."""
+        try:
+            tuned = [node for node in self.nodes if isinstance(node, ProcessorNode)]
+            tune_at_start(arguments, self.rack.config.namespace, tuned)
+        except RosArgumentsError:
+            self.close()
+            raise
+        declared = {node.own_name: node.list_parameters([], 0).names for node in (*self.nodes, *self._own)}
+        notes = without_use(arguments, self.rack.config, declared)
+        for text in notes:
+            self.nodes[0].get_logger().warning(text)
+        return notes
 
     @property
     def lock(self) -> AbstractContextManager[None]:

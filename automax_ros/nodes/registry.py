@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from automax_ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.nodes.drive_plant import DrivePlantNode
+from automax_ros.nodes.facts import module_facts, rack_facts
 from automax_ros.nodes.io_module import IoModuleNode
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.network import NetworkNode
@@ -55,11 +56,13 @@ def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
     made: list[ModuleNode] = []
     if site.is_home:
         made.append(CommonMemoryNode(site))
+        made[0].declare_facts(rack_facts(site.rack, site.stream.run_id))
         if site.rack.config.operator:
             made.append(OperatorNode(site))
     for module in site.rack.modules:
         node = NODES[SUPPORTED[module.config.model]]
         if node is not None:
             made.append(node(site, module))
+            made[-1].declare_facts(module_facts(module.config))
     made += (DrivePlantNode(site, driven) for driven in site.rack.part.driven)
     return tuple(made)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import groupby, islice
 from pathlib import Path
 from typing import TypeAlias
 
@@ -28,9 +28,12 @@ MOST_PARAMETERS = 10_000
 """Most parameters of a file (decision: a rack has some hundred tunables)."""
 _PARAMETERS = "ros__parameters"
 _EVERY = "/**"
+_WILD = {"**": "(/[^/]+)*", "*": "/[^/]+"}
 _TRUE = frozenset(["y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
 _FALSE = frozenset(["n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
-_WHOLE = re.compile(r"[-+]?(0x[0-9a-fA-F]{1,16}|[0-9]{1,19})")
+_WHOLE = re.compile(r"[-+]?(0x[0-9a-fA-F]{1,16}|[1-9][0-9]{0,18}|0[0-7]{0,18})")
+_OCTAL = re.compile(r"[-+]?0[0-7]+")
+"""As in C, for rcl is written in it; with an 8 or 9 in it, rcl takes it for a real."""
 _REAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
@@ -55,9 +58,13 @@ class GivenParameter:
     def means(self, node: str) -> bool:
         """Return whether it is for a node, by its full name."""
         pattern = self.key if self.key.startswith("/") else f"{_EVERY}/{self.key}"
-        parts = (".*" if part == "**" else "[^/]*" if part == "*" else re.escape(part) for part in pattern.split("/"))
-        # Between two slashes ** may stand for nothing at all.
-        return re.fullmatch("/".join(parts).replace("/.*/", "(/.*)?/"), node) is not None
+        # Each ** once in a row: with many of them a match would take for ever.
+        parts = (part for part, same in groupby(pattern.strip("/").split("/")) for part in _once(part, list(same)))
+        return re.fullmatch("".join(_WILD.get(part, f"/{re.escape(part)}") for part in parts), node) is not None
+
+
+def _once(part: str, same: list[str]) -> list[str]:
+    return [part] if part == "**" else same
 
 
 def parameter_of(rule: str) -> GivenParameter:
@@ -148,7 +155,7 @@ def _scalar(node: Scalar) -> bool | int | float | str | None:
     if text in _TRUE or text in _FALSE:
         return text in _TRUE
     if _WHOLE.fullmatch(text):
-        return int(text, 16 if "x" in text else 10)
+        return int(text, 16 if "x" in text else 8 if _OCTAL.fullmatch(text) else 10)
     if _REAL.fullmatch(text):
         return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
     return text

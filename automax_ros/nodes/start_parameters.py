@@ -12,6 +12,7 @@ gives parameters to the node that it has named).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 from automax_ros.core.text import did_you_mean, quoted
@@ -50,9 +51,7 @@ def tune_at_start(arguments: RosArguments, namespace: str, nodes: Iterable[Tuned
                 raise RosArgumentsError(f"{item.name}: {reason}", place=item.place)
 
 
-def without_use(
-    arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]
-) -> list[str]:
+def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]) -> list[str]:
     """Return what to tell of parameters that reach nobody.
 
     Args:
@@ -60,39 +59,51 @@ def without_use(
         config: of the rack.
         declared: the parameters of each node that is here, by its own name; other processes may have more nodes.
     """
-    told = [text for item in _once(arguments.parameters) if (text := _complaint(item, arguments, config, declared))]
-    return [*told[:MOST_TOLD], *([f"{len(told) - MOST_TOLD} more parameters reach nobody"] if told[MOST_TOLD:] else [])]
+    told: dict[tuple[str, str], str] = {}
+    for item in arguments.parameters:
+        if item.name.startswith(_OWN_OF_ROS):
+            continue
+        reached = _reached(item, arguments, config, declared)
+        if not reached:
+            told.setdefault((item.key, ""), _without_node(item, config, declared))
+        elif not reached - {MAIN_NODE} - set(declared):
+            told[item.key, item.name] = _without_name(item, reached, declared)
+    texts = [text for text in told.values() if text]
+    more = [f"{len(texts) - MOST_TOLD} more parameters reach nobody"] if texts[MOST_TOLD:] else []
+    return [*texts[:MOST_TOLD], *more]
 
 
-def _once(given: Iterable[GivenParameter]) -> list[GivenParameter]:
-    """Return the parameters without those of a key that was there, if it names a node: one complaint a node is enough."""
-    found = {(item.key, item.name): item for item in given}
-    return list(found.values())
+def _names(config: RackConfig, declared: Mapping[str, Iterable[str]]) -> set[str]:
+    """Return the nodes of a rack, those in other processes included."""
+    return {MAIN_NODE, *declared, *(module.name for module in config.modules)}
 
 
-def _complaint(
+def _reached(
     item: GivenParameter, arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]
-) -> str | None:
-    if item.name.startswith(_OWN_OF_ROS):
-        return None
-    names = {MAIN_NODE, *declared, *(module.name for module in config.modules)}
-    reached = {
-        name for name in names if item.name in arguments.given_to(name, config.namespace, main=name == MAIN_NODE)
-    }
-    if not reached:
-        return _no_node(item, [f"/{config.namespace}/{name}" for name in sorted(names)])
-    known = {name for node in declared for name in declared[node]}
-    elsewhere = reached - {MAIN_NODE} - set(declared)
-    if item.name in known or elsewhere:
-        return None
-    hint = did_you_mean(item.name, known)
-    if item.is_for_all and hint is None:
-        return None  # one file for many programs
-    return f"{item.place}: no node has the parameter {quoted(item.name)}{f': {hint}' if hint else ''}"
+) -> set[str]:
+    """Return the nodes that a parameter is for."""
+    only = replace(arguments, parameters=(item,))
+    return {name for name in _names(config, declared) if only.given_to(name, config.namespace, main=name == MAIN_NODE)}
 
 
-def _no_node(item: GivenParameter, known: list[str]) -> str | None:
+def _without_node(item: GivenParameter, config: RackConfig, declared: Mapping[str, Iterable[str]]) -> str:
+    """Return what to tell of a key that no node has; nothing where it may be for another program."""
+    space = f"/{config.namespace}/" if item.key.startswith("/") else ""
+    known = [f"{space}{name}" for name in sorted(_names(config, declared))]
     hint = did_you_mean(item.key, known)
     if item.is_for_all and hint is None:
-        return None
+        return ""
     return f"{item.place}: the rack has no node {quoted(item.key)}{f': {hint}' if hint else ''}"
+
+
+def _without_name(item: GivenParameter, reached: set[str], declared: Mapping[str, Iterable[str]]) -> str:
+    """Return what to tell of a name that its nodes do not declare; nothing where it may be for another program."""
+    having = [node for node, names in declared.items() if item.name in names]
+    if reached.intersection(having) or (having and MAIN_NODE in reached):
+        return ""
+    known = sorted({name for names in declared.values() for name in names})
+    hint = f"{having[0]} has it" if having else did_you_mean(item.name, known)
+    if item.is_for_all and hint is None:
+        return ""
+    nodes = ", ".join(sorted(reached)) if not item.is_for_all else "the rack"
+    return f"{item.place}: {nodes} has no parameter {quoted(item.name)}{f': {hint}' if hint else ''}"

@@ -44,9 +44,7 @@ class TunableParameters:
             self._node.undeclare_parameter(name)
         found = tunables_of(tasks)
         for tunable in found:
-            self._node.declare_parameter(
-                tunable.parameter, tunable.initial, tunable.descriptor(), ignore_override=True
-            )
+            self._node.declare_parameter(tunable.parameter, tunable.initial, tunable.descriptor(), ignore_override=True)
         self._tunables |= {item.parameter: item for item in found}
 
     def begin_with(self, name: str, value: ParameterValue) -> str:
