@@ -76,10 +76,7 @@ def _run_locked(plan: RunPlan, stop: StopRequest, domain: int) -> int:
         # What is there now stays: a look of the collector at all of it would hold up scans by tens of ms.
         gc.collect()
         gc.freeze()
-        if not plan.is_watched:
-            display.message(_opening(plan, rack, domain))
-        for text in live.notes:
-            display.message(f"warning: {text}")
+        _open(plan, live, domain, display)
         if _all_are_there(live, display, stop):
             live.start([*state.settings, *plan.settings])
             stimulation.begin(joining=live.is_joining)
@@ -125,6 +122,13 @@ def _all_are_there(live: LiveRack, display: StatusDisplay, stop: StopRequest) ->
         return stop.requested
 
     return live.await_others(look)
+
+
+def _open(plan: RunPlan, live: LiveRack, domain: int, display: StatusDisplay) -> None:
+    if not plan.is_watched:
+        display.message(_opening(plan, live.rack, domain))
+    for text in live.notes:
+        display.message(f"warning: {text}")
 
 
 def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:
