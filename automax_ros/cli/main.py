@@ -43,6 +43,7 @@ SUBCOMMANDS: dict[str, str] = {
     "compare": "compare a block with the Logix instruction that replaces it",
     "bridge": "steady state of an SCR bridge, or a motor's run on it",
     "blocks": "describe the control blocks",
+    "security-policy": "SROS 2 policy and keys for a rack",
     "schema": "JSON schema of rack files or stimuli files, for editors",
     "completion": "what makes a shell complete this command line",
     "explain": "say what a problem code means and how to cure it",

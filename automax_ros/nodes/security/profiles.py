@@ -1,0 +1,67 @@
+"""Who may say and hear what in a rack's graph: profiles of nodes, in enclaves.
+
+An enclave is what one process is in ROS 2's security: its certificate, and what that permits. A profile has the full
+names that one node needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What one node publishes, subscribes, serves and calls; full names, in the order of their letters."""
+
+    namespace: str
+    node: str
+    publish: tuple[str, ...] = ()
+    subscribe: tuple[str, ...] = ()
+    reply: tuple[str, ...] = ()
+    request: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Enclave:
+    """What one process may do; ``path`` is what it names with ``--ros-args --enclave``."""
+
+    path: str
+    profiles: tuple[Profile, ...]
+
+    def names(self, part: str) -> tuple[str, ...]:
+        """Return the names of all profiles in one of their parts, such as ``publish``, each once."""
+        return tuple(sorted({name for profile in self.profiles for name in getattr(profile, part)}))
+
+
+LOG, EVENTS = "/rosout", "/parameter_events"
+_OWN_ALWAYS = (LOG, EVENTS)
+
+
+def recorder_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
+    """Return the enclave of those who watch and record: they hear what the rack says in its namespace, and say nothing.
+
+    ``namespace`` is the rack's, with its slash. Reading values, plots and layouts need no more than this.
+    """
+    heard = _said(rack)
+    return Enclave(f"{namespace}/recorder", (Profile(namespace, "recorder", subscribe=heard),))
+
+
+def operator_of(namespace: str, rack: Iterable[Enclave]) -> Enclave:
+    """Return the enclave of those who operate: they hear the rack, write its ``/set`` topics and call its services."""
+    enclaves = tuple(rack)
+    inputs = sorted(
+        name
+        for enclave in enclaves
+        for name in enclave.names("subscribe")
+        if name.startswith(f"{namespace}/") and name not in _said(enclaves)
+    )
+    served = sorted({name for enclave in enclaves for name in enclave.names("reply")})
+    profile = Profile(
+        namespace, "operator_desk", publish=tuple(inputs), subscribe=_said(enclaves), request=tuple(served)
+    )
+    return Enclave(f"{namespace}/operator_desk", (profile,))
+
+
+def _said(rack: Iterable[Enclave]) -> tuple[str, ...]:
+    return tuple(sorted({name for enclave in rack for name in enclave.names("publish")} - {EVENTS}))
