@@ -16,7 +16,7 @@ from automax_ros.nodes.security.profiles import Enclave, Profile
 VERSION = "0.2.0"
 """Version of the form of policies."""
 DISCOVERY = "ros_discovery_info"
-"""The topic on which every process of ROS 2 tells which nodes it has."""
+"""The topic on which every process of ROS 2 says which nodes it has."""
 _PARTS = (("topics", "topic", ("publish", "subscribe")), ("services", "service", ("reply", "request")))
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 _SCHEMAS = "http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_"
