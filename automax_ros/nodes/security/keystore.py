@@ -2,8 +2,8 @@
 
 It has the form of `ros2 security create_keystore`: ``public``, ``private`` and ``enclaves``. The one authority, whose
 key stays in ``private``, signs identities and permissions. An authority that is there is kept, and so are keys of
-enclaves: what is written again is what an enclave may do. So the racks of a plant share one keystore, one after another.
-The work is openssl's; keys are of the curve prime256v1 and last ``DAYS`` (decision).
+enclaves: what is written again is what an enclave may do. So the racks of a plant share one keystore, one after the
+other. The work is openssl's; keys are of the curve prime256v1 and last ``DAYS`` (decision).
 """
 
 from __future__ import annotations
