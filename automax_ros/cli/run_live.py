@@ -107,7 +107,7 @@ def _seating(plan: RunPlan, stimulation: Stimulation) -> Seating | None:
     if plan.seat is None:
         return None
     slots = [seat.slots for seat in plan.seat.seats]
-    return Seating(slots, plan.seat.run_id, lambda: stimulation.is_acting)
+    return Seating(slots, plan.seat.run_id, lambda: stimulation.is_common)
 
 
 def _all_are_there(live: LiveRack, display: StatusDisplay, stop: StopRequest) -> bool:

@@ -13,6 +13,7 @@ from typing import Protocol
 from automax_ros.cli.child_process import Child, Lines
 from automax_ros.cli.restarts import Restarts
 from automax_ros.cli.seat_talk import Reported, Told, heard
+from automax_ros.cli.status_parts import Progress
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 
 _LOOK_S = 0.05
@@ -22,8 +23,6 @@ END_NS = 10 * NS_PER_S
 """Who has not ended so long after it was asked to is killed."""
 GRACE_NS = 2 * NS_PER_S
 """How long the others may take to reach the end that the first process has reached by itself."""
-_REFUSED = 2
-"""Exit code of a process that cannot do what was asked for: to start it again helps nobody."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +65,14 @@ class _Place:
     """A post and who holds it.
 
     ``start_ns`` is when it is to be started, None where it is not. ``code`` is the exit code of one that is over.
+    ``has_begun``: it has told how it stands, once. ``reported``: it ends in order.
     """
 
     post: Post
     start_ns: int | None = 0
     child: Child | None = None
     restarts: Restarts = field(default_factory=Restarts)
+    has_begun: bool = False
     reported: bool = False
     code: int | None = None
 
@@ -145,6 +146,7 @@ class Supervisor:
 
     def _hear(self, place: _Place, line: str) -> None:
         told = heard(line)
+        place.has_begun = place.has_begun or isinstance(told, Progress)
         place.reported = place.reported or isinstance(told, Reported)
         self._listener.heard(place.post.name, told)
 
@@ -159,7 +161,9 @@ class Supervisor:
         assert code is not None
         child.close()
         in_order = place.reported or not place.post.reports
-        if in_order or self._stage >= 0 or code == _REFUSED:
+        # What cannot begin at all is not helped by another start: wrong usage, a rack with errors.
+        refused = code > 0 and not place.has_begun
+        if in_order or self._stage >= 0 or refused:
             # Who was asked to end before it could heed a signal has ended as it should.
             place.code = 0 if code == -signal.SIGTERM and self._stage >= 0 else code
             if place.post.ends_run or not in_order:

@@ -58,6 +58,19 @@ class RackPart:
         """The names of its tasks."""
         return [task.name for module in self.modules for task in module.tasks]
 
+    def is_elsewhere(self, what: str | int) -> bool:
+        """Whether a task or a plant by its name, or a module by its slot, is in another process."""
+        return what in self._elsewhere
+
+    @cached_property
+    def _elsewhere(self) -> frozenset[str | int]:
+        return RackPart.of(self.config, None)._names - self._names
+
+    @property
+    def _names(self) -> frozenset[str | int]:
+        """What is here: tasks and plants by name, modules by slot."""
+        return frozenset[str | int]([*self.slots, *self.tasks, *(plant.name for plant in self.plants)])
+
     @cached_property
     def driven(self) -> tuple[DrivenPlant, ...]:
         """The plants that its drives turn, by slot and drive."""

@@ -20,6 +20,7 @@ from automax_ros.cli.supervisor import Post, Supervisor
 
 PATIENCE_S = 30.0
 REPORT = 'print(json.dumps({"report": {"ok": True}}), flush=True)'
+BEGINS = 'print(json.dumps({"progress": {"now_ns": 1}}), flush=True)\n'
 WAITS = """
 stop = StopRequest()
 end_with_watcher(stop)
@@ -130,7 +131,7 @@ def test_a_process_that_was_killed_is_started_again_and_the_others_are_left_alon
 
 
 def test_a_process_that_dies_three_times_is_given_up():
-    with Supervised(Post("one", program("sys.exit(7)")), Post("two", program(WAITS + REPORT))) as run:
+    with Supervised(Post("one", program(BEGINS + "sys.exit(7)")), Post("two", program(WAITS + REPORT))) as run:
         run.heard.until(lambda heard: len(heard.deaths) == 3)
         run.stop()
     assert [again_s is None for _, _, again_s in run.heard.deaths] == [False, False, True]
@@ -140,21 +141,23 @@ def test_a_process_that_dies_three_times_is_given_up():
 
 def test_without_restarts_a_death_is_told_and_the_home_ends_the_run():
     with Supervised(
-        Post("home", program("sys.exit(1)"), ends_run=True), Post("one", program(WAITS + REPORT)), restart=False
+        Post("home", program(BEGINS + "sys.exit(1)"), ends_run=True),
+        Post("one", program(WAITS + REPORT)),
+        restart=False,
     ) as run:
         run.ended()
     assert run.heard.deaths == [("home", "ended with exit code 1", None)]
     assert run.supervisor.codes == {"home": 1, "one": 0}
 
 
-def test_wrong_usage_ends_the_run_at_once():
-    with Supervised(
-        Post("one", program("print('no', file=sys.stderr)\nsys.exit(2)")), Post("two", program(WAITS + REPORT))
-    ) as run:
+@pytest.mark.parametrize("code", [1, 2])
+def test_what_cannot_begin_ends_the_run_at_once(code):
+    refuses = f"print('no', file=sys.stderr)\nsys.exit({code})"
+    with Supervised(Post("one", program(refuses)), Post("two", program(WAITS + REPORT))) as run:
         run.ended()
     assert run.heard.errors == [("one", "no")]
     assert run.heard.deaths == []
-    assert run.supervisor.codes == {"one": 2, "two": 0}
+    assert run.supervisor.codes == {"one": code, "two": 0}
 
 
 def test_a_process_asked_to_end_before_it_heeds_signals_has_ended_well():

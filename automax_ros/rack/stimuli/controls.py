@@ -33,6 +33,8 @@ def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Actio
         if slot is None:
             continue
         module = by_slot.get(slot)
+        if module is None and rack.part.is_elsewhere(slot):
+            continue
         if module is None:
             findings.add("AMX6742", f"the rack has no module in slot {slot}", key.span)
             continue

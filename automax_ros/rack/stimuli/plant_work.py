@@ -23,6 +23,8 @@ def read_plant_work(rack: Rack, node: Node, what: str, findings: Findings) -> li
     for key, item in named(node, what, findings):
         name = findings.upper_case(key.text, key.span)
         where = f"{what} {name}"
+        if rack.part.is_elsewhere(name):
+            continue
         if name not in rack.plants:
             hint = near_or_listed(name, rack.plants) or "a plant needs a motor to be simulated"
             message = f"the rack has no plant {quoted(key.text)} that can be operated"

@@ -16,7 +16,8 @@ class Stimulation:
     """Posts one event at a time: that of the next instant with entries.
 
     ``happened`` are the operations so far, refused ones too, and values that were refused; ``refused`` counts
-    those. ``is_acting`` is TRUE while an entry does something.
+    those. ``is_acting`` is TRUE while an entry does something, ``is_common`` while what is written is written in every
+    process of a distributed rack.
     """
 
     def __init__(self, stimuli: Sequence[Stimulus], scheduler: Scheduler) -> None:
@@ -26,6 +27,7 @@ class Stimulation:
         self.happened: list[Happened] = []
         self.refused = 0
         self.is_acting = False
+        self._everywhere = False
         self._told = 0
 
     def begin(self, *, joining: bool = False) -> None:
@@ -37,6 +39,11 @@ class Stimulation:
         while joining and self._waiting and self._waiting[0].at_ns <= now_ns:
             self._waiting.popleft()
         self._post()
+
+    @property
+    def is_common(self) -> bool:
+        """See the class."""
+        return self._everywhere or self._stage.is_sampling
 
     @property
     def is_over(self) -> bool:
@@ -62,6 +69,7 @@ class Stimulation:
 
     def _do(self, entry: Stimulus, action: Action) -> None:
         now_ns, self.is_acting = self._stage.scheduler.now_ns, True
+        self._everywhere = entry.everywhere
         try:
             action.do(self._stage)
         except OperationRefused as refused:
@@ -71,7 +79,7 @@ class Stimulation:
             if not entry.is_value:
                 self.happened.append(Happened(now_ns, entry.verb, action.of))
         finally:
-            self.is_acting = False
+            self.is_acting = self._everywhere = False
 
 
 def _line(item: Happened) -> str:

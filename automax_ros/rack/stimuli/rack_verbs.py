@@ -42,8 +42,8 @@ def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mappin
     operations = rack.operations
     return {
         **value_verbs(RackSignals(rack)),
-        "force": Verb(partial(_force, rack)),
-        "unforce": Verb(partial(_unforce, rack)),
+        "force": Verb(partial(_force, rack), everywhere=True),
+        "unforce": Verb(partial(_unforce, rack), everywhere=True),
         "tune": Verb(tasks.tune),
         "run": Verb(tasks.each(operations.run)),
         "stop": Verb(tasks.each(operations.stop)),
@@ -85,9 +85,10 @@ class _Tasks:
     rack: Rack
 
     def task(self, key: Scalar, findings: Findings) -> Task | None:
+        """Return a task, None for one in another process of a distributed rack, which sees to it (decision)."""
         name = findings.upper_case(key.text, key.span)
         known = {task.name: task for task in self.rack.tasks}
-        if name not in known:
+        if name not in known and not self.rack.part.is_elsewhere(name):
             message = f"the rack has no task {quoted(key.text)}"
             findings.add("AMX6739", message, key.span, near_or_listed(name, known))
         return known.get(name)
@@ -146,6 +147,8 @@ def _forceable(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
 
 
 def _local(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
+    if rack.part.is_elsewhere(key.text.partition(".")[0].strip().upper()):
+        return None
     try:
         meant = local_named(rack.tasks, key.text)
     except NameFault as fault:

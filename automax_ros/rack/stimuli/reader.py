@@ -136,7 +136,7 @@ class _Reader:
         actions = verb.read(value, key.text, self.findings)
         if at_ns is None:
             return None
-        return Stimulus(at_ns, key.text, key.span.line, tuple(actions), verb.is_value)
+        return Stimulus(at_ns, key.text, key.span.line, tuple(actions), verb.is_value, verb.is_value or verb.everywhere)
 
     def _unknown(self, key: Scalar) -> None:
         if key.text in self.elsewhere:

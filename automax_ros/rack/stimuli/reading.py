@@ -23,10 +23,11 @@ Read = Callable[[Node, str, Findings], Sequence[Action]]
 
 @dataclass(frozen=True)
 class Verb:
-    """How a verb is read; ``is_value`` where it only writes values."""
+    """How a verb is read; ``is_value`` where it only writes values, ``everywhere`` as ``Stimulus`` has it."""
 
     read: Read
     is_value: bool = False
+    everywhere: bool = False
 
 
 def named(node: Node, what: str, findings: Findings) -> Iterator[Entry]:

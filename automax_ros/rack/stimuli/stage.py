@@ -32,6 +32,7 @@ class Stimulus:
     """An entry of a stimuli file: at a rack time, a verb with its actions. ``line`` is where it stands.
 
     ``is_value`` is TRUE for verbs that only write values, as the process does; the others operate the rack.
+    ``everywhere`` is TRUE where it writes the same in every process of a distributed rack.
     """
 
     at_ns: int
@@ -39,14 +40,19 @@ class Stimulus:
     line: int
     actions: tuple[Action, ...]
     is_value: bool
+    everywhere: bool = False
 
 
 class Stage:
-    """Time, and the waves that drive signals: at most one each, the latest."""
+    """Time, and the waves that drive signals: at most one each, the latest.
+
+    ``is_sampling`` is TRUE while a wave writes a value.
+    """
 
     def __init__(self, scheduler: Scheduler) -> None:
         """Take whose time it is."""
         self.scheduler = scheduler
+        self.is_sampling = False
         self._driven: dict[str, list[ScheduledEvent]] = {}
         self._count = 0
 
@@ -72,7 +78,7 @@ class Stage:
         self.rest(signal)
         scheduler = self.scheduler
         began, start = scheduler.now_ns, signal.read()
-        _sample(signal, wave.value(0, start))
+        self._sample(signal, wave.value(0, start))
         if wave.for_ns == 0:
             return
         key = self._key()
@@ -81,10 +87,10 @@ class Stage:
             self.rest(signal)
             last = wave.last()
             if last is not None:
-                _sample(signal, last)
+                self._sample(signal, last)
 
         def sample(now_ns: int, _: int) -> None:
-            _sample(signal, wave.value(now_ns - began, start))
+            self._sample(signal, wave.value(now_ns - began, start))
 
         events = [] if wave.for_ns is None else [scheduler.at(began + wave.for_ns, key, end)]
         events.append(scheduler.every(SAMPLE_NS, began + SAMPLE_NS, key, sample))
@@ -94,6 +100,14 @@ class Stage:
         """End the wave that drives a signal, if one does; its value stays."""
         for event in self._driven.pop(signal.label, ()):
             event.cancel()
+
+    def _sample(self, signal: Signal, value: Value) -> None:
+        if signal.read() != value:
+            self.is_sampling = True
+            try:
+                signal.write(value)
+            finally:
+                self.is_sampling = False
 
     def _key(self) -> EventKey:
         """Return the place of an event's samples: what began first comes first."""
@@ -105,11 +119,6 @@ _BEGUN = 0
 """Priority, among what comes from outside at one instant, of what earlier entries began: samples of waves."""
 ENTRIES = 1
 """Priority of entries: after what earlier entries began (decision), before all else."""
-
-
-def _sample(signal: Signal, value: Value) -> None:
-    if signal.read() != value:
-        signal.write(value)
 
 
 @dataclass(frozen=True)
