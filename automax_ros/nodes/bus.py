@@ -32,6 +32,7 @@ from automax_ros.nodes.topics import ros_qos
 from automax_ros.rack.bus.link import Batch, BusLink
 from automax_ros.rack.bus.part_name import part_name
 from automax_ros.rack.config import ModuleLoss
+from automax_ros.rack.plants.driven import driven_plants
 from automax_ros.wire.bus import BUS, batch_of, image_message, picture_of, standing_of, with_standing, write_message
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
 from automax_ros.wire.bus_peers import BEAT_NS, Heard, Peer, Peers
@@ -70,7 +71,10 @@ class Seating:
 
 
 class RackBus:
-    """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot."""
+    """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot.
+
+    ``seats`` are the slots of all processes by the slot that names each, ``plants`` the slots whose drives turn them.
+    """
 
     def __init__(self, site: Site, node: ModuleNode, seating: Seating) -> None:
         """Join the bus.
@@ -83,7 +87,8 @@ class RackBus:
         if own is None:
             raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
         self._site, self._rack, self._node = site, rack, node
-        self._seats = {min(slots): tuple(slots) for slots in seats}
+        self.seats = {min(slots): tuple(slots) for slots in seats}
+        self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._watch = ProcessWatch()
         self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
@@ -119,12 +124,12 @@ class RackBus:
     def missing(self) -> list[str]:
         """The processes that are not there, by their first modules."""
         there = {*self.peers.by_seat, self.peers.seat}
-        return [part_name(self._rack.config, slots) for seat, slots in self._seats.items() if seat not in there]
+        return [part_name(self._rack.config, slots) for seat, slots in self.seats.items() if seat not in there]
 
     @property
     def lost(self) -> list[str]:
         """The processes that were lost and have not come back."""
-        return [part_name(self._rack.config, self._seats[seat]) for seat in sorted(self.peers.lost & set(self._seats))]
+        return [part_name(self._rack.config, self.seats[seat]) for seat in sorted(self.peers.lost & set(self.seats))]
 
     def begin(self) -> None:
         """Take up what has come before the start: to be called as soon as the rack was started."""
