@@ -26,6 +26,7 @@ from rclpy.qos import LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType
+from automax_ros.nodes.bus_way import BusWay
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.process_watch import ProcessWatch, this_host
 from automax_ros.nodes.topics import ros_qos
@@ -36,7 +37,7 @@ from automax_ros.rack.plants.driven import driven_plants
 from automax_ros.wire.bus import BUS, batch_of, image_message, picture_of, standing_of, with_standing, write_message
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
 from automax_ros.wire.bus_peers import BEAT_NS, Heard, Peer, Peers
-from automax_ros.wire.cdr import CdrError, decode, encode
+from automax_ros.wire.cdr import encode
 
 LEASE_NS = 100 * NS_PER_MS
 """Liveliness of a process's presence, for whoever looks from outside."""
@@ -99,14 +100,15 @@ class RackBus:
         self._begun = self._has_image = False
         self._waiting: list[Callable[[], None]] = []
         self._answered: dict[int, int] = {}
+        self._participants: dict[int, bytes] = {}
         self._since_ns = time.monotonic_ns()
         qos = ros_qos(BUS)
         self._writes = node.create_publisher(BusWriteClass, "bus", qos)
         self._images = node.create_publisher(BusImageClass, "bus/image", qos)
         self._presences = node.create_publisher(PresenceClass, _PRESENCE, _presence_qos())
-        self._hear(BusWriteClass, "bus", qos, BusWrite, self._take_write, MOST_BYTES // 100)
-        self._hear(BusImageClass, "bus/image", qos, BusImage, self._take_image, MOST_BYTES)
-        self._hear(PresenceClass, _PRESENCE, _presence_qos(), Presence, self._take_presence, MOST_BYTES // 100)
+        self._hear("bus", qos, BusWrite, self._take_write, MOST_BYTES // 100)
+        self._hear("bus/image", qos, BusImage, self._take_image, MOST_BYTES)
+        self._hear(_PRESENCE, _presence_qos(), Presence, self._take_presence, MOST_BYTES // 100)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(BEAT_NS / NS_PER_S, node.inside("the bus", self._beat), clock=steady)
 
@@ -225,6 +227,7 @@ class RackBus:
 
     def _lost(self, peer: Peer) -> None:
         self._watch.forget(peer.process)
+        self._participants.pop(peer.process, None)
         name = part_name(self._rack.config, peer.presence.slots)
         text = f"{name} is lost: its process has ended, or gives no sign of life"
         self._site.health.note("lost process", (name, peer.process), lambda: text)
@@ -236,27 +239,17 @@ class RackBus:
 
     # what comes in
 
-    def _hear(self, cls: Any, topic: str, qos: QoSProfile, kind: Any, take: Callable[[Any], None], most: int) -> None:
+    def _hear(self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], most: int) -> None:
         type_name = f"automax_msgs/msg/{kind.__name__}"
-
-        def heard(payload: bytes) -> None:
-            if len(payload) > most:
-                self._refuse(topic, f"a message of {len(payload)} bytes")
-                return
-            try:
-                take(decode(type_name, payload))
-            except CdrError as error:
-                self._refuse(topic, str(error))
-
-        self._node.create_subscription(cls, topic, self._node.inside(topic, heard), qos, raw=True)
+        BusWay(self._node, topic, type_name, qos, receive, self._refuse, most)
 
     def _refuse(self, topic: str, what: str) -> None:
         self._site.health.note("refused bus message", (topic, what[:40]), lambda: f"{topic}: {what} was refused")
 
-    def _take_write(self, message: BusWrite) -> None:
-        peer = self.peers.of(message.process) if message.run_id == self.run_id else None
+    def _take_write(self, message: BusWrite, sender: bytes) -> None:
         if message.process == self.peers.process:
             return
+        peer = self._peer(message, sender)
         if peer is None or message.seat != peer.presence.seat:
             self._refuse("bus", "a write of a process that is not of this run")
             return
@@ -264,8 +257,8 @@ class RackBus:
         batch = batch_of(message, self._texts)
         self._when_begun(lambda: self.link.receive(batch))
 
-    def _take_image(self, message: BusImage) -> None:
-        peer = self.peers.of(message.process) if message.run_id == self.run_id else None
+    def _take_image(self, message: BusImage, sender: bytes) -> None:
+        peer = self._peer(message, sender)
         if peer is None or message.asked_by != self.peers.process:
             return
         peer.caught_up(message.sequence)
@@ -273,13 +266,24 @@ class RackBus:
         self._has_image = True
         self._when_begun(lambda: self.link.merge(picture))
 
-    def _take_presence(self, presence: Presence) -> None:
+    def _peer(self, message: BusWrite | BusImage, sender: bytes) -> Peer | None:
+        """Return the process that a message says it is of; None where that is not of this run, or not its sender."""
+        if message.run_id != self.run_id or self._participants.get(message.process, sender) != sender:
+            return None
+        return self.peers.of(message.process)
+
+    def _take_presence(self, presence: Presence, sender: bytes) -> None:
+        if self._participants.get(presence.process, sender) != sender:
+            self._refuse(_PRESENCE, "a word in another process's name")
+            return
         found = self.peers.heard(presence, time.monotonic_ns())
         if found is Heard.OWN:
             return
         if found not in (Heard.KNOWN, Heard.NEW):
             self._strange(found, presence)
             return
+        if found is Heard.NEW:
+            self._participants[presence.process] = sender
         if presence.asks == self.peers.process:
             self._answer(presence.process)
         if self._begun and presence.run_id == self.run_id:

@@ -1,0 +1,63 @@
+"""How a message of the bus comes in: through the rack's door, judged by its length and its sender's participant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+from automax_ros.nodes.module_node import ModuleNode
+from automax_ros.nodes.rcl import library
+from automax_ros.nodes.taking import taker_of
+from automax_ros.nodes.topics import message_class
+from automax_ros.wire.cdr import CdrError, decode
+
+PARTICIPANT_BYTES = 12
+"""The part of a publisher's GID that all of one process share."""
+Receive = Callable[[Any, bytes], None]
+"""Gets a decoded message and its sender's participant, b"" where that is not known; in the rack's present."""
+
+
+class BusWay:
+    """One topic of the bus. ``refuse`` is told what is not a message of it, or longer than ``most_bytes``."""
+
+    def __init__(
+        self,
+        node: ModuleNode,
+        topic: str,
+        type_name: str,
+        qos: QoSProfile,
+        receive: Receive,
+        refuse: Callable[[str, str], None],
+        most_bytes: int,
+    ) -> None:
+        """Subscribe, and be served at the rack's door."""
+        subscription = node.own_subscription(message_class(type_name), topic, qos)
+        self.name, self.handle = subscription.topic_name, subscription.handle
+        self._topic, self._type_name = topic, type_name
+        self._receive, self._refuse = node.inside(topic, receive), refuse
+        self._taker = taker_of(subscription, most_bytes)
+        node.site.door.add(self)
+
+    def take(self) -> bool:
+        """Take the next message; False where there is none."""
+        taken = self._taker.take()
+        if taken is None:
+            return False
+        if taken.payload is None:
+            self._refuse(self._topic, f"a message of {taken.size:,} bytes")
+            return True
+        try:
+            message = decode(self._type_name, taken.payload)
+        except CdrError as error:
+            self._refuse(self._topic, str(error))
+        else:
+            self._receive(message, taken.sender[:PARTICIPANT_BYTES])
+        return True
+
+    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
+        """Let rcl call a function for each message."""
+        rcl = library()
+        assert rcl is not None
+        return int(rcl.on_message(pointer, callback, data))
