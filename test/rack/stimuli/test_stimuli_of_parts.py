@@ -109,7 +109,7 @@ def test_what_the_rack_does_not_have_is_told_in_every_process(tmp_path, verbs, s
 def test_values_are_written_everywhere_and_operations_are_not(tmp_path):
     verbs = (
         "- {at: 0.001, set: {A%: 5}}\n- {at: 0.002, ramp: {A%: {to: 8, over: 0.003}}}\n"
-        "- {at: 0.006, stop: TWO}\n- {at: 0.007, run: TWO}\n- {at: 0.010, force: {A%: 1}}\n"
+        "- {at: 0.007, stop_all: true}\n- {at: 0.010, force: {A%: 1}}\n"
     )
     rack, stimulation = part(tmp_path, verbs)
     rack.start()
@@ -119,7 +119,7 @@ def test_values_are_written_everywhere_and_operations_are_not(tmp_path):
     values = [(at // 1_000_000, value, everywhere) for at, value, everywhere in common.seen]
     assert values[:4] == [(1, 5, True), (3, 6, True), (4, 7, True), (5, 8, True)]
     assert (10, 1, True) in values
-    assert [item for item in values if item[0] == 7] == [(7, 3, False)], "what a start-up part writes"
+    assert [item for item in values if item[0] == 7] == [(7, 0, False)], "STOP ALL clears memory"
 
 
 def test_who_joins_leaves_out_what_has_happened(tmp_path):
