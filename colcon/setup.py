@@ -27,5 +27,6 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         *shared("launch"),
         *shared("config"),
+        *shared("examples"),
     ],
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 COLCON = ROOT / "colcon"
-LINKS = {"LICENSE", "automax_ros", "config", "launch"}
+LINKS = {"LICENSE", "automax_ros", "config", "examples", "launch"}
 """What colcon/ shows of the repository's own folder."""
 IDENTIFYING = {"package.xml", "setup.py", "CMakeLists.txt", "colcon.pkg"}
 """A folder with one of these files is a package to colcon, which then looks no further below it."""
@@ -56,12 +56,12 @@ def test_colcon_and_pip_install_the_same_package():
 
 
 def test_pip_shares_every_file_that_colcon_does():
-    """setup.cfg names each folder; colcon/setup.py takes all below launch/ and config/."""
+    """setup.cfg names each folder; colcon/setup.py takes all below launch/, config/ and examples/."""
     folders = options(ROOT / "setup.cfg")["options.data_files"]
     shared = {path for pattern in folders.values() for path in glob.glob(pattern, root_dir=ROOT)}
     wanted = {
         str(path.relative_to(ROOT))
-        for name in ("launch", "config")
+        for name in ("launch", "config", "examples")
         for path in (ROOT / name).rglob("*")
         if path.is_file() and not {"__pycache__", ".automax"} & set(path.parts)
     }

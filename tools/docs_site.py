@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FROM_ELSEWHERE = {
     "CHANGELOG.md": "changelog.md",
     "CONTRIBUTING.md": "contributing.md",
+    "examples/README.md": "examples/robots.md",
     **{
         path.relative_to(ROOT).as_posix(): f"examples/{path.parent.name}.md"
         for path in sorted((ROOT / "config").glob("*/README.md"))
