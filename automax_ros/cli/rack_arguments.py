@@ -33,6 +33,32 @@ def config_of(path: Path, *, allow_outside: bool, quiet: bool = False) -> RackCo
     return result.config if not has_errors(result.diagnostics) else None
 
 
+def usable_config(path: Path, *, allow_outside: bool) -> RackConfig:
+    """Return a rack's configuration; its warnings are printed.
+
+    Raises:
+        RackError: the file has errors, which it holds.
+        UsageError: the file cannot be read.
+    """
+    result = load_rack_file(path, allow_outside=allow_outside)
+    if result.config is None:
+        raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
+    print_diagnostics(result.diagnostics, result.source, sys.stderr)
+    return result.config
+
+
+def namespace_of(path: Path) -> str:
+    """Return the namespace of a rack whose file may have errors.
+
+    Raises:
+        UsageError: the file cannot be read, or says no name.
+    """
+    found = load_rack_file(path, allow_outside=False).namespace
+    if found is None:
+        raise UsageError(f"{path} says no name of a rack", "the node `rack` needs one: rack: PM1")
+    return found
+
+
 def settings_of(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
     """Return what the texts of ``--set`` give common variables.
 

@@ -14,13 +14,13 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.cli.output_files import held_for_writing, require_different_files, require_folder, require_writable
-from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
+from automax_ros.cli.rack_arguments import config_of, namespace_of, print_refused, settings_of, usable_config
 from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
 from automax_ros.cli.record_options import add_record_arguments, recording_options
 from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.run_plan import RunPlan
 from automax_ros.cli.run_simulated import run_simulated
-from automax_ros.cli.signals import stop_signals
+from automax_ros.cli.signals import CutShort, StopRequest, stop_signals
 from automax_ros.cli.stimuli_file import StimuliRefused
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
@@ -51,6 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="restart",
         action="store_false",
         help="with --distributed: do not start a process again that has died",
+    )
+    parser.add_argument(
+        "--no-autostart",
+        dest="autostart",
+        action="store_false",
+        help="on the wall clock: wait unconfigured for a ROS 2 lifecycle manager, which configures and activates the "
+        "node `rack` (docs/ros.md)",
     )
     parser.add_argument(
         "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
@@ -88,8 +95,7 @@ def folder(text: str) -> Path:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
-    duration_ns = arguments.duration
-    if arguments.simulated and arguments.record is not None and duration_ns is None:
+    if arguments.simulated and arguments.record is not None and arguments.duration is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
     if arguments.simulated and arguments.ros is not None and arguments.ros.given:
         raise UsageError("--ros-args: with --simulated nothing of ROS is started", "leave one of them out")
@@ -97,38 +103,16 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--distributed needs the wall clock, by which its processes agree", "leave out --simulated")
     if not (arguments.distributed or arguments.restart):
         raise UsageError("--no-restart belongs to --distributed")
+    if not arguments.autostart and (arguments.simulated or arguments.distributed):
+        raise UsageError("--no-autostart: a lifecycle manager starts racks on the wall clock, in one process")
     check_files(arguments)
     with stop_signals() as stop, held_for_writing(arguments.report):
         if not arguments.simulated:
             prepare_ros(arguments, WITHOUT_ROS)
-        config = config_of(arguments.config, allow_outside=arguments.allow_outside)
-        if config is None:
-            return 1
-        ros = NO_ARGUMENTS if arguments.simulated else ros_arguments(arguments)
-        config = replace(config, namespace=ros.placed(config.namespace))
-        plan = RunPlan(
-            config,
-            duration_ns,
-            arguments.record,
-            recording_options(arguments, config),
-            tuple(settings_of(config, arguments.settings)),
-            tuple(watched_commons(config, arguments.watch)),
-            arguments.state,
-            arguments.stimuli,
-            arguments.report,
-            arguments.allow_outside,
-            ros,
-        )
         try:
-            if arguments.simulated:
-                return run_simulated(plan, stop)
-            if arguments.distributed:
-                from automax_ros.cli.run_distributed import run_distributed
-
-                return run_distributed(plan, arguments, stop)
-            from automax_ros.cli.run_live import run_live
-
-            return run_live(plan, stop)
+            return _run(arguments, stop)
+        except CutShort:
+            return 0
         except RackError as error:
             return print_refused("run", error)
         except StimuliRefused:
@@ -136,6 +120,59 @@ def run(arguments: argparse.Namespace) -> int:
         except (BagError, RetentionFault) as error:
             print(error, file=sys.stderr)
             return 2
+
+
+def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
+    if not arguments.autostart:
+        return _run_managed(arguments, stop)
+    with stop.cut_short():
+        config = config_of(arguments.config, allow_outside=arguments.allow_outside)
+    if config is None:
+        return 1
+    plan = _plan(arguments, config)
+    if arguments.simulated:
+        return run_simulated(plan, stop)
+    if arguments.distributed:
+        from automax_ros.cli.run_distributed import run_distributed
+
+        return run_distributed(plan, arguments, stop)
+    from automax_ros.cli.managed_run import Managed
+    from automax_ros.cli.run_live import run_managed
+
+    return run_managed(Managed(plan.config.namespace, lambda: _read(arguments, stop), plan, plan.ros), stop)
+
+
+def _run_managed(arguments: argparse.Namespace, stop: StopRequest) -> int:
+    from automax_ros.cli.managed_run import Managed
+    from automax_ros.cli.run_live import run_managed
+
+    ros = ros_arguments(arguments)
+    with stop.cut_short():
+        space = ros.placed(namespace_of(arguments.config))
+    return run_managed(Managed(space, lambda: _read(arguments, stop), ros=ros), stop)
+
+
+def _read(arguments: argparse.Namespace, stop: StopRequest) -> RunPlan:
+    with stop.cut_short():
+        return _plan(arguments, usable_config(arguments.config, allow_outside=arguments.allow_outside))
+
+
+def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
+    ros = NO_ARGUMENTS if arguments.simulated else ros_arguments(arguments)
+    config = replace(config, namespace=ros.placed(config.namespace))
+    return RunPlan(
+        config,
+        arguments.duration,
+        arguments.record,
+        recording_options(arguments, config),
+        tuple(settings_of(config, arguments.settings)),
+        tuple(watched_commons(config, arguments.watch)),
+        arguments.state,
+        arguments.stimuli,
+        arguments.report,
+        arguments.allow_outside,
+        ros,
+    )
 
 
 def check_files(arguments: argparse.Namespace) -> None:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
+from typing import Any
 
 _SIGNALLED = 128
 """Exit code of a command that a signal has ended, less the signal's number: what the shell adds."""
+
+
+class CutShort(BaseException):
+    """A signal came during work that is not worth its end: not an error, so that nobody takes it for one."""
 
 
 @dataclass
@@ -18,6 +24,42 @@ class StopRequest:
     """Whether a signal has asked for the end."""
 
     requested: bool = False
+    _cuts: bool = False
+
+    @contextmanager
+    def cut_short(self) -> Iterator[None]:
+        """Let a signal end the block at once, by CutShort: for long work that leaves nothing behind.
+
+        Raises:
+            CutShort: a signal has come, in the block or before.
+        """
+        before = sys.unraisablehook
+
+        def quiet(what: Any) -> None:
+            # Raised where nobody can take it, as while an object is deleted, the request is still noted.
+            if not isinstance(what.exc_value, CutShort):
+                before(what)
+
+        sys.unraisablehook = quiet
+        self._cuts = True
+        try:
+            if self.requested:
+                raise CutShort
+            yield
+        finally:
+            self._cuts = False
+            sys.unraisablehook = before
+
+    def note(self) -> None:
+        """Take notice of a signal.
+
+        Raises:
+            CutShort: in a ``cut_short`` block, once.
+        """
+        self.requested = True
+        if self._cuts:
+            self._cuts = False
+            raise CutShort
 
 
 @contextmanager
@@ -29,7 +71,7 @@ def stop_signals() -> Iterator[StopRequest]:
     stop = StopRequest()
 
     def note(_: int, __: FrameType | None) -> None:
-        stop.requested = True
+        stop.note()
 
     before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:

@@ -10,20 +10,15 @@ long conversion or a queue of events does not stand before them.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
-from contextlib import suppress
 
 from automax_ros.core.types import Value
 from automax_ros.nodes.bus import Seating
-from automax_ros.nodes.context import joined_context
-from automax_ros.nodes.executor import make_executor
+from automax_ros.nodes.process import RosProcess
+from automax_ros.nodes.rack_node import RackNode
 from automax_ros.nodes.rack_nodes import RackNodes
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.rack import Rack
-
-_SPIN_S = 0.1
-"""Longest wait of the executor for an event."""
 
 
 class LiveRack:
@@ -32,27 +27,43 @@ class LiveRack:
     Make it, ``start`` it, then ``run``; ``close`` in any case. ``on_idle`` or a callback sets ``stopping``.
     """
 
-    def __init__(self, rack: Rack, arguments: RosArguments = NO_ARGUMENTS, seating: Seating | None = None) -> None:
-        """Initialise ROS for this process and create all nodes; ``seating`` is that of ``RackNodes``.
+    def __init__(
+        self,
+        rack: Rack,
+        arguments: RosArguments = NO_ARGUMENTS,
+        seating: Seating | None = None,
+        *,
+        process: RosProcess | None = None,
+        manager: RackNode | None = None,
+    ) -> None:
+        """Create all nodes.
+
+        Args:
+            rack: a rack that was not started.
+            arguments: what the nodes are told.
+            seating: the processes of a distributed rack, as ``RackNodes`` takes it.
+            process: the caller's part in the graph, who closes it; without one it is this rack's own.
+            manager: the caller's node ``rack``, as ``RackNodes`` takes it.
 
         Raises:
             RosUnavailable: ROS cannot be initialised.
         """
         self.rack = rack
         self.stopping = False
-        self._context = joined_context(arguments)
-        self._executor = make_executor(self._context)
+        self._process = RosProcess(arguments) if process is None else process
+        self._owns_process = process is None
+        self._executor, context = self._process.executor, self._process.context
         try:
-            self._nodes = RackNodes(rack, context=self._context, arguments=arguments, seating=seating)
+            with self._process.resting():
+                self.nodes = RackNodes(rack, context=context, arguments=arguments, manager=manager, seating=seating)
+                self.nodes.add_to(self._executor)
         except Exception:
             self._leave()
             raise
-        self._nodes.add_to(self._executor)
-        self.notes = self._nodes.notes
-        self._closing = False
-        self._spinning = threading.Thread(target=self._spin, name="executor", daemon=True)
-        self._spinning.start()
-        self.stream, self.health, self.bus = self._nodes.stream, self._nodes.health, self._nodes.bus
+        self.notes = self.nodes.notes
+        if process is None:
+            self._process.spin(self.nodes.nodes[0].guard)
+        self.stream, self.health, self.bus = self.nodes.stream, self.nodes.health, self.nodes.bus
 
     @property
     def missing(self) -> list[str]:
@@ -70,29 +81,22 @@ class LiveRack:
         Raises:
             SeatTaken: another process of this run has the same modules.
         """
-        return self._nodes.await_others(should_stop)
+        return self.nodes.await_others(should_stop)
 
     def start(self, settings: list[tuple[str, Value]]) -> None:
         """Begin the stream and put the rack into RUN; rack time starts in a moment."""
-        self._nodes.start(settings, paced=False)
+        self.nodes.start(settings, paced=False)
 
     def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:
         """Let the rack live until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
-        self._nodes.run(duration_ns, on_idle, lambda: self.stopping)
+        self.nodes.run(duration_ns, on_idle, lambda: self.stopping)
 
     def close(self) -> None:
-        """Stop the tasks, send what is still to be sent, destroy the nodes and end ROS in this process."""
-        self._closing = True
-        self._spinning.join()
-        self._nodes.close()
+        """Stop the tasks, send what is still to be sent, destroy the nodes, and end ROS unless the caller does."""
+        with self._process.resting():
+            self.nodes.close()
         self._leave()
 
     def _leave(self) -> None:
-        self._executor.shutdown()
-        self._context.try_shutdown()
-
-    def _spin(self) -> None:
-        guard = self._nodes.nodes[0].guard
-        with suppress(Exception):  # what an executor raises once the context is shut down
-            while not self._closing and self._context.ok():
-                guard.serve(self._executor, self._context, _SPIN_S)
+        if self._owns_process:
+            self._process.close()

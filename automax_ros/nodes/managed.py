@@ -44,6 +44,9 @@ _SUCCESS, _FAILURE, _ERROR = (
     TransitionCallbackReturn.ERROR,
 )
 
+Done = Callable[[Exception | None], None]
+"""Is told how a transition has ended: None where it succeeded."""
+
 
 class TransitionRefused(Exception):
     """A transition cannot be carried out now; the node keeps its state, and the text says why."""
@@ -53,7 +56,7 @@ class TransitionRefused(Exception):
 class Pending:
     """The rest of a transition that goes on elsewhere: ``begin`` gets what is called, once, with how it ended."""
 
-    begin: Callable[[Callable[[Exception | None], None]], None]
+    begin: Callable[[Done], None]
 
 
 class Duties(Protocol):
@@ -117,8 +120,8 @@ class Managed(LifecycleNodeMixin):  # type: ignore[misc]
         """The node's state, such as ``active``; between two that last, such as ``configuring``."""
         return str(self._state_machine.current_state[1])
 
-    def change(self, transition: str, done: Callable[[bool], None] = lambda _: None) -> None:
-        """Carry out a transition; ``done`` is called with whether it succeeded, later if it must wait.
+    def change(self, transition: str, done: Done = lambda _: None) -> None:
+        """Carry out a transition; ``done`` is called with what it ended with, later if it must wait.
 
         Raises:
             TransitionRefused: the node's state does not have this transition.
@@ -159,7 +162,7 @@ class Managed(LifecycleNodeMixin):  # type: ignore[misc]
         except Exception as error:  # rclpy's own class has no public name
             raise TransitionRefused(f"a node that is {self.state} has no transition {label}") from error
 
-    def _conclude(self, transition: str, error: Exception | None, done: Callable[[bool], None]) -> None:
+    def _conclude(self, transition: str, error: Exception | None, done: Done) -> None:
         """End a transition: by success, by failure, or by error processing where something unforeseen was raised."""
         result = _SUCCESS if error is None else _FAILURE if isinstance(error, TransitionRefused) else _ERROR
         if result is _FAILURE:
@@ -168,7 +171,7 @@ class Managed(LifecycleNodeMixin):  # type: ignore[misc]
         if result is _ERROR and error is not None:
             self._guard.report(f"transition {transition} failed, everything is stopped", error)
             self._trigger(self._failed().to_label())
-        done(result is _SUCCESS)
+        done(error)
 
     def _failed(self) -> TransitionCallbackReturn:
         try:
@@ -186,23 +189,23 @@ class Managed(LifecycleNodeMixin):  # type: ignore[misc]
             return response
 
         def begin(respond: Respond) -> None:
-            def done(success: bool) -> None:
-                response.success = success
+            def done(error: Exception | None) -> None:
+                response.success = error is None
                 respond(response)
 
             self._enter(lambda: self._try(name, done))
 
         return Later(begin)
 
-    def _try(self, transition: str, done: Callable[[bool], None]) -> None:
+    def _try(self, transition: str, done: Done) -> None:
         try:
             self.change(transition, done)
         except TransitionRefused as refused:
             self._tell(transition, str(refused))
-            done(False)
+            done(refused)
         except Exception as error:
             self._guard.report(f"transition {transition}", error)
-            done(False)
+            done(error)
 
     def _tell(self, transition: str, reason: str) -> None:
         self.get_logger().warning(f"transition {transition} refused: {reason}")

@@ -45,6 +45,7 @@ class RackNode(Managed, GuardedNode):
     ) -> None:
         """Join the graph, unconfigured; the arguments are those of ``GuardedNode`` and ``Managed.manage``."""
         GuardedNode.__init__(self, MAIN_NODE, namespace, context, health, arguments)
+        self.health = health
         self.manage(duties, self.guard, enter)
 
 

@@ -95,7 +95,7 @@ class RackNodes:
         self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
-        self.health = Health()
+        self.health = Health() if manager is None else manager.health
         self._executor: Any = None
         self._context = get_default_context() if context is None else context
         turns = Turns()
@@ -128,7 +128,8 @@ class RackNodes:
         except RosArgumentsError:
             self.close()
             raise
-        declared = {node.own_name: node.list_parameters([], 0).names for node in (*self.nodes, *self._own)}
+        managing = () if self.manager is None else (self.manager,)
+        declared = {node.own_name: node.list_parameters([], 0).names for node in (*self.nodes, *managing)}
         notes = without_use(arguments, self.rack.config, declared)
         for text in notes:
             self.nodes[0].get_logger().warning(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.views import bank_variables
 
 _START = Span(1, 1, 2)
+_NAME = re.compile(r"""^rack[ ]*:[ ]*(?:["']?)(\w{1,8})(?:["']?)[ ]*(?:#.*)?$""", re.MULTILINE)
 _TIMINGS, _LOSSES = [timing.value for timing in Timing], [loss.value for loss in ModuleLoss]
 KEYS: Keys = {
     "rack": named("The rack's name; in lower case its ROS 2 namespace.", RACK_NAME),
@@ -63,6 +65,19 @@ class LoadResult:
     config: RackConfig | None
     diagnostics: list[Diagnostic]
     source: SourceText
+
+    @property
+    def namespace(self) -> str | None:
+        """The rack's namespace, None where even its name cannot be made out.
+
+        With errors elsewhere, in the YAML itself too, it is that of the first line ``rack: NAME`` (decision: so the
+        rack has its place in the graph while the rest of the file is mended).
+        """
+        if self.config is not None:
+            return self.config.namespace
+        found = _NAME.search(self.source.text)
+        name = found[1].upper() if found is not None else ""
+        return namespace(name) if is_rack_name(name) else None
 
 
 def load(path: str | Path, *, allow_outside: bool = False) -> LoadResult:

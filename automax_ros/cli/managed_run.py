@@ -1,0 +1,222 @@
+"""`automax run` on the wall clock as a lifecycle manager sees it: the node ``rack``, and the rack it stands for.
+
+What the node's transitions do is done here, by the program's own loop: a manager that asks for one gets its answer when
+the loop has carried it out, between two scans.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from automax_ros.bags.errors import BagError
+from automax_ros.cli.live_session import LiveSession
+from automax_ros.cli.run_plan import RunPlan
+from automax_ros.cli.signals import CutShort, StopRequest
+from automax_ros.cli.stimuli_file import StimuliRefused
+from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.core.diagnostics import render
+from automax_ros.core.faults import Fault
+from automax_ros.nodes.managed import ACTIVATE, CLEANUP, CONFIGURE, FINALIZED, TransitionRefused
+from automax_ros.nodes.managed_module import NOT_OPERATED
+from automax_ros.nodes.process import RosProcess
+from automax_ros.nodes.rack_node import RackNode
+from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.rack.installation import RackError
+from automax_ros.rack.operations import OperationRefused
+from automax_ros.running.health import Health
+
+_LOOK_S = 0.05
+"""Longest wait while no rack runs."""
+_MOST_TOLD = 100
+"""Most findings of a file that go to the log."""
+_FAULTS = (RackError, StimuliRefused, BagError, Fault)
+"""What a rack can have against being configured: things for the person to mend."""
+_PARTS_END = "the rack runs in several processes: they are started and ended by `automax run --distributed`"
+
+
+@dataclass(frozen=True)
+class Managed:
+    """What is managed: a rack's name in the graph, and how its plan is read.
+
+    ``plan`` is that of the first configuration where it was read already; ``read`` reads the files (again).
+    """
+
+    namespace: str
+    read: Callable[[], RunPlan]
+    plan: RunPlan | None = None
+    ros: RosArguments = NO_ARGUMENTS
+
+
+class ManagedRun:
+    """Carries out the transitions of one rack's node, and lets the rack live in between."""
+
+    def __init__(self, managed: Managed, process: RosProcess, stop: StopRequest, domain: int) -> None:
+        self._managed, self._process, self._stop, self._domain = managed, process, stop, domain
+        self._asked: deque[Callable[[], None]] = deque()
+        self._session: LiveSession | None = None
+        self._ended = self._was_active = self._is_starting = self._broken = False
+        self._sessions = self._code = 0
+        self._node = RackNode(managed.namespace, process.context, Health(), self, self._asked.append, managed.ros)
+        process.executor.add_node(self._node)
+        process.spin(self._node.guard)
+
+    @property
+    def code(self) -> int:
+        """The exit code: how the last run ended."""
+        return 1 if self._broken else self._code
+
+    def autostart(self) -> None:
+        """Configure and activate.
+
+        Raises:
+            RackError, StimuliRefused, BagError, Fault: what keeps the rack from it.
+        """
+        self._is_starting = True
+        for transition in (CONFIGURE, ACTIVATE):
+            if not self._stop.requested:
+                self._node.change(transition, self._started)
+        self._is_starting = False
+
+    def run(self) -> None:
+        """Let the rack live, and carry transitions out, until a signal, the run's duration or a shutdown."""
+        while not (self._stop.requested or self._ended):
+            if self._node.state == FINALIZED:  # everything has failed, even stopping
+                self._broken = True
+                return
+            while self._asked:
+                self._asked.popleft()()
+            if self._session is None or not self._session.has_begun:
+                time.sleep(_LOOK_S)
+                continue
+            session = self._session
+            session.run(self._is_wanted)
+            if session.is_over:
+                self._ended = True
+
+    def close(self) -> None:
+        """End what runs, and leave the graph."""
+        try:
+            self._end_session()
+        finally:
+            with self._process.resting():
+                self._process.executor.remove_node(self._node)
+                self._node.destroy_node()
+
+    # Duties
+
+    def refusal(self, transition: str) -> str | None:
+        """Without an operator only a rack that was never active may be managed (decision: somebody must start it).
+
+        One that runs in several processes is configured by starting them (decision).
+        """
+        plan = None if self._session is None else self._session.plan
+        if plan is None:
+            return None
+        if plan.seat is not None and transition == CLEANUP:
+            return _PARTS_END
+        return NOT_OPERATED if self._was_active and not plan.config.operator else None
+
+    def configure(self) -> None:
+        """Read the files and compile: the nodes of the modules appear."""
+        try:
+            self._configure()
+        except CutShort as cut:
+            raise TransitionRefused("the program ends") from cut
+        except _FAULTS as fault:
+            self._tell(fault)
+            raise TransitionRefused(str(fault) or "the stimuli have errors") from fault
+
+    def activate(self) -> None:
+        """Start the rack, or put all of its tasks into RUN again."""
+        session = self._expected()
+        if session.has_begun:
+            self._operate(session.live.nodes.activate)
+        else:
+            self._start(session)
+        self._was_active = True
+
+    def deactivate(self) -> None:
+        """STOP ALL."""
+        self._operate(self._expected().live.nodes.deactivate)
+
+    def cleanup(self) -> None:
+        """Let the nodes of the modules leave the graph; what is not volatile is kept, the recording is finished."""
+        self._end_session()
+
+    def shutdown(self) -> None:
+        """End the program as SIGTERM does."""
+        self._ended = True
+
+    def fail(self) -> None:
+        """STOP ALL, and let the nodes of the modules leave the graph."""
+        session = self._session
+        if session is not None and session.rack.operations.powered:
+            session.rack.operations.stop_all("a transition of the node rack failed")
+        self._end_session()
+
+    def _configure(self) -> None:
+        plan = self._managed.plan if self._sessions == 0 and self._managed.plan is not None else self._managed.read()
+        if plan.config.namespace != self._managed.namespace:
+            now, before = plan.config.namespace, self._managed.namespace
+            raise RackError(f"the rack is called {now} now, this is the node of {before}: start the program again")
+        plan = replace(plan, record=_numbered(plan.record, self._sessions + 1))
+        self._session = LiveSession(plan, self._process, self._node, self._stop, self._domain)
+        self._sessions += 1
+
+    def _start(self, session: LiveSession) -> None:
+        try:
+            if not session.start(self._stop):
+                raise TransitionRefused("the program ends")
+        except Fault as fault:
+            raise TransitionRefused(str(fault)) from fault
+
+    def _end_session(self) -> None:
+        session, self._session = self._session, None
+        if session is not None:
+            self._code = session.close()
+
+    def _is_wanted(self) -> bool:
+        return self._stop.requested or self._ended or bool(self._asked)
+
+    def _started(self, error: Exception | None) -> None:
+        """Raise what keeps the rack from its autostart, but for a signal."""
+        if error is not None and not self._stop.requested:
+            raise error.__cause__ or error
+
+    def _expected(self) -> LiveSession:
+        assert self._session is not None, "only a configured node has this transition"
+        return self._session
+
+    def _operate(self, operation: Callable[[], None]) -> None:
+        try:
+            operation()
+        except OperationRefused as refused:
+            raise TransitionRefused(str(refused)) from refused
+
+    def _tell(self, fault: Exception) -> None:
+        """Log what keeps the rack from being configured; at an autostart the command prints it as it ends."""
+        if not self._is_starting:
+            _print_fault(fault)
+        found = [(item, where) for where, items in getattr(fault, "findings", ()) for item in items]
+        for item, where in found[:_MOST_TOLD]:
+            self._node.get_logger().error(render(item, where))
+
+
+def _print_fault(fault: Exception) -> None:
+    """Print what keeps a rack from being configured on standard error."""
+    for source, diagnostics in getattr(fault, "findings", ()):
+        print_diagnostics(diagnostics, source, sys.stderr)
+    if str(fault):
+        print(f"automax run: {fault}", file=sys.stderr, flush=True)
+
+
+def _numbered(folder: Path | None, number: int) -> Path | None:
+    """Return where the nth run of a program is recorded: each has a folder, DIR, DIR_2, DIR_3 (decision)."""
+    if folder is None or number == 1:
+        return folder
+    return folder.with_name(f"{folder.name}_{number}")

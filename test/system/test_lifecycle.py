@@ -1,0 +1,111 @@
+"""`automax run --no-autostart` under a lifecycle manager, over real DDS."""
+
+import re
+import shutil
+import signal
+
+import pytest
+from nodes.managing import ACTIVE, INACTIVE, UNCONFIGURED, Manager
+
+from automax_ros.bags.reader import BagReader
+
+from .support import RACKS, TYPES, Automax, Client
+
+WAITS = "is unconfigured"
+
+
+@pytest.fixture
+def rack(tmp_path):
+    """A copy of a rack that may be broken and mended."""
+    folder = tmp_path / "rack"
+    shutil.copytree(RACKS / "operated", folder)
+    return folder / "rack.yaml"
+
+
+def manager_of(client, space="/operated"):
+    return Manager(client, space, client.until)
+
+
+def test_a_manager_brings_a_rack_up_and_down_again(ros_domain_id, rack, tmp_path):
+    """Errors in the file and in a task fail the transition with what is wrong; mended, the rack runs twice."""
+    from rcl_interfaces.msg import Log
+    from std_msgs.msg import Int16
+
+    text, bag = rack.read_text(), tmp_path / "bag"
+    task = rack.with_name("LINE.BLK")
+    source = task.read_text()
+    rack.write_text(text.replace("tick_ms: 5.5", "tick_ms: 0.1"))
+    with Automax("run", rack, "--no-autostart", "--record", bag) as process, Client() as client:
+        process.wait_for_line(WAITS)
+        logs = client.listen(Log, "/rosout")
+        manager = manager_of(client)
+        assert manager.state("rack") == UNCONFIGURED
+        assert not manager.ask("rack", "activate")
+        assert not manager.ask("rack", "configure")
+        client.until(lambda: any("rack.yaml:" in item.msg and "error[" in item.msg for item in logs))
+        rack.write_text(text)
+        task.write_text(source.replace("COUNT! + 1", "NIL! + 1"))
+        assert not manager.ask("rack", "configure")
+        client.until(lambda: any("NIL!" in item.msg and "LINE.BLK:" in item.msg for item in logs))
+        assert manager.state("rack") == UNCONFIGURED
+        task.write_text(source)
+        assert manager.ask("rack", "configure")
+        assert manager.state("rack") == manager.state("processor_1") == INACTIVE
+        assert not manager.ask("processor_1", "activate"), "the node rack comes first"
+        out = client.listen(Int16, "/operated/common/OUT", latched=True, depth=1)
+        assert manager.ask("rack", "activate")
+        client.until(lambda: bool(out) and out[-1].data != 0, "the task's output")
+        assert manager.state("processor_1") == ACTIVE
+        assert manager.ask("rack", "deactivate")
+        client.until(lambda: out[-1].data == 0, "an output that is off")
+        assert manager.ask("rack", "activate")
+        client.until(lambda: out[-1].data != 0, "the task's output, again")
+        assert manager.ask("rack", "deactivate")
+        assert manager.ask("rack", "cleanup")
+        client.until(lambda: "processor_1" not in client.node.get_node_names())
+        assert manager.ask("rack", "configure")
+        assert manager.ask("rack", "activate")
+        assert manager.ask("rack", "shutdown")
+        ended = process.end()
+    assert ended.code == 0
+    assert re.search(r"rack.yaml:\d+:\d+: error\[AMX\d+\]: .*tick", ended.err)
+    assert "LINE.BLK:" in ended.err
+    assert "Traceback" not in ended.err
+    for folder in (bag, bag.with_name("bag_2")):
+        whats = [item.message.what for item in BagReader(folder).messages(topics={"/operated/operations"})]
+        assert whats == (["stop_all", "run_all", "stop_all"] if folder == bag else [])
+
+
+def test_without_an_operator_a_manager_may_start_a_rack_but_not_stop_it(ros_domain_id):
+    with Automax("run", TYPES, "--no-autostart") as process, Client() as client:
+        process.wait_for_line(WAITS)
+        manager = manager_of(client, "/types")
+        assert manager.ask("rack", "configure")
+        assert manager.ask("rack", "cleanup")
+        assert manager.ask("rack", "configure")
+        assert manager.ask("rack", "activate")
+        for transition in ("deactivate", "shutdown"):
+            assert not manager.ask("rack", transition)
+        assert manager.state("rack") == ACTIVE
+        ended = process.end(signal.SIGTERM)
+    assert (ended.code, ended.err) == (0, "")
+
+
+def test_a_fault_leaves_the_node_active(ros_domain_id):
+    """A manager that finds a node inactive without having asked for it brings the system down."""
+    from std_msgs.msg import Bool
+
+    with Automax("run", RACKS / "stuck" / "rack.yaml") as process, Client() as client:
+        process.wait_for_line("Ctrl-C ends the run")
+        client.send(Bool, "/stuck/common/GO/set", Bool(data=True))
+        process.wait_for_line("STOP ALL (code 14)")
+        assert manager_of(client, "/stuck").state("rack") == ACTIVE
+        assert process.end(signal.SIGINT).code == 1
+
+
+def test_a_file_without_a_name_cannot_wait(ros_domain_id, tmp_path):
+    (tmp_path / "rack.yaml").write_text("slots: {}\n")
+    with Automax("run", tmp_path / "rack.yaml", "--no-autostart") as process:
+        ended = process.end()
+    assert ended.code == 2
+    assert "says no name of a rack" in ended.err
