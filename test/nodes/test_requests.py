@@ -117,7 +117,7 @@ def test_failure_before_our_callback_is_reached_does_not_end_the_loop(live, monk
             time.sleep(min(timeout_sec, 0.01))
             raise RuntimeError("unheard of")
 
-    monkeypatch.setattr(live, "_executor", Failing())
+    monkeypatch.setattr(live._process, "executor", Failing())
     live.run(live.rack.now_ns + NS_PER_S // 5, lambda _: None)
     monkeypatch.undo()
     assert_told(live)
