@@ -72,7 +72,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record until Ctrl-C, the duration has passed or the rack starts again; 1 where recording broke off."""
+    """Record until Ctrl-C, the duration has passed or the rack starts again.
+
+    1 where recording broke off or ended by itself, or holds nothing (decision: a script must see that).
+    """
     storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
     how = _Storing(storage, arguments.split_s or 0, arguments.tasks)
     with stop_signals() as stop:
@@ -146,6 +149,8 @@ class _Session:
             table = self._recorder.find(wait_ns, lambda: self._stop.requested)
         except CdrError as error:
             raise UsageError(f"{self._space}/variables is not a rack's table: {error}") from error
+        if not self._recorder.binding.tells_senders:
+            self._line.message("warning: this ROS 2 does not tell who sends: what others publish is recorded too")
         if table is not None or self._stop.requested:
             return table
         there = self._recorder.racks()
@@ -194,9 +199,11 @@ class _Session:
             time.sleep(LOOK_S)
 
     def _notes(self, recording: LiveRecording) -> None:
-        for note in recording.notes:
+        news = self._recorder.binding.news
+        for note in (*recording.notes, *news):
             self._line.message(note)
         recording.notes.clear()
+        news.clear()
 
     def _show(self, recording: LiveRecording) -> None:
         passed = self._line.due()
@@ -257,6 +264,9 @@ class _Session:
             self._line.message(f"  {count_of(lost, 'value')} of common topics did not come; the write log has them")
         if recording.malformed:
             self._line.message(f"  {count_of(recording.malformed, 'malformed message')} left out")
+        foreign = sum(self._recorder.binding.refused.values())
+        if foreign:
+            self._line.message(f"  {count_of(foreign, 'message')} of other programs left out")
         for item in recording.lacks if recording.first_stamp is not None else ():
             self._line.message(f"  the bag lacks {item}")
         if recording.failure is not None:
@@ -264,7 +274,7 @@ class _Session:
             return 1
         size = sum(item.stat().st_size for item in folder.iterdir())
         self._line.message(f"recorded {folder}: {size / 1e6:.2f} MB")
-        return 0
+        return 1 if recording.ended is not None or recording.first_stamp is None else 0
 
 
 def _rack(text: str, ros: RosArguments) -> tuple[str, list[RackFile]]:

@@ -13,6 +13,7 @@ from rclpy.parameter import Parameter
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.context import joined_context
+from automax_ros.nodes.participants import racks_of
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 
 _LOOK_S = 0.05
@@ -108,7 +109,7 @@ class RackClient:
         self._executor.spin_once(timeout_sec=_LOOK_S)
 
     def _racks(self) -> int:
-        return int(self._node.count_publishers(f"{self._space}/variables"))
+        return len(racks_of(self._node, self._space))
 
     def _operators(self) -> int:
         nodes = self._node.get_node_names_and_namespaces()

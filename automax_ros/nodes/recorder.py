@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +24,27 @@ from automax_ros.bags.live.arrival import ArrivalOrder
 from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.live.topics import LiveTopics, TopicKind
 from automax_ros.bags.writer import StorageOptions
+from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.nodes.binding import MOST_TABLES, Binding
 from automax_ros.nodes.context import joined_context
+from automax_ros.nodes.participants import participant
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.nodes.taking import Taken, taker_of
 from automax_ros.nodes.topics import message_class
+from automax_ros.wire.bus_messages import Presence
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import table_of
 from automax_ros.wire.messages import VariableTable
-from automax_ros.wire.qos import LATCHED
+from automax_ros.wire.qos import LATCHED, SCAN
 from automax_ros.wire.rack_files import RackFile, RackFilesError, files_from_text
 
 LOOK_S = 0.025
 """Time between two looks at the topics."""
 HOLD_NS = 250 * NS_PER_MS
 """How long a message waits for those that were sent before it and came later."""
+MOST_BYTES = 64 << 20
+"""Longest message that is read (decision: an image of the largest rack is a fraction of it)."""
 READER_DEPTH = 10_000
 """Messages of one topic that wait in this process when it is held up."""
 FILES_WAIT_NS = 3 * NS_PER_S
@@ -45,6 +53,11 @@ _KNOCK_NS = NS_PER_S
 _MOST_KNOCKS = 5
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _FILES = TopicKind("std_msgs/msg/String", LATCHED)
+_PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
+
+
+class SeveralRacks(Fault):
+    """Several racks have one name in this ROS domain."""
 
 
 class RawSubscription:
@@ -62,18 +75,12 @@ class RawSubscription:
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )
         self._subscription = node.create_subscription(self._class, topic, _nothing, qos, raw=True)
+        self._taker = taker_of(self._subscription, MOST_BYTES)
 
-    def taken(self) -> Iterator[tuple[int, int, bytes]]:
-        """Return the messages that have come: time of sending, the sender's number or 0, bytes."""
-        handle = self._subscription.handle
-        with handle:
-            while True:
-                found = handle.take_message(self._class, True)
-                if found is None:
-                    return
-                payload, information = found
-                number = information.get("publication_sequence_number") or 0
-                yield information["source_timestamp"], number, payload
+    def taken(self) -> Iterator[Taken]:
+        """Return the messages that have come; one that is longer than any of a rack's has no bytes."""
+        while (found := self._taker.take()) is not None:
+            yield found
 
     def close(self) -> None:
         """End the subscription."""
@@ -128,6 +135,9 @@ class LiveRecorder:
         self._next_knock = 0
         self._knock_count = 0
         self._files_begun = 1
+        self.binding = Binding(self._node, space)
+        self._presences: RawSubscription | None = None
+        self._run_id = 0
 
     def racks(self) -> list[str]:
         """Return the namespaces of the racks that are there."""
@@ -135,21 +145,41 @@ class LiveRecorder:
 
     @property
     def is_there(self) -> bool:
-        """Whether the rack's table of variables has a sender."""
-        return bool(self._node.count_publishers(self._topics.variables))
+        """Whether the rack that is recorded is in the graph."""
+        return self.binding.is_there
 
     def find(self, wait_ns: int, stopping: Callable[[], bool]) -> VariableTable | None:
-        """Wait for the rack's table; None if it does not come.
+        """Wait for the rack's table; None if it does not come. From then on only that rack's messages count.
 
         Raises:
             CdrError: what comes is not a table.
+            SeveralRacks: several racks have this name.
         """
         source = RawSubscription(self._node, self._topics.variables, self._topics.all[self._topics.variables])
+        tables: dict[bytes, Taken] = {}
+        deadline = time.monotonic_ns() + wait_ns
         try:
-            self._table = _last(source, wait_ns, stopping)
+            while not stopping() and time.monotonic_ns() < deadline:
+                for found in source.taken():
+                    tables[participant(found.sender)] = found
+                racks = self.binding.racks() if self.binding.tells_senders else set(tables)
+                if len(tables) > MOST_TABLES:
+                    tables = {sender: found for sender, found in tables.items() if sender in racks}
+                if len(racks) > 1:
+                    raise SeveralRacks(f"{len(racks)} racks are called {self._space}", "stop one of them")
+                for rack in racks & tables.keys():
+                    return self._bound_to(tables[rack])
+                time.sleep(LOOK_S)
         finally:
             source.close()
-        return table_of(self._table) if self._table else None
+        return None
+
+    def _bound_to(self, found: Taken) -> VariableTable:
+        self.binding.bind(found.sender)
+        self._table = found.payload or b""
+        table = table_of(self._table)
+        self._run_id = table.run_id
+        return table
 
     def files(self, stopping: Callable[[], bool]) -> list[RackFile]:
         """Return the files that the rack runs from; none if it does not offer them.
@@ -158,11 +188,16 @@ class LiveRecorder:
             RackFilesError: what it sends are none.
         """
         source = RawSubscription(self._node, self._topics.config, _FILES)
+        deadline = time.monotonic_ns() + FILES_WAIT_NS
         try:
-            payload = _last(source, FILES_WAIT_NS, stopping)
+            while time.monotonic_ns() < deadline and not stopping():
+                found = [item.payload for item in self._ours(source) if item.payload]
+                if found:
+                    return _files(found[-1])
+                time.sleep(LOOK_S)
         finally:
             source.close()
-        return _files(payload) if payload else []
+        return []
 
     def open(
         self,
@@ -186,6 +221,9 @@ class LiveRecorder:
         first += [topics.snapshot, topics.scans, topics.states]
         self._subscriptions = [RawSubscription(self._node, name, kinds[name]) for name in first]
         self._files = RawSubscription(self._node, topics.config, _FILES)
+        presence = f"{self._space}/bus/presence"
+        if presence in offered:
+            self._presences = RawSubscription(self._node, presence, _PRESENCE)
         return self.recording
 
     def step(self) -> None:
@@ -221,20 +259,43 @@ class LiveRecorder:
         self._context.try_shutdown()
 
     def _look(self) -> None:
+        self._meet_processes()
+        table = self.binding.successor()
+        if table is not None:
+            self._order.add(table.sent_ns, (self._topics.variables, table.payload or b""))
         for subscription in self._subscriptions:
             topic = subscription.topic
-            for sent_ns, number, payload in subscription.taken():
+            for found in self._ours(subscription):
                 if topic in self._topics.values:
-                    self._count_lost(topic, number)
-                self._order.add(sent_ns, (topic, payload))
+                    self._count_lost(topic, found.number)
+                self._order.add(found.sent_ns, (topic, found.payload or b""))
+
+    def _ours(self, subscription: RawSubscription) -> Iterator[Taken]:
+        """Return what has come from the rack."""
+        topic, binding = subscription.topic, self.binding
+        for found in subscription.taken():
+            if binding.is_ours(topic, found):
+                yield found
+            elif topic == self._topics.variables:
+                binding.keep(found)
+
+    def _meet_processes(self) -> None:
+        """Learn which participants are the processes of a rack that is cut into several."""
+        if self._presences is None:
+            return
+        for found in self._presences.taken():
+            with suppress(CdrError):
+                presence = decode(_PRESENCE.type_name, found.payload or b"")
+                if isinstance(presence, Presence) and presence.run_id == self._run_id:
+                    self.binding.admit(found.sender)
 
     def _look_at_files(self) -> None:
         """Store the source of a task that was reloaded meanwhile: the rack tells its files again then."""
         assert self._files is not None
         assert self.recording is not None
-        for _, _, payload in self._files.taken():
+        for found in self._ours(self._files):
             try:
-                self.recording.store(_files(payload))
+                self.recording.store(_files(found.payload or b""))
             except RackFilesError as error:
                 self.recording.notes.append(f"left out what {self._topics.config} told: {error}")
 
@@ -261,17 +322,6 @@ class LiveRecorder:
             self._knock_count += 1
             kinds = self._topics.all
             self._knocks = [RawSubscription(self._node, name, kinds[name]) for name in wanted]
-
-
-def _last(source: RawSubscription, wait_ns: int, stopping: Callable[[], bool]) -> bytes:
-    """Wait for messages on a latched topic and return the last one, empty if none comes."""
-    deadline = time.monotonic_ns() + wait_ns
-    while time.monotonic_ns() < deadline and not stopping():
-        found = list(source.taken())
-        if found:
-            return max(found)[2]
-        time.sleep(LOOK_S)
-    return b""
 
 
 def _files(payload: bytes) -> list[RackFile]:

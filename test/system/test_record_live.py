@@ -153,7 +153,7 @@ def test_restarted_rack_ends_the_recording(ros_domain_id, tmp_path):
             with Automax("run", TYPES) as second:
                 second.wait_for_line(READY)
                 ended = recorder.end()
-    assert (ended.code, ended.err) == (0, "")
+    assert (ended.code, ended.err) == (1, "")
     assert "the rack was started again: the recording ends here" in ended.out
     runs = {item.message.run_id for item in BagReader(bag).messages(types={"automax_msgs/msg/CommonWrite"})}
     assert len(runs) == 1
