@@ -4,18 +4,22 @@ Publishes: ``/dcsnet/NETWORK`` (automax_msgs/NetworkDrop), one message for each 
 cycle of 5.5 ms; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second, and at once when a drop is lost or
 heard again, or another module uses its drops.
 
-Subscribes: ``/dcsnet/NETWORK``. Messages wait as bytes, the last ``MOST_WAITING``; once per cycle those that wait are
-read, longer ones than any of a station unread, and given to the module between two scans.
+Subscribes: ``/dcsnet/NETWORK``. Messages are taken at the rack's door as bytes, longer ones than any of a station are
+dropped unread; the last ``MOST_WAITING`` wait for the next cycle, are read then, and given to the module between two
+scans.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.nodes.rcl import library
+from automax_ros.nodes.taking import taker_of
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.modules.network import CYCLE_NS
@@ -24,7 +28,7 @@ from automax_ros.rack.modules.network_registers import HALF
 from automax_ros.rack.names import is_rack_name
 from automax_ros.rack.ros_names import network_topic
 from automax_ros.running.scheduler import EventClass, EventKey
-from automax_ros.wire.cdr import CdrError, decode, encode
+from automax_ros.wire.cdr import MAX_TRAILING, CdrError, decode, encode
 from automax_ros.wire.messages import NetworkDrop
 from automax_ros.wire.qos import NETWORK
 from automax_ros.wire.topics import Topic
@@ -32,8 +36,8 @@ from automax_ros.wire.topics import Topic
 TYPE = "automax_msgs/msg/NetworkDrop"
 MOST_WAITING = NETWORK.depth
 """Messages that wait for the next cycle; of more the oldest are lost, as they would be on DDS's side."""
-MOST_BYTES = len(encode(NetworkDrop(0, 0, "R" * 8, 0, 0, 0, False, 0, 0, (0,) * HALF)))
-"""Length of the longest message that a station sends."""
+MOST_BYTES = len(encode(NetworkDrop(0, 0, "R" * 8, 0, 0, 0, False, 0, 0, (0,) * HALF))) + MAX_TRAILING
+"""Length of the longest message that a station sends, with what a DDS may put after it."""
 
 
 class NetworkNode(ModuleNode):
@@ -48,14 +52,11 @@ class NetworkNode(ModuleNode):
         self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
         self._told: tuple[object, ...] = ("", (), ())
         self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
-        self.create_subscription(message_class(TYPE), name, self._hear, ros_qos(NETWORK), raw=True)
+        site.door.add(_Cable(self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK)), self._waiting))
         module.connect(self._send)
         scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
         scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._look())
         self.diagnose(self._health)
-
-    def _hear(self, payload: bytes) -> None:
-        self._waiting.append(payload if len(payload) <= MOST_BYTES else b"")
 
     def _send(self, now_ns: int, frames: Sequence[Frame]) -> None:
         stream, rack = self.site.stream, self.site.rack.config.name
@@ -120,6 +121,27 @@ class NetworkNode(ModuleNode):
             **{name: str(count) for name, count in status.counters},
         }
         return [self.status(self._model, level, text, self._slot, values)]
+
+
+class _Cable:
+    """The network's topic, as the rack's door serves it: what comes joins those that wait."""
+
+    def __init__(self, subscription: Any, waiting: deque[bytes]) -> None:
+        self.name, self.handle, self._waiting = subscription.topic_name, subscription.handle, waiting
+        self._taker = taker_of(subscription, MOST_BYTES)
+
+    def take(self) -> bool:
+        """Take the next message, b"" in place of one that is too long."""
+        taken = self._taker.take()
+        if taken is not None:
+            self._waiting.append(taken.payload or b"")
+        return taken is not None
+
+    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
+        """Let rcl call a function for each message."""
+        rcl = library()
+        assert rcl is not None
+        return int(rcl.on_message(pointer, callback, data))
 
 
 def _read(payload: bytes) -> tuple[Sender, Frame] | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from automax_ros.nodes.bus import Seating
 from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.rack_nodes import RackNodes
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
@@ -16,6 +17,7 @@ from automax_ros.rack.config import RackConfig
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.seating import Seat
 
+_ANY_RUN = 1
 _Names = Callable[[str, str], list[tuple[str, list[str]]]]
 
 
@@ -37,16 +39,17 @@ def enclaves_of_seats(
     Raises:
         RackError, RosUnavailable: as above.
     """
+    seating = Seating([seat.slots for seat in seats], _ANY_RUN)
     return tuple(
-        Enclave(f"/{config.namespace}/{seat.name}", _profiles(Rack(config, local=seat.slots), arguments))
+        Enclave(f"/{config.namespace}/{seat.name}", _profiles(Rack(config, local=seat.slots), arguments, seating))
         for seat in seats
     )
 
 
-def _profiles(rack: Rack, arguments: RosArguments) -> tuple[Profile, ...]:
+def _profiles(rack: Rack, arguments: RosArguments, seating: Seating | None = None) -> tuple[Profile, ...]:
     context = joined_context(arguments)
     try:
-        with RackNodes(rack, context=context, arguments=arguments) as made:
+        with RackNodes(rack, context=context, arguments=arguments, seating=seating) as made:
             managers = [] if made.manager is None else [made.manager]
             return tuple(_profile(node) for node in (*managers, *made.nodes))
     finally:

@@ -83,6 +83,7 @@ def test_a_recorder_needs_no_more_than_its_enclave_allows(client, tmp_path):
 
 def test_processes_of_a_distributed_rack_have_enclaves_of_their_own(ros_domain_id):
     from automax_ros.nodes.security.opened import enclaves_of_seats
+    from automax_ros.nodes.security.profiles import operator_of
 
     config = replace(config_of(LINE), namespace="plant/line1")
     enclaves = {item.path: item for item in enclaves_of_seats(config, seats_of(config))}
@@ -92,6 +93,10 @@ def test_processes_of_a_distributed_rack_have_enclaves_of_their_own(ros_domain_i
     assert "/plant/dcsnet/PAPER" not in processor.names("publish")
     assert "/plant/line1/scans" in processor.names("publish")
     assert "/plant/line1/scans" not in network.names("publish")
+    for enclave in enclaves.values():
+        assert {"/plant/line1/bus", "/plant/line1/bus/presence"} <= set(enclave.names("publish"))
+        assert {"/plant/line1/bus", "/plant/line1/bus/presence"} <= set(enclave.names("subscribe"))
+    assert not any("bus" in name for name in operator_of("/plant/line1", enclaves.values()).names("publish"))
 
 
 def test_a_rack_with_an_error_has_no_policy(tmp_path):
