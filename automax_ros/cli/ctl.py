@@ -13,11 +13,12 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from automax_ros.cli.ctl_actions import ACTIONS, Action, Ask
+from automax_ros.cli.ctl_actions import ACTIONS
+from automax_ros.cli.ctl_ask import Action, Ask
 from automax_ros.cli.ctl_watch import values_of, watch
 from automax_ros.cli.rack_space import space_of
 from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
-from automax_ros.cli.signals import stop_signals
+from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds_above_0
 
@@ -47,21 +48,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask the rack; 1 where it refused something, 2 where it could not be asked."""
+    with stop_signals() as stop:
+        domain = prepare_ros(arguments)
+        from automax_ros.nodes.operating import Interrupted, NotOperable
+
+        try:
+            return _run(arguments, stop)
+        except Interrupted:
+            return stop.code
+        except NotOperable as fault:
+            raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault
+
+
+def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
+    from automax_ros.nodes.operating import RackClient
+
     action = ACTIONS[arguments.action]
-    domain = prepare_ros(arguments)
     ros = ros_arguments(arguments)
     space = space_of(arguments.rack, ros)
     asks = action.asks(arguments)
-    from automax_ros.nodes.operating import NotOperable, RackClient
-
-    try:
-        with RackClient(space, ros) as client:
+    with RackClient(space, ros, lambda: stop.requested) as client:
+        if action.by_operator:
             client.find(arguments.timeout)
-            if action.repeats:
-                return _watched(client, asks[0], arguments)
-            answers = [(ask, _answer(client, ask, arguments.timeout)) for ask in asks]
-    except NotOperable as fault:
-        raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault
+        if action.repeats:
+            return _watched(client, asks[0], arguments, stop)
+        answers = [(ask, _answer(client, ask, arguments.timeout)) for ask in asks]
     if arguments.json:
         _print_json(action, arguments.action, answers)
     else:
@@ -73,7 +84,9 @@ class _Refused(Exception):
     """What was asked for was refused; the text says why."""
 
 
-def _watched(client: RackClient, ask: Ask, arguments: argparse.Namespace) -> int:
+def _watched(client: RackClient, ask: Ask, arguments: argparse.Namespace, stop: StopRequest) -> int:
+    from automax_ros.nodes.operating import Interrupted
+
     def read() -> list[dict[str, str]]:
         answer = _answer(client, ask, arguments.timeout)
         if not _ok(answer):
@@ -81,8 +94,9 @@ def _watched(client: RackClient, ask: Ask, arguments: argparse.Namespace) -> int
         return values_of(answer)
 
     try:
-        with stop_signals() as stop:
-            watch(read, arguments, lambda: stop.requested)
+        watch(read, arguments, lambda: stop.requested)
+    except Interrupted:
+        return 0
     except _Refused as refusal:
         print(f"automax ctl: watch {ask.of}: refused: {refusal}", file=sys.stderr)
         return 1

@@ -8,44 +8,16 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from automax_ros.cli.ctl_ask import Action, Ask
+from automax_ros.cli.ctl_lifecycle import LIFECYCLE
 from automax_ros.cli.ctl_watch import add_watch_arguments, values_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import quoted
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.task_source import read_task_source
-
-
-@dataclass(frozen=True)
-class Ask:
-    """One request: the service, its type as ``package/Type``, the request's fields, and what it is about.
-
-    ``worded`` puts the rack's words into the person's, who knows files of this computer.
-    """
-
-    service: str
-    type_name: str
-    fields: Mapping[str, Any] = field(default_factory=dict)
-    of: str = ""
-    worded: Callable[[str], str] = str
-
-
-@dataclass(frozen=True)
-class Action:
-    """An action: its line of help, its arguments, its requests, and for a reading what an answer holds.
-
-    ``read`` returns data for JSON, ``lines`` how a person reads them. One that ``repeats`` asks again and again.
-    """
-
-    help: str
-    asks: Callable[[argparse.Namespace], list[Ask]]
-    add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
-    read: Callable[[Any], Any] | None = None
-    lines: Callable[[Any], Iterable[str]] = lambda _: ()
-    repeats: bool = False
 
 
 def _tasks(parser: argparse.ArgumentParser) -> None:
@@ -239,5 +211,6 @@ ACTIONS: Mapping[str, Action] = {
         read=_fields,
         lines=_status_lines,
     ),
+    "lifecycle": LIFECYCLE,
 }
 """What can be asked, by the word for it."""

@@ -1,6 +1,6 @@
 """The command line `automax`: finds the subcommand, runs it, and turns what goes wrong into exit codes.
 
-At the top stands only what every Python has loaded already: imports inside `main` may be interrupted by Ctrl-C.
+At the top stands only what every Python has loaded already: what is imported later may be interrupted by signals.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ import io
 import os
 import sys
 from typing import TYPE_CHECKING
+
+from automax_ros.cli import early
 
 if TYPE_CHECKING:
     import argparse
@@ -61,14 +63,13 @@ BROKEN_PIPE = 141
 
 
 def entry() -> NoReturn:
-    """Run `automax` as the program of this process: once the exit code stands, no Ctrl-C changes it any more."""
+    """Run `automax` as the program of this process: once the exit code stands, no signal changes it any more."""
+    early.until_work_begins()
     code = main()
     try:
-        import signal
-
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        early.work_has_ended()
     except KeyboardInterrupt:
-        pass
+        early.work_has_ended()
     sys.exit(code)
 
 
@@ -112,6 +113,7 @@ def _run(argv: list[str]) -> int:
             parser.print_help(sys.stderr)
             return 2
         _hand_over(ros, arguments)
+        early.work_begins()
         return _exit_code(module.run(arguments))
     except Fault as error:
         head = "" if error.place else f"automax{f' {name}' if name in SUBCOMMANDS else ''}: error: "

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
+from automax_ros.cli.early import end_at_once
+
 _SIGNALLED = 128
 """Exit code of a command that a signal has ended, less the signal's number: what the shell adds."""
 
@@ -21,10 +23,16 @@ class CutShort(BaseException):
 
 @dataclass
 class StopRequest:
-    """Whether a signal has asked for the end."""
+    """Whether a signal has asked for the end, and the first one's number."""
 
     requested: bool = False
+    number: int = 0
     _cuts: bool = False
+
+    @property
+    def code(self) -> int:
+        """The exit code of a command that a signal has kept from its work."""
+        return _SIGNALLED + self.number
 
     @contextmanager
     def cut_short(self) -> Iterator[None]:
@@ -50,13 +58,14 @@ class StopRequest:
             self._cuts = False
             sys.unraisablehook = before
 
-    def note(self) -> None:
+    def note(self, number: int) -> None:
         """Take notice of a signal.
 
         Raises:
             CutShort: in a ``cut_short`` block, once.
         """
-        self.requested = True
+        if not self.requested:
+            self.requested, self.number = True, number
         if self._cuts:
             self._cuts = False
             raise CutShort
@@ -70,8 +79,8 @@ def stop_signals() -> Iterator[StopRequest]:
     """
     stop = StopRequest()
 
-    def note(_: int, __: FrameType | None) -> None:
-        stop.note()
+    def note(number: int, _: FrameType | None) -> None:
+        stop.note(number)
 
     before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
@@ -94,7 +103,7 @@ def ended_by_signals() -> Iterator[None]:
     before = {}
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) is signal.SIG_DFL:
+            if signal.getsignal(number) in (signal.SIG_DFL, end_at_once):
                 before[number] = signal.signal(number, end)
     try:
         yield

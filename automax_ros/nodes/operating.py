@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
@@ -27,16 +28,25 @@ class NotOperable(Fault):
     """There is no such rack, it has no operator, there are several of the name, or it does not answer."""
 
 
+class Interrupted(Exception):
+    """The person does not wait any longer."""
+
+
 class RackClient:
     """One program's access to the operator of a rack; a context manager. ``space`` is the namespace with its slash.
 
+    ``should_stop`` ends all waiting.
+
     Raises:
         RosUnavailable: ROS cannot be initialised.
+        Interrupted: ``find`` and ``call``, where asked to stop.
     """
 
-    def __init__(self, space: str, arguments: RosArguments = NO_ARGUMENTS) -> None:
+    def __init__(
+        self, space: str, arguments: RosArguments = NO_ARGUMENTS, should_stop: Callable[[], bool] = lambda: False
+    ) -> None:
         """Join the graph."""
-        self._space = space
+        self._space, self._should_stop = space, should_stop
         self._context = joined_context(arguments)
         quiet = [Parameter("start_type_description_service", value=False)]
         self._node = Node(
@@ -83,6 +93,7 @@ class RackClient:
                 raise NotOperable(f"rack {self._space} has no operator's services", hint)
             if now > deadline:
                 raise self._absent(wait_ns)
+            self._go_on()
             time.sleep(_LOOK_S)
 
     def call(self, kind: Any, name: str, request: Any, wait_ns: int) -> Any:
@@ -102,7 +113,12 @@ class RackClient:
             self._spin(deadline, name)
         return future.result()
 
+    def _go_on(self) -> None:
+        if self._should_stop():
+            raise Interrupted
+
     def _spin(self, deadline: int, name: str) -> None:
+        self._go_on()
         if time.monotonic_ns() > deadline:
             hint = "it may be busy or gone; --timeout waits longer. What was asked may still happen"
             raise NotOperable(f"rack {self._space} does not answer on {name}", hint)

@@ -1,0 +1,36 @@
+"""Signals before a command has begun its work: nothing is open yet, so they end the program at once and in silence.
+
+An import that is interrupted by an exception shows it. Only what every Python has loaded is imported here.
+"""
+
+from __future__ import annotations
+
+import _signal  # type: ignore[import-not-found]
+import os
+
+_SIGNALLED = 128
+_NUMBERS = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP)
+
+
+def end_at_once(number: int, _: object) -> None:
+    """End the program with the exit code that the shell gives a signal."""
+    os._exit(_SIGNALLED + number)
+
+
+def until_work_begins() -> None:
+    """Let SIGINT, SIGTERM and SIGHUP end the program at once; one that is ignored stays so."""
+    for number in _NUMBERS:
+        if _signal.getsignal(number) != _signal.SIG_IGN:
+            _signal.signal(number, end_at_once)
+
+
+def work_begins() -> None:
+    """Let Ctrl-C be an exception again, so that a command cleans up; nothing changes without ``until_work_begins``."""
+    if _signal.getsignal(_signal.SIGINT) is end_at_once:
+        _signal.signal(_signal.SIGINT, _signal.default_int_handler)
+
+
+def work_has_ended() -> None:
+    """Let no signal change the end any more: the exit code stands."""
+    for number in _NUMBERS:
+        _signal.signal(number, _signal.SIG_IGN)
