@@ -2,8 +2,12 @@
 
 import glob
 import os
+import re
+import subprocess
 from configparser import ConfigParser
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parent.parent
 COLCON = ROOT / "colcon"
@@ -71,3 +75,16 @@ def test_pip_shares_every_file_that_colcon_does():
     for share, pattern in folders.items():
         if share.startswith("share/automax_ros/"):
             assert share == f"share/automax_ros/{Path(pattern).parent}"
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("option", [(), ("--symlink-install",)], ids=["copied", "linked"])
+def test_colcon_builds_a_workspace_whose_rack_runs(tmp_path_factory, option):
+    """From the last commit; the environment with colcon is made once."""
+    folder = tmp_path_factory.getbasetemp() / "colcon"
+    command = [ROOT / "tools" / "try_colcon.sh", folder, *option]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "2 packages finished" in result.stdout
+    assert re.search(r"^  LINE +1 +11 +18\d ", result.stdout, re.MULTILINE), result.stdout

@@ -8,9 +8,12 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from automax_ros.cli.arguments import commands
+from automax_ros.rack.loader import load
 from automax_ros.rack.standing import StopCause
 
-FILE = Path(__file__).parent.parent / "launch" / "rack.launch.py"
+ROOT = Path(__file__).parent.parent
+FILE = ROOT / "launch" / "rack.launch.py"
+EXAMPLES = sorted((ROOT / "examples").glob("*/*.launch.py"))
 NOT_OPTIONS = {"config", "mode", "namespace", "params_file", "use_sim_time", "log_level", "set", "on_stop_all"}
 EVENTS = "automax_ros.nodes.launch_events"
 
@@ -28,8 +31,11 @@ class Configuration:
 
 
 @pytest.fixture
-def launch_file(monkeypatch) -> dict:
-    actions = ("DeclareLaunchArgument", "EmitEvent", "OpaqueFunction", "RegisterEventHandler", "Shutdown")
+def launch(monkeypatch):
+    actions = (
+        "DeclareLaunchArgument", "EmitEvent", "IncludeLaunchDescription", "OpaqueFunction", "RegisterEventHandler",
+        "Shutdown",
+    )  # fmt: skip
     contents = {
         "launch": {"Action": object, "Event": object, "LaunchContext": dict, "LaunchDescription": list},
         "launch.actions": {name: kept(name) for name in actions},
@@ -47,8 +53,13 @@ def launch_file(monkeypatch) -> dict:
         vars(module).update(members)
         monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.delitem(sys.modules, EVENTS, raising=False)
-    yield runpy.run_path(str(FILE))
+    yield lambda file: runpy.run_path(str(file))
     sys.modules.pop(EVENTS, None)
+
+
+@pytest.fixture
+def launch_file(launch) -> dict:
+    return launch(FILE)
 
 
 def declared(launch_file) -> dict[str, str]:
@@ -124,6 +135,26 @@ def test_a_stop_all_ends_the_launch_where_that_is_wanted(launch_file):
     assert handler.matcher(event)
     assert not handler.matcher(SimpleNamespace())
     assert [item.kind for item in handler.entities] == ["Shutdown"]
+
+
+def shared(path: SimpleNamespace) -> Path:
+    """Where colcon installs a path below share/automax_ros from."""
+    share, *parts = path.args[0]
+    assert share.args == ("automax_ros",)
+    return ROOT.joinpath(*parts)
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_launches_its_rack_and_a_robot_in_its_namespace(launch, file):
+    """The rack's namespace is its name in lower case; the robot's own topics stand below its name."""
+    rack, robot = launch(file)["generate_launch_description"]()
+    assert shared(rack.args[0]) == FILE
+    (config,) = [shared(value) for name, value in rack.launch_arguments if name == "config"]
+    assert load(config).config.namespace == robot.namespace
+    assert robot.executable == sys.executable
+    (program,) = map(shared, robot.arguments)
+    assert program.parent == file.parent
+    assert f'super().__init__("{robot.name}")' in program.read_text(encoding="utf-8")
 
 
 def test_launch_itself_runs_the_rack(tmp_path, ros_domain_id):
