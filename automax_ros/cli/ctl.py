@@ -80,6 +80,10 @@ def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
     return 0 if all(_ok(answer) for _, answer in answers) else 1
 
 
+_NOW = ("status", "now", "forced", "powered", "message")
+"""Fields in which an answer says what is true now."""
+
+
 class _Refused(Exception):
     """What was asked for was refused; the text says why."""
 
@@ -125,7 +129,9 @@ def _print(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
         if not _ok(answer):
             print(f"automax ctl: {' '.join((what, ask.of)).strip()}: refused: {_reason(ask, answer)}", file=sys.stderr)
         elif action.read is None:
-            print(f"{what} {ask.of}: done" if ask.of else f"{what}: done")
+            done = f"{what} {ask.of}: done" if ask.of else f"{what}: done"
+            told = getattr(answer, "message", "")
+            print(f"{done}, {told}" if told else done)
         else:
             for line in action.lines(action.read(answer)):
                 print(line)
@@ -134,7 +140,10 @@ def _print(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
 def _print_json(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
     found = []
     for ask, answer in answers:
-        entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": _ok(answer), "reason": _reason(ask, answer)}
+        ok = _ok(answer)
+        entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": ok, "reason": "" if ok else _reason(ask, answer)}
+        if ok and action.read is None:
+            entry |= {"now": getattr(answer, name) for name in _NOW if getattr(answer, name, "") != ""}
         if getattr(answer, "findings", ()):
             entry["findings"] = [ask.worded(text) for text in answer.findings]
         if action.read is not None and _ok(answer):

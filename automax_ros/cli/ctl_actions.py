@@ -14,10 +14,16 @@ from typing import Any
 from automax_ros.cli.ctl_ask import Action, Ask
 from automax_ros.cli.ctl_lifecycle import LIFECYCLE
 from automax_ros.cli.ctl_watch import add_watch_arguments, values_of
+from automax_ros.cli.numbers import whole_number
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.text import quoted
+from automax_ros.cli.window import seconds_above_0
+from automax_ros.core.text import count_of, quoted
+from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.task_source import read_task_source
+
+
+_MOST_STEPS = 1_000_000
 
 
 def _tasks(parser: argparse.ArgumentParser) -> None:
@@ -120,6 +126,48 @@ def _clear(given: argparse.Namespace) -> list[Ask]:
     return [Ask("clear_errors", "automax_msgs/OperateTask", {"task": name}, name or "all tasks") for name in tasks]
 
 
+def _stepped(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "what", nargs="?", choices=("scan", "tick", "until"), default="scan", help="what is stepped (default: scan)"
+    )
+    parser.add_argument(
+        "of", nargs="?", default="", metavar="TASK|SECONDS", help="whose scan or tick; until: the rack time to go to"
+    )
+    parser.add_argument(
+        "--count", type=whole_number, default=1, metavar="N", help="how many scans or ticks (default: 1)"
+    )
+
+
+def _step(given: argparse.Namespace) -> list[Ask]:
+    if not 1 <= given.count <= _MOST_STEPS:
+        raise UsageError(f"--count: {given.count} is not a number from 1 to {_MOST_STEPS}")
+    fields: dict[str, Any] = {"what": given.what, "task": given.of, "count": given.count}
+    if given.what == "until":
+        try:
+            fields = {"what": "until", "until_s": seconds_ns(given.of) / NS_PER_S}
+        except ValueError as error:
+            raise UsageError(f"step until takes a rack time in seconds, not {quoted(given.of)}") from error
+    return [Ask("step", "automax_msgs/Step", fields, " ".join(filter(None, (given.what, given.of))))]
+
+
+def _powered(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("off", "on", "cycle"), help="cycle: off, and on again by itself")
+    parser.add_argument(
+        "--off-for", type=seconds_above_0, default="1", metavar="S", help="cycle: for how long, s (default: 1)"
+    )
+    help_text = "on, cycle: non-volatile memory is lost too, as with a bad battery"
+    parser.add_argument("--without-battery", action="store_true", help=help_text)
+
+
+def _power(given: argparse.Namespace) -> list[Ask]:
+    fields = {
+        "what": given.what,
+        "off_for_s": given.off_for / NS_PER_S if given.what == "cycle" else 0.0,
+        "without_battery": given.without_battery,
+    }
+    return [Ask("power", "automax_msgs/Power", fields, given.what)]
+
+
 def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[Ask]]:
     return lambda _: [Ask(service, type_name)]
 
@@ -130,7 +178,7 @@ def _value_lines(data: Any) -> Iterable[str]:
 
 def _fields(item: Any) -> dict[str, Any]:
     """Return the fields of a message of plain values."""
-    return {name: getattr(item, name) for name in item.get_fields_and_field_types()}
+    return {name: getattr(item, name) for name in item.get_fields_and_field_types() if name not in ("ok", "reason")}
 
 
 def _task_lines(data: Any) -> Iterable[str]:
@@ -151,9 +199,15 @@ def _error_lines(data: Any) -> Iterable[str]:
         yield "no errors are logged"
 
 
+def _step_lines(data: Any) -> Iterable[str]:
+    yield f"step: {data['why']} at {data['time_s']:.9g} s, {count_of(data['scans'], 'scan')}"
+
+
 def _status_lines(data: Any) -> Iterable[str]:
     power = "" if data["powered"] else ", the power is off"
     yield f"rack {data['rack']}: {data['time_s']:.3f} s, {data['running']} of {data['tasks']} tasks run{power}"
+    if data["halted"]:
+        yield "halted: rack time stands still"
     if data["stopped"]:
         code = f" (code {data['stopped_code']})" if data["stopped_code"] else ""
         yield f"stopped at {data['stopped_at_s']:.3f} s{code}: {data['stopped_reason']}"
@@ -164,8 +218,19 @@ def _status_lines(data: Any) -> Iterable[str]:
 ACTIONS: Mapping[str, Action] = {
     "run": Action("put tasks into RUN", _each_task("run"), _tasks),
     "stop": Action("stop tasks", _each_task("stop"), _tasks),
+    "delete": Action("take stopped tasks out; a reload brings them back", _each_task("delete"), _tasks),
     "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger")),
     "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger")),
+    "power": Action("switch the power off and on", _power, _powered),
+    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger")),
+    "step": Action(
+        "let a halted rack go on by scans, ticks, or until a rack time at most 1 s later",
+        _step,
+        _stepped,
+        _fields,
+        _step_lines,
+    ),
+    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger")),
     "set": Action("write commons once", _each_assignment("set"), _assignments),
     "get": Action(
         "read commons, array elements, variables of tasks",

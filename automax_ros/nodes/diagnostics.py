@@ -17,7 +17,7 @@ from rclpy.node import Node
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.throttle import Throttle
-from automax_ros.rack.halting import Haltable
+from automax_ros.rack.halting import Haltable, is_halted
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
@@ -79,7 +79,7 @@ class Diagnostics:
     def look(self) -> None:
         """Send at the next opportunity if a level has changed."""
         self._changed = True
-        if self._pending is None and not self._halted:
+        if self._pending is None and not is_halted(self._pace):
             at_ns = max(self._rack.now_ns, self._next_look_ns)
             self._pending = self._rack.scheduler.at(at_ns, _KEY, self._look_at)
 
@@ -99,10 +99,6 @@ class Diagnostics:
     def operated(self, operation: Operation) -> None:  # noqa: ARG002
         """Look after whatever was done."""
         self.look()
-
-    @property
-    def _halted(self) -> bool:
-        return isinstance(self._pace, Haltable) and self._pace.halted
 
     def _report(self, now_ns: int) -> None:
         self._send(self._statuses(now_ns), now_ns)

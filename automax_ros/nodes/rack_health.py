@@ -8,7 +8,7 @@ from automax_ros.core.text import count_of
 from automax_ros.nodes.diagnostics import status_of
 from automax_ros.nodes.guarded_node import MAIN_NODE
 from automax_ros.nodes.module_node import Site
-from automax_ros.rack.halting import Haltable
+from automax_ros.rack.halting import is_halted
 from automax_ros.running.task import Status
 
 OVERRUNS = "overruns"
@@ -36,7 +36,7 @@ class RackHealth:
             "time_s": f"{now_ns / 1e9:.3f}",
             "run_id": str(self._site.stream.run_id),
             "powered": str(operations.powered),
-            "halted": str(self._halted),
+            "halted": str(is_halted(self._site.pacer)),
             "tasks": str(len(rack.tasks)),
             "running": str(sum(task.status is Status.RUNNING for task in rack.tasks)),
             "forced": str(len(rack.forces())),
@@ -50,11 +50,6 @@ class RackHealth:
         name = f"{rack.config.namespace}/{MAIN_NODE}: {rack.config.name}"
         return [status_of(name, rack.config.name, level, text, values)]
 
-    @property
-    def _halted(self) -> bool:
-        pace: object = self._site.pacer
-        return isinstance(pace, Haltable) and pace.halted
-
     def _judged(self, skipped: int, troubles: int) -> tuple[bytes, str]:
         """Return level and text; what counts most first."""
         operations, diagnostics = self._site.rack.operations, self._site.diagnostics
@@ -65,7 +60,7 @@ class RackHealth:
             return DiagnosticStatus.ERROR, f"{cause.title}: {cause.reason}"
         if not operations.powered:
             return DiagnosticStatus.WARN, "the power is off"
-        if self._halted:
+        if is_halted(self._site.pacer):
             return DiagnosticStatus.WARN, "halted: rack time stands still"
         if cause is not None:
             return DiagnosticStatus.WARN, f"{cause.title}: {cause.reason}"

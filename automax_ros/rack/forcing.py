@@ -24,10 +24,14 @@ from automax_ros.running.views import MemoryValueError, ViewSpec, fitting
 
 @dataclass(frozen=True)
 class Force:
-    """A line of the force table: a variable and the value at which it is held."""
+    """A line of the force table: a variable and the value at which it is held.
+
+    ``under`` is what was written last, which the force hides; None for a local, of which none is kept.
+    """
 
     name: str
     value: Value
+    under: Value | None = None
 
 
 class Forcing:
@@ -42,7 +46,8 @@ class Forcing:
         """Return what is forced: commons in the order of the rack file, then locals, task by task."""
         memory = self._memory
         held = sorted(memory.forced)
-        commons = [Force(memory.specs[view].name, memory.read_now(view, element)) for view, element in held]
+        under = {(view, element): value for view, element, value in memory.under_forces}
+        commons = [Force(memory.specs[key[0]].name, memory.read_now(*key), under.get(key)) for key in held]
         return commons + [
             Force(f"{task.name}.{name}", value) for task in self._tasks() for name, value in task.forces.items()
         ]

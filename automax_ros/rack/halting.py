@@ -40,6 +40,11 @@ class Haltable(Protocol):
         ...
 
 
+def is_halted(pace: object) -> bool:
+    """Return whether what keeps a rack's pace lets its time stand still."""
+    return isinstance(pace, Haltable) and pace.halted
+
+
 @dataclass(frozen=True)
 class Stepped:
     """How a step ended: why, at which rack time, and how many scans all tasks have ended in it."""
@@ -63,7 +68,7 @@ class Halting:
     @property
     def halted(self) -> bool:
         """Whether rack time stands still."""
-        return isinstance(self._pace, Haltable) and self._pace.halted
+        return is_halted(self._pace)
 
     def halt(self) -> None:
         """Let rack time stand still.

@@ -182,6 +182,10 @@ class Orders:
         """Return a task, all of the rack without a name."""
         return [self._known(task)] if task.strip() else [item.name for item in self._rack.tasks]
 
+    def task_word(self, task: str) -> str:
+        """Return what a task's name is looked up as, "" where none is given."""
+        return self._task("step", task)
+
     def _shown(self, name: str) -> tuple[str, str]:
         if len(name) > MAX_NAME:
             raise OperationRefused(f"a name of {len(name)} characters: the longest has {MAX_NAME}")

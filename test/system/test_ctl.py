@@ -48,7 +48,7 @@ def test_a_rack_is_operated_from_another_process(rack, tmp_path):
     ended = ctl("set", "REF%=200", "NIL%=1", "--json")
     assert ended.code == 1
     good, bad = json.loads(ended.out)
-    assert good == {"what": "set", "of": "REF% = 200", "ok": True, "reason": ""}
+    assert good == {"what": "set", "of": "REF% = 200", "ok": True, "reason": "", "now": "200"}
     assert bad["ok"] is False
     assert "no common variable" in bad["reason"]
     assert ctl("tune", "SPEED.TRIM%=5").code == 0

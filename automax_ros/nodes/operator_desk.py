@@ -1,0 +1,213 @@
+"""What the operator's services do, and what they answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from automax_msgs.msg import LoggedError, TaskInfo
+from automax_msgs.srv import (
+    OperateControl,
+    OperateTask,
+    Power,
+    ReadErrors,
+    ReadStatus,
+    ReadTasks,
+    ReadValues,
+    Reload,
+    SetValue,
+    Step,
+    Unforce,
+)
+from std_srvs.srv import Trigger
+
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.text import count_of
+from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.nodes.later import allow_later
+from automax_ros.nodes.module_node import ModuleNode
+from automax_ros.nodes.reloading import Reloading
+from automax_ros.nodes.tables import status_of_task, task_fields
+from automax_ros.rack.halting import Halting
+from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.orders import Orders
+from automax_ros.running.task import Status
+
+PLACES = ("first", "second", "last")
+"""What the error log keeps."""
+REFUSED = "refused request"
+"""What ``Health`` counts requests as that were not carried out."""
+MOST_TOLD = 300
+"""Most characters of an unforeseen error that an answer tells."""
+Act = Callable[[Any, Any], object]
+"""Carries a request out and may fill the response in; raises OperationRefused."""
+Tell = Callable[[Any, Any], None]
+"""Fills in what is true now, after a request that was carried out or refused."""
+
+
+def _nothing(_: Any, __: Any) -> None:
+    """Tell nothing further."""
+
+
+class OperatorDesk:
+    """Serves requests by the services of one node. ``close`` when it leaves the graph."""
+
+    def __init__(self, node: ModuleNode) -> None:
+        """Create the services."""
+        self._node, self._site, self._rack = node, node.site, node.site.rack
+        orders = self._orders = Orders(self._rack)
+        self._halting = Halting(self._rack, self._site.pacer)
+        self._serve(OperateTask, "run", lambda request, _: orders.run(request.task), self._task_now)
+        self._serve(OperateTask, "stop", lambda request, _: orders.stop(request.task), self._task_now)
+        self._serve(OperateTask, "delete", lambda request, _: orders.delete(request.task), self._task_now)
+        for name in ("clear", "clear_errors"):
+            self._serve(OperateTask, name, lambda request, _: orders.clear_errors(request.task), self._task_now)
+        self._serve(Trigger, "run_all", lambda *_: orders.run_all(), self._running_now)
+        self._serve(Trigger, "stop_all", lambda *_: orders.stop_all(), self._running_now)
+        self._serve(Trigger, "pause", lambda *_: self._halting.halt(), self._time_now)
+        self._serve(Trigger, "resume", lambda *_: self._halting.resume(), self._time_now)
+        self._serve(Step, "step", self._step, self._stepped_now)
+        self._serve(Power, "power", self._power, self._powered_now)
+        self._serve(SetValue, "set", lambda request, _: orders.set(request.name, request.value), self._value_now)
+        self._serve(SetValue, "force", lambda request, _: orders.force(request.name, request.value), self._value_now)
+        self._serve(SetValue, "tune", lambda request, _: orders.tune(request.name, request.value), self._value_now)
+        self._serve(Unforce, "unforce", lambda request, _: orders.unforce(list(request.names)), self._forced_now)
+        self._serve(OperateControl, "module", lambda request, _: orders.module(*_moved(request)))
+        self._serve(OperateControl, "plant", lambda request, _: orders.plant(*_moved(request)))
+        self._reloading = Reloading(node, orders, self._reloaded)
+        allow_later(node.create_service(Reload, "reload", self._reloading.answer))
+        self._serve(ReadValues, "get", lambda request, response: _fill(response, orders.get(list(request.names))))
+        self._serve(ReadValues, "forces", lambda _, response: _fill(response, orders.forces()))
+        self._serve(ReadErrors, "errors", self._errors)
+        self._serve(ReadTasks, "tasks", self._tasks)
+        self._serve(ReadStatus, "status", self._status)
+
+    def close(self) -> None:
+        """End; a source that is being compiled is not installed."""
+        self._reloading.close()
+
+    def _serve(self, kind: Any, name: str, act: Act, tell: Tell = _nothing) -> None:
+        def answered(request: Any, response: Any) -> Any:
+            with self._site.present():
+                error: Exception | None = None
+                try:
+                    act(request, response)
+                except Exception as raised:
+                    error = raised
+                return self._concluded(name, request, response, error, tell)
+
+        self._node.create_service(kind, name, answered)
+
+    def _concluded(self, name: str, request: Any, response: Any, error: Exception | None, tell: Tell) -> Any:
+        """Return a response with how the request ended, and what is true now."""
+        reason = "" if error is None else str(error)
+        if error is not None and not isinstance(error, OperationRefused):
+            reason = f"{type(error).__name__}: {reason[:MOST_TOLD]}"
+            self._node.guard.report(f"a request to {name} was refused", error)
+        elif error is not None:
+            self._site.health.note(REFUSED, name, lambda: f"a request was refused: {name}: {reason}")
+        for field, value in (
+            ("ok", error is None),
+            ("reason", reason),
+            ("success", error is None),
+            ("message", reason),
+        ):
+            if hasattr(response, field):
+                setattr(response, field, value)
+        with suppress(OperationRefused):
+            tell(request, response)
+        return response
+
+    def _reloaded(self, request: Any, response: Any, error: Exception | None) -> Any:
+        return self._concluded("reload", request, response, error, self._task_now)
+
+    # What is true now
+
+    def _task_now(self, request: Any, response: Any) -> None:
+        """Tell how a task stands; nothing where none or no such task is meant."""
+        if request.task.strip():
+            (name,) = self._orders.tasks_named(request.task)
+            response.status = status_of_task(self._rack, self._rack.task(name))
+
+    def _running_now(self, _: Any, response: Any) -> None:
+        running = sum(task.status is Status.RUNNING for task in self._rack.tasks)
+        response.message = response.message or f"{running} of {count_of(len(self._rack.tasks), 'task')} run"
+
+    def _time_now(self, _: Any, response: Any) -> None:
+        stands = "stands still" if self._halting.halted else "goes on"
+        response.message = response.message or f"rack time {stands} at {self._rack.now_ns / NS_PER_S:.9g} s"
+
+    def _stepped_now(self, _: Any, response: Any) -> None:
+        response.time_s = self._rack.now_ns / NS_PER_S
+
+    def _powered_now(self, _: Any, response: Any) -> None:
+        response.powered = self._rack.operations.powered
+
+    def _value_now(self, request: Any, response: Any) -> None:
+        """Tell what a variable holds; nothing where no such variable is meant."""
+        if request.name.strip():
+            ((_, response.now),) = self._orders.get([request.name])
+
+    def _forced_now(self, _: Any, response: Any) -> None:
+        response.forced = [name for name, _ in self._orders.forces()]
+
+    # What is more than one order
+
+    def _step(self, request: Any, response: Any) -> None:
+        try:
+            until_ns = seconds_ns(request.until_s) if request.what == "until" else 0
+        except ValueError as error:
+            raise OperationRefused(str(error)) from error
+        task = self._orders.task_word(request.task)
+        stepped = self._halting.step(request.what, task, request.count or 1, until_ns)
+        response.why, response.scans = stepped.why, stepped.scans
+
+    def _power(self, request: Any, _: Any) -> None:
+        self._orders.power(request.what, request.off_for_s, without_battery=request.without_battery)
+
+    def _errors(self, request: Any, response: Any) -> None:
+        for name in self._orders.tasks_named(request.task):
+            for place, entry in zip(PLACES, self._rack.task(name).errors.entries, strict=False):
+                problem = PROBLEMS.get(entry.problem)
+                response.errors.append(
+                    LoggedError(
+                        task=name,
+                        place=place,
+                        line=entry.line,
+                        code=entry.problem,
+                        text=problem.title if problem else "unknown problem",
+                        scan=entry.scan,
+                    )
+                )
+
+    def _tasks(self, _: Any, response: Any) -> None:
+        response.tasks = [
+            TaskInfo(**task_fields(self._rack, module, item))
+            for module in self._rack.task_modules
+            for item in module.tasks
+        ]
+
+    def _status(self, _: Any, response: Any) -> None:
+        rack, operations = self._rack, self._rack.operations
+        response.rack, response.run_id = rack.config.name, self._site.stream.run_id
+        response.time_s, response.powered = rack.now_ns / NS_PER_S, operations.powered
+        response.halted = self._halting.halted
+        cause = operations.stopped
+        response.stopped = cause is not None
+        if cause is not None:
+            response.stopped_at_s = cause.time_ns / NS_PER_S
+            response.stopped_code, response.stopped_task = cause.code or "", cause.task
+            response.stopped_reason = cause.reason
+        response.tasks = len(rack.tasks)
+        response.running = sum(task.status is Status.RUNNING for task in rack.tasks)
+        response.forced = len(rack.forces())
+
+
+def _moved(request: Any) -> tuple[str, str, str]:
+    return request.name, request.control, request.value
+
+
+def _fill(response: Any, values: list[tuple[str, str]]) -> None:
+    response.found = [name for name, _ in values]
+    response.values = [text for _, text in values]
