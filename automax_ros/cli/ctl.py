@@ -143,7 +143,8 @@ def _print_json(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> No
         ok = _ok(answer)
         entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": ok, "reason": "" if ok else _reason(ask, answer)}
         if ok and action.read is None:
-            entry |= {"now": getattr(answer, name) for name in _NOW if getattr(answer, name, "") != ""}
+            told = [shown for name in _NOW if (shown := getattr(answer, name, "")) != ""]
+            entry |= {"now": told[0]} if told else {}
         if getattr(answer, "findings", ()):
             entry["findings"] = [ask.worded(text) for text in answer.findings]
         if action.read is not None and _ok(answer):

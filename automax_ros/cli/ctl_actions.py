@@ -22,7 +22,6 @@ from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.task_source import read_task_source
 
-
 _MOST_STEPS = 1_000_000
 
 

@@ -62,3 +62,37 @@ def test_controls_take_the_words_of_stimuli(action):
         (("UNWIND", "line_sag", "70", "0.2"), "70 0.2"),
     ):
         assert asked(action, *words) == [{"name": words[0], "control": words[1], "value": value}]
+
+
+def test_steps_and_power_are_asked_for_as_the_services_take_them():
+    assert asked("step") == [{"what": "scan", "task": "", "count": 1}]
+    assert asked("step", "tick", "SPEED", "--count", "3") == [{"what": "tick", "task": "SPEED", "count": 3}]
+    assert asked("step", "until", "12.5") == [{"what": "until", "until_s": 12.5}]
+    assert asked("power", "off") == [{"what": "off", "off_for_s": 0.0, "without_battery": False}]
+    assert asked("power", "cycle", "--off-for", "2.5", "--without-battery") == [
+        {"what": "cycle", "off_for_s": 2.5, "without_battery": True}
+    ]
+
+
+@pytest.mark.parametrize("name", ACTIONS)
+def test_every_action_asks_a_service_with_fields_that_it_has(name, tmp_path):
+    """What is sent is what msg_defs/ defines; the rack serves it (test_operator)."""
+    msgs = pytest.importorskip("automax_msgs.srv")
+    (tmp_path / "T.BLK").write_text("10 END\n")
+    words = {
+        "reload": ("T", str(tmp_path / "T.BLK")),
+        "plant": ("UNWIND", "repair", "all"),
+        "module": ("7", "test_switch", "A"),
+        "power": ("on",),
+        "unforce": ("--all",),
+    }
+    assigned, named = {"set", "force", "tune"}, {"run", "stop", "delete", "get", "watch"}
+    given = words.get(name) or (("A%=1",) if name in assigned else ("A",) if name in named else ())
+    parser = argparse.ArgumentParser()
+    ACTIONS[name].add_arguments(parser)
+    for ask in ACTIONS[name].asks(parser.parse_args(list(given))):
+        package, _, kind = ask.type_name.partition("/")
+        if package == "automax_msgs":
+            assert getattr(msgs, kind).Request(**ask.fields)
+        else:
+            assert (ask.type_name, ask.fields) == ("std_srvs/Trigger", {})

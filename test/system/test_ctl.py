@@ -76,8 +76,20 @@ def test_a_rack_is_operated_from_another_process(rack, tmp_path):
     assert (status["rack"], status["running"], status["tasks"], status["forced"]) == ("OPERATED", 0, 2, 1)
     assert (status["stopped"], status["stopped_reason"]) == (True, "STOP ALL by the operator")
     assert ctl("unforce", "--all").code == 0
-    assert ctl("run-all").code == 0
+    assert ctl("run-all").out == "run-all: done, 2 of 2 tasks run\n"
     assert "stopped" not in ctl("status").out
+
+
+def test_a_rack_is_halted_and_stepped_from_another_process(rack):
+    assert ctl("pause").out.startswith("pause: done, rack time stands still at ")
+    (stepped,) = json.loads(ctl("step", "scan", "SPEED", "--count", "2", "--json").out)
+    at_s = stepped["answer"]["time_s"]
+    assert (stepped["answer"]["why"], at_s) == ("done", pytest.approx(round(at_s / 0.0055) * 0.0055))
+    assert ctl("step", "tick", "--count", "4").out == f"step: done at {at_s + 0.022:.9g} s, 2 scans\n"
+    assert ctl("resume").code == 0
+    refused = ctl("step")
+    assert refused.code == 1
+    assert refused.err == "automax ctl: step scan: refused: the rack is not halted: pause it first\n"
 
 
 def test_what_was_done_is_told_to_late_joiners_and_recorded_and_the_recording_replays(rack):
@@ -85,7 +97,7 @@ def test_what_was_done_is_told_to_late_joiners_and_recorded_and_the_recording_re
 
     with Client() as client:
         told = client.listen(Operation, "/operated/operations", latched=True, depth=100)
-        client.until(lambda: bool(told) and told[-1].what == "run_all", "the last operation")
+        client.until(lambda: bool(told) and not told[-1].ok and told[-1].what == "step", "the last operation")
     assert rack.end(signal.SIGINT).code == 0
     recorded = [item.message for item in BagReader(rack.bag).messages(types={"automax_msgs/msg/Operation"})]
     assert [(item.what, item.task, item.ok) for item in told] == [(item.what, item.task, item.ok) for item in recorded]
@@ -102,6 +114,11 @@ def test_what_was_done_is_told_to_late_joiners_and_recorded_and_the_recording_re
         ("stop_all", True),
         ("unforce", True),
         ("run_all", True),
+        ("pause", True),
+        ("step", True),
+        ("step", True),
+        ("resume", True),
+        ("step", False),
     ]
     report = replay(rack.bag, {}, ReplayOptions())
     assert report.identical
@@ -133,6 +150,8 @@ def test_without_an_operator_nothing_can_be_operated(ros_domain_id):
         (("PM1", "unforce"), "takes names, or --all"),
         (("PM1", "reload", "LINE", "missing.BLK"), "missing.BLK"),
         (("PM1", "fly"), "invalid choice"),
+        (("PM1", "step", "until", "soon"), "takes a rack time in seconds"),
+        (("PM1", "step", "--count", "0"), "--count: 0 is not a number from 1 to 1000000"),
         (("PM1", "status", "--timeout", "0"), "too short"),
     ],
 )
