@@ -19,6 +19,7 @@ from automax_ros.cli.stimuli_file import stimulation as stimulation_of
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.bus import Seating
 from automax_ros.nodes.discovery_range import range_text
+from automax_ros.nodes.guarded_node import follows_clock
 from automax_ros.nodes.launcher import LiveRack
 from automax_ros.nodes.process import RosProcess
 from automax_ros.nodes.rack_node import RackNode
@@ -65,7 +66,9 @@ class LiveSession:
         self._told: StopCause | None = None
         self._ending = ExitStack()
         try:
-            self.live = LiveRack(rack, plan.ros, self._seating(), process=process, manager=manager)
+            self.live = LiveRack(
+                rack, plan.ros, self._seating(), process=process, manager=manager, simulated=plan.simulated
+            )
             self._ending.callback(self.live.close)
             rack.observers.add(self._operated)
             self._display = StatusDisplay(rack, plan.watch, live=True, health=self.live.health, screen=plan.screen)
@@ -190,4 +193,16 @@ def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:
     return (
         f"{head}; {len(config.declared)} common variables\n"
         f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"
+        f"{_time(plan)}"
     )
+
+
+def _time(plan: RunPlan) -> str:
+    """Return whose time the rack has, on a line of its own, where that is not the wall clock's."""
+    if plan.simulated is not None:
+        rate = plan.simulated.rate
+        pace = "as fast as it goes" if rate is None else f"{rate:g} times the wall clock"
+        return f"\nrack time is simulated, {pace}, and told on /clock"
+    if follows_clock(plan.ros, plan.config.namespace):
+        return "\nrack time follows /clock, and begins with its first message"
+    return ""

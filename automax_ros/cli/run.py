@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.numbers import option_number
 from automax_ros.cli.output_files import held_for_writing, require_different_files, require_folder, require_writable
 from automax_ros.cli.rack_arguments import config_of, namespace_of, print_refused, settings_of, usable_config
 from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
@@ -31,7 +32,10 @@ from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.retention import RetentionFault
 from automax_ros.rack.settings import CommonElement, watched
+from automax_ros.running.simulated_pacer import SimulatedTime
 
+MOST_RATE = 1000.0
+"""Fastest ``--rate`` (decision: as that of `automax play`)."""
 WITHOUT_ROS = "or run with --simulated, which needs no ROS"
 
 
@@ -58,6 +62,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="on the wall clock: wait unconfigured for a ROS 2 lifecycle manager, which configures and activates the "
         "node `rack` (docs/ros.md)",
+    )
+    parser.add_argument(
+        "--ros",
+        action="store_true",
+        dest="with_ros",
+        help="with --simulated: with ROS nodes all the same, which send /clock and may be written",
+    )
+    parser.add_argument(
+        "--rate", metavar="R", help="with --simulated --ros: R times as fast as the wall clock (default: as it goes)"
     )
     parser.add_argument(
         "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
@@ -97,8 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
     if arguments.simulated and arguments.record is not None and arguments.duration is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
-    if arguments.simulated and arguments.ros is not None and arguments.ros.given:
-        raise UsageError("--ros-args: with --simulated nothing of ROS is started", "leave one of them out")
+    _check_time(arguments)
     if arguments.simulated and arguments.distributed:
         raise UsageError("--distributed needs the wall clock, by which its processes agree", "leave out --simulated")
     if not (arguments.distributed or arguments.restart):
@@ -107,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--no-autostart: a lifecycle manager starts racks on the wall clock, in one process")
     check_files(arguments)
     with stop_signals() as stop, held_for_writing(arguments.report):
-        if not arguments.simulated:
+        if arguments.with_ros or not arguments.simulated:
             prepare_ros(arguments, WITHOUT_ROS)
         try:
             return _run(arguments, stop)
@@ -130,11 +142,12 @@ def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
     if config is None:
         return 1
     plan = _plan(arguments, config)
-    if arguments.simulated:
+    if arguments.simulated and not arguments.with_ros:
         return run_simulated(plan, stop)
     if arguments.distributed:
         from automax_ros.cli.run_distributed import run_distributed
 
+        _check_clock(plan)
         return run_distributed(plan, arguments, stop)
     from automax_ros.cli.managed_run import Managed
     from automax_ros.cli.run_live import run_managed
@@ -158,7 +171,10 @@ def _read(arguments: argparse.Namespace, stop: StopRequest) -> RunPlan:
 
 
 def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
-    ros = NO_ARGUMENTS if arguments.simulated else ros_arguments(arguments)
+    simulated = SimulatedTime(_rate(arguments.rate)) if arguments.with_ros else None
+    ros = NO_ARGUMENTS if arguments.simulated and not arguments.with_ros else ros_arguments(arguments)
+    if simulated is not None:  # whoever sends /clock does not follow it
+        ros = ros.without("use_sim_time")
     config = replace(config, namespace=ros.placed(config.namespace))
     return RunPlan(
         config,
@@ -172,7 +188,35 @@ def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
         arguments.report,
         arguments.allow_outside,
         ros,
+        simulated=simulated,
     )
+
+
+def _check_time(arguments: argparse.Namespace) -> None:
+    """Refuse options that would have no effect on a run in simulated time, or on one that is not."""
+    if arguments.with_ros and not arguments.simulated:
+        raise UsageError("--ros belongs to --simulated", "on the wall clock the rack has ROS nodes anyway")
+    if arguments.rate is not None and not arguments.with_ros:
+        raise UsageError("--rate belongs to --simulated --ros", "without ROS time passes as fast as it goes")
+    if arguments.simulated and not arguments.with_ros and arguments.ros is not None and arguments.ros.given:
+        raise UsageError("--ros-args: with --simulated nothing of ROS is started", "add --ros, or leave them out")
+
+
+def _check_clock(plan: RunPlan) -> None:
+    """Refuse ``use_sim_time`` for a rack in several processes, before they are started."""
+    from automax_ros.nodes.guarded_node import follows_clock
+
+    if follows_clock(plan.ros, plan.config.namespace):
+        raise UsageError(
+            "use_sim_time: processes of a distributed rack agree by the wall clock", "run it without --distributed"
+        )
+
+
+def _rate(text: str | None) -> float | None:
+    rate = None if text is None else option_number("--rate", text, 0, MOST_RATE)
+    if rate == 0:
+        raise UsageError("--rate: at 0 no time would pass")
+    return rate
 
 
 def check_files(arguments: argparse.Namespace) -> None:

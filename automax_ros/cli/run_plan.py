@@ -23,6 +23,7 @@ from automax_ros.rack.seating import Seat
 from automax_ros.rack.settings import CommonElement
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.stage import Happened
+from automax_ros.running.simulated_pacer import SimulatedTime
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class RunPlan:
     named for values that outlive the run, if any. ``stimuli`` is the file of what happens to the rack, ``report`` that
     in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
     command line says to ROS. ``seat`` is the part of the rack that is run, None for all of it.
+    ``simulated`` is simulated time where the rack has ROS nodes all the same.
     """
 
     config: RackConfig
@@ -61,6 +63,7 @@ class RunPlan:
     allow_outside: bool = False
     ros: RosArguments = NO_ARGUMENTS
     seat: SeatPlan | None = None
+    simulated: SimulatedTime | None = None
 
     @property
     def is_watched(self) -> bool:
@@ -73,9 +76,9 @@ class RunPlan:
         return None if self.seat is None else self.seat.seat.slots
 
     @property
-    def state_folder(self) -> Path:
-        """Where a run on the wall clock keeps what outlives it; processes of one rack have a folder each."""
-        if self.state is not None:
+    def state_folder(self) -> Path | None:
+        """Where a run keeps what outlives it, in simulated time only where that is said; processes have one each."""
+        if self.state is not None or self.simulated is not None:
             return self.state
         whole = default_folder(self.config)
         return whole if self.seat is None else whole / self.seat.seat.name

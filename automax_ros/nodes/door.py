@@ -26,6 +26,8 @@ MOST_A_ROUND = 16
 """Most messages and requests that are taken in a round, together ..."""
 MOST_OF_ONE = 4
 """... and of one topic or service."""
+MOST_ROUNDS_FIRST = 16
+"""Most rounds that the last entrance waits for the others (decision: a flood does not hold it up for long)."""
 REST_S = 0.001
 """Rest after a round: so at most 16,000 are taken in a second (decision)."""
 _GROUPS = 64
@@ -66,11 +68,13 @@ class Door:
         self._groups: list[_Group] = []
         self._thread: threading.Thread | None = None
         self._closing = False
+        self._last: Entrance | None = None
         self._poll = select.epoll() if library() is not None else None
 
-    def add(self, entrance: Entrance) -> None:
-        """Let an entrance be served."""
+    def add(self, entrance: Entrance, *, last: bool = False) -> None:
+        """Let an entrance be served; the ``last`` one, of which there is one, after what has come at all others."""
         with self._lock:
+            self._last = entrance if last else self._last
             place = len(self._entrances)
             self._entrances.append(entrance)
             if self._poll is None:
@@ -108,13 +112,19 @@ class Door:
 
     def _run(self) -> None:
         ready: deque[Entrance] = deque()
+        last, rounds = False, 0
         while not self._closing:
-            for entrance in self._woken(_PATIENCE_S if not ready else 0.0):
-                if entrance not in ready:
+            for entrance in self._woken(_PATIENCE_S if not (ready or last) else 0.0):
+                if entrance is self._last:
+                    last = True
+                elif entrance not in ready:
                     ready.append(entrance)
             if ready:
                 self._round(ready)
+                rounds += 1
                 time.sleep(REST_S)
+            if last and self._last is not None and (not ready or rounds >= MOST_ROUNDS_FIRST):
+                last, rounds = self._some(self._last, 1)[1], 0
 
     def _woken(self, patience_s: float) -> list[Entrance]:
         """Return where something may have come, after a wait if there is nothing."""

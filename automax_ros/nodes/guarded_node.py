@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -13,12 +14,14 @@ from rclpy.parameter import Parameter
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.nodes.guard import Guard
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.nodes.ros_parameters import RosArgumentsError
 from automax_ros.running.health import Health
 
 MAIN_NODE = "rack"
 """The node that ``__node`` without a name means."""
-_SIM_TIME = "use_sim_time"
-_OF_RCLPY = (_SIM_TIME, "start_type_description_service")
+SIM_TIME = "use_sim_time"
+"""The parameter of every node that says whether its time is that of ``/clock``."""
+_OF_RCLPY = (SIM_TIME, "start_type_description_service")
 
 
 class GuardedNode(Node):  # type: ignore[misc]
@@ -28,15 +31,15 @@ class GuardedNode(Node):  # type: ignore[misc]
         self, name: str, namespace: str, context: Context, health: Health, arguments: RosArguments = NO_ARGUMENTS
     ) -> None:
         """Join the graph; ``namespace`` is the rack's, without a slash at its head."""
-        # The rack is the clock: its stamps are the grid's, whatever a launch file says to all nodes.
-        own_time = [Parameter(_SIM_TIME, value=False)]
+        follows = follows_clock(arguments, namespace)
+        own_time = [Parameter(SIM_TIME, value=follows)]
         space = f"/{namespace}"
         self.own_name = name
         name = arguments.name_of(name, main=name == MAIN_NODE)
         # Rules of a foreign context that are for all nodes must not put the rack elsewhere, or give all one name.
         own_place = ["--ros-args", "-r", f"__ns:={space}", "-r", f"__node:={name}"]
         super().__init__(name, namespace=space, context=context, cli_args=own_place, parameter_overrides=own_time)
-        self.add_on_set_parameters_callback(_refuse_simulated_time)
+        self.add_on_set_parameters_callback(partial(_keep_time, follows))
         self.guard = Guard(health, self.get_logger().error)
         self.guard.services(self)
 
@@ -57,8 +60,23 @@ class GuardedNode(Node):  # type: ignore[misc]
         return super().set_parameters_atomically(parameter_list)
 
 
-def _refuse_simulated_time(parameters: list[Parameter[Any]]) -> SetParametersResult:
-    """Refuse ``use_sim_time``: the rack's own time is what its messages are stamped with."""
-    wanted = any(parameter.name == _SIM_TIME and parameter.value for parameter in parameters)
-    reason = "the rack keeps its own time; use_sim_time cannot be set on its nodes" if wanted else ""
-    return SetParametersResult(successful=not wanted, reason=reason)
+def follows_clock(arguments: RosArguments, namespace: str) -> bool:
+    """Return whether a rack is told to follow ``/clock``: by ``use_sim_time`` for all nodes, or for the node ``rack``.
+
+    Raises:
+        RosArgumentsError: it is neither true nor false.
+    """
+    item = arguments.given_to(MAIN_NODE, namespace, main=True).get(SIM_TIME)
+    if item is not None and not isinstance(item.value, bool):
+        raise RosArgumentsError(f"{SIM_TIME} is true or false", place=item.place)
+    return item is not None and bool(item.value)
+
+
+def _keep_time(follows: bool, parameters: list[Parameter[Any]]) -> SetParametersResult:
+    """Refuse another ``use_sim_time`` than at the start: the rack's time is what its messages are stamped with."""
+    if all(parameter.name != SIM_TIME or parameter.value is follows for parameter in parameters):
+        return SetParametersResult(successful=True)
+    own = "the rack follows /clock" if follows else "the rack keeps its own time"
+    cure = f"start it with --ros-args -p use_sim_time:={'false' if follows else 'true'}"
+    reason = f"{own}; use_sim_time cannot be set on its nodes: {cure}"
+    return SetParametersResult(successful=False, reason=reason)

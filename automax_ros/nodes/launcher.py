@@ -19,6 +19,7 @@ from automax_ros.nodes.rack_node import RackNode
 from automax_ros.nodes.rack_nodes import RackNodes
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.rack import Rack
+from automax_ros.running.simulated_pacer import SimulatedTime
 
 
 class LiveRack:
@@ -35,6 +36,7 @@ class LiveRack:
         *,
         process: RosProcess | None = None,
         manager: RackNode | None = None,
+        simulated: SimulatedTime | None = None,
     ) -> None:
         """Create all nodes.
 
@@ -44,6 +46,7 @@ class LiveRack:
             seating: the processes of a distributed rack, as ``RackNodes`` takes it.
             process: the caller's part in the graph, who closes it; without one it is this rack's own.
             manager: the caller's node ``rack``, as ``RackNodes`` takes it.
+            simulated: the rack's own time, as ``RackNodes`` takes it.
 
         Raises:
             RosUnavailable: ROS cannot be initialised.
@@ -55,7 +58,9 @@ class LiveRack:
         self._executor, context = self._process.executor, self._process.context
         try:
             with self._process.resting():
-                self.nodes = RackNodes(rack, context=context, arguments=arguments, manager=manager, seating=seating)
+                self.nodes = RackNodes(
+                    rack, context=context, arguments=arguments, manager=manager, seating=seating, simulated=simulated
+                )
                 self.nodes.add_to(self._executor)
         except Exception:
             self._leave()

@@ -26,7 +26,7 @@ from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.nodes.turns import Turns
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
-from automax_ros.running.pacer import Pacer
+from automax_ros.running.pace import Pace
 from automax_ros.wire.stream import RackStream
 from automax_ros.wire.topics import Take, Topic
 
@@ -38,7 +38,7 @@ class Site:
     Attributes:
         rack: the rack.
         stream: the messages that it sends.
-        pacer: what keeps it on the wall clock.
+        pacer: what keeps its time.
         context: of all its nodes.
         health: where they report trouble.
         door: where messages and requests come in.
@@ -49,7 +49,7 @@ class Site:
 
     rack: Rack
     stream: RackStream
-    pacer: Pacer
+    pacer: Pace
     context: Context
     health: Health
     door: Door

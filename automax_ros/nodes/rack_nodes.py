@@ -27,7 +27,9 @@ from rclpy.utilities import get_default_context
 
 from automax_ros.core.types import Value
 from automax_ros.nodes.bus import RackBus, Seating
+from automax_ros.nodes.clock import RackClock
 from automax_ros.nodes.door import Door
+from automax_ros.nodes.guarded_node import SIM_TIME, follows_clock
 from automax_ros.nodes.managed import ACTIVE, INACTIVE
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
@@ -43,11 +45,14 @@ from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health
-from automax_ros.running.pacer import START_LEAD_NS, Pacer
+from automax_ros.running.pacer import START_LEAD_NS
+from automax_ros.running.simulated_pacer import SimulatedTime
 from automax_ros.wire.stream import RackStream
 
 LOOK_S = 0.02
 """How often it is looked whether the other processes are there."""
+
+_TOGETHER = "a distributed rack keeps the wall clock, by which its processes agree"
 
 
 class RackNodes:
@@ -75,6 +80,7 @@ class RackNodes:
         arguments: RosArguments | None = None,
         manager: RackNode | None = None,
         seating: Seating | None = None,
+        simulated: SimulatedTime | None = None,
     ) -> None:
         """Create the nodes; nothing runs yet.
 
@@ -85,13 +91,17 @@ class RackNodes:
                 namespace is that of a rack that is given by its file; a rack that is given has its own.
             manager: the node ``rack`` where the caller has one, who then sees to its state; else one is made here.
             seating: the processes of a distributed rack; ``rack`` is the part of this one.
+            simulated: the rack's own time in place of the wall clock, which it then tells on ``/clock``.
 
         Raises:
             RackError: the YAML file or a task has errors, which ``findings`` holds.
-            RosArgumentsError: the command line is not one, or gives a tunable a value that its task refuses.
+            RosArgumentsError: the command line is not one, gives a tunable a value that its task refuses, or lets a
+                distributed rack follow ``/clock``.
         """
         if arguments is None:
             arguments = split_arguments(sys.argv)[1]
+        if simulated is not None:  # whoever sends /clock does not follow it
+            arguments = arguments.without(SIM_TIME)
         self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
         run_id = int.from_bytes(os.urandom(8), "big") >> 1
         self.stream = RackStream(self.rack, run_id)
@@ -99,7 +109,11 @@ class RackNodes:
         self._executor: Any = None
         self._context = get_default_context() if context is None else context
         turns = Turns()
-        self._pacer = Pacer(self.rack.scheduler, turn=turns.scanner)
+        follows = follows_clock(arguments, self.rack.config.namespace)
+        if follows and seating is not None:
+            raise RosArgumentsError(_TOGETHER, "leave out use_sim_time, or run the rack in one process")
+        self._clock = RackClock(self.rack.scheduler, turns, follows=follows, simulated=simulated)
+        self._pacer = self._clock.pace
         self._door = Door(self._report)
         self._site = Site(
             self.rack, self.stream, self._pacer, self._context, self.health, self._door, arguments, lock=turns
@@ -115,6 +129,8 @@ class RackNodes:
             manager.follow(INACTIVE)
             self._own = (manager,)
         self.manager = manager
+        self._clock.join(self._site, self.nodes[0])
+        self._to_begin: Sequence[tuple[str, Value]] | None = None
         if manager is not None:
             self.rack.observers.add(Follower(manager))
         self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
@@ -150,24 +166,33 @@ class RackNodes:
     def start(self, settings: Sequence[tuple[str, Value]] = (), *, paced: bool = True) -> None:
         """Send what stands at the start and put the rack into RUN; rack time 0 comes in a moment.
 
+        A rack that follows ``/clock`` begins with its first message: ``run``, or the thread, waits for it.
+
         Args:
             settings: those of ``Rack.start``, which raises what it says.
             paced: whether a thread scans from then on; without one, ``run`` does.
         """
         self._door.open()
+        self._to_begin = settings
+        if self._clock.is_there:
+            self._begin()
+        if paced:
+            self._thread = threading.Thread(target=self._keep_pace, name=self.rack.config.namespace, daemon=True)
+            self._thread.start()
+
+    def _begin(self) -> None:
+        settings, self._to_begin = self._to_begin, None
+        if settings is None:
+            return
         with self._site.lock:
             if self.bus is None:
-                self._pacer.begin(START_LEAD_NS)
-                self.stream.begin(time.time_ns() + START_LEAD_NS)
+                self.stream.begin(self._pacer.begin(START_LEAD_NS))
                 self._begun = True
                 self.rack.start(settings)
             else:
                 self._start_together(self.bus, settings)
             for node in (*self._own, *self._managed()):
                 node.follow(ACTIVE)
-        if paced:
-            self._thread = threading.Thread(target=self._keep_pace, name=self.rack.config.namespace, daemon=True)
-            self._thread.start()
 
     @property
     def has_begun(self) -> bool:
@@ -228,7 +253,10 @@ class RackNodes:
         on_idle: Callable[[int], None] | None = None,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Scan on this thread until rack time ``until_ns``, or asked to stop (``Pacer.run``)."""
+        """Scan on this thread until rack time ``until_ns``, or asked to stop (``Pace.run``)."""
+        if not self._clock.wait(should_stop, on_idle):
+            return
+        self._begin()
         self._pacer.run(until_ns, on_idle, should_stop)
 
     def close(self) -> None:
@@ -270,6 +298,8 @@ class RackNodes:
 
     def _keep_pace(self) -> None:
         try:
+            self._clock.wait(lambda: self._closed)
+            self._begin()
             while not self._closed:
                 with self._site.lock.scanner:
                     wait_s = self._pacer.step()

@@ -15,7 +15,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from automax_ros.core.text import near_or_listed, quoted
@@ -75,6 +75,10 @@ class RosArguments:
         if main and "" in self.names:
             full.append(f"/{self.placed(self.names[''])}")
         return {item.name: item for item in self.parameters if any(item.means(name) for name in full)}
+
+    def without(self, parameter: str) -> RosArguments:
+        """Return the same without a parameter."""
+        return replace(self, parameters=tuple(item for item in self.parameters if item.name != parameter))
 
     @property
     def words(self) -> list[str]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import dataclass
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.running.pace import Turn, Wait, by_steps
@@ -19,6 +20,13 @@ MOST_TICK_NS = 10 * NS_PER_MS
 """The clock is told at least once in so much rack time (decision: ``automax play`` and rosbag2 do as often or less)."""
 MOST_LATE_NS = 100 * NS_PER_MS
 """What a slow host loses beyond this on the wall clock is not made up for by running faster (decision)."""
+
+
+@dataclass(frozen=True)
+class SimulatedTime:
+    """Simulated time at ``rate`` times the wall clock, None as fast as it goes."""
+
+    rate: float | None = None
 
 
 class SimulatedPacer:

@@ -148,6 +148,10 @@ class RackStream:
         """Be the stream of a run whose number was not known before; to be called before ``begin``."""
         self.run_id = self._messages.run_id = run_id
 
+    def leave_out(self, time_ns: int) -> None:
+        """Let later stamps be ahead by a time (ns) that the rack has not lived through."""
+        self._messages.epoch_ns += time_ns
+
     def begin(self, epoch_ns: int = 0) -> None:
         """Send the facts that stand at the start, and observe the rack: to be called just before ``Rack.start``.
 

@@ -43,7 +43,7 @@ def test_tunables_have_the_values_given(started, tmp_path):
     live = started("--params-file", str(path), "-p", "processor_1:FAST.SLOPE:=0.6", "-p", "FAST.FREE:=2")
     assert (fast(live, "TRIM%"), fast(live, "SLOPE"), fast(live, "FREE")) == (7, pytest.approx(0.6), 2.0)
     assert live.notes == []
-    (node,) = [node for node in live._nodes.nodes if node.get_name() == "processor_1"]
+    (node,) = [node for node in live.nodes.nodes if node.get_name() == "processor_1"]
     assert node.get_parameter("FAST.TRIM").value == 7
     assert node.get_parameter("FAST.FREE").value == 2.0
 
@@ -166,7 +166,7 @@ def test_reasons_name_what_is_near_and_facts_cannot_be_set(started, client):
 
 def test_parameters_follow_whoever_tunes_otherwise(started):
     live = started()
-    (node,) = [node for node in live._nodes.nodes if node.get_name() == "processor_1"]
+    (node,) = [node for node in live.nodes.nodes if node.get_name() == "processor_1"]
     live.rack.adjust.tune("FAST.TRIM%", 42)
     assert node.get_parameter("FAST.TRIM").value == 42
     assert fast(live, "TRIM%") == 42
@@ -174,7 +174,7 @@ def test_parameters_follow_whoever_tunes_otherwise(started):
 
 def test_facts_of_rack_and_module(started):
     live = started()
-    nodes = {node.get_name(): node for node in live._nodes.nodes}
+    nodes = {node.get_name(): node for node in live.nodes.nodes}
     facts = {
         name: nodes["common_memory"].get_parameter(name).value for name in ("rack", "run_id", "config", "executive")
     }
