@@ -23,9 +23,9 @@ class OperatorNode(ModuleNode):
     def __init__(self, site: Site) -> None:
         """Create the services."""
         super().__init__(site, "operator")
-        self._desk = OperatorDesk(self)
+        self.desk = OperatorDesk(self)
 
     def destroy_node(self) -> None:
         """Leave the graph; a source that is being compiled is not installed."""
-        self._desk.close()
+        self.desk.close()
         super().destroy_node()

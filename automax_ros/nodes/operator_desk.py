@@ -27,6 +27,7 @@ from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.nodes.later import allow_later
 from automax_ros.nodes.module_node import ModuleNode
+from automax_ros.nodes.operator_forward import Forwarding
 from automax_ros.nodes.reloading import Reloading
 from automax_ros.nodes.tables import status_of_task, task_fields
 from automax_ros.rack.halting import Halting
@@ -51,11 +52,16 @@ def _nothing(_: Any, __: Any) -> None:
 
 
 class OperatorDesk:
-    """Serves requests by the services of one node. ``close`` when it leaves the graph."""
+    """Serves requests by the services of one node. ``close`` when it leaves the graph.
 
-    def __init__(self, node: ModuleNode) -> None:
-        """Create the services."""
+    ``forward_by``, once it is set, passes on what concerns other processes of a distributed rack.
+    """
+
+    def __init__(self, node: ModuleNode, name_of: Callable[[str], str] = str) -> None:
+        """Create the services; ``name_of`` returns the full name of one."""
         self._node, self._site, self._rack = node, node.site, node.site.rack
+        self._name_of = name_of
+        self.forward_by: Forwarding | None = None
         orders = self._orders = Orders(self._rack)
         self._halting = Halting(self._rack, self._site.pacer)
         self._serve(OperateTask, "run", lambda request, _: orders.run(request.task), self._task_now)
@@ -76,7 +82,7 @@ class OperatorDesk:
         self._serve(OperateControl, "module", lambda request, _: orders.module(*_moved(request)))
         self._serve(OperateControl, "plant", lambda request, _: orders.plant(*_moved(request)))
         self._reloading = Reloading(node, orders, self._reloaded)
-        allow_later(node.create_service(Reload, "reload", self._reloading.answer))
+        self._create(Reload, "reload", self._reloading.answer)
         self._serve(ReadValues, "get", lambda request, response: _fill(response, orders.get(list(request.names))))
         self._serve(ReadValues, "forces", lambda _, response: _fill(response, orders.forces()))
         self._serve(ReadErrors, "errors", self._errors)
@@ -97,7 +103,16 @@ class OperatorDesk:
                     error = raised
                 return self._concluded(name, request, response, error, tell)
 
-        self._node.create_service(kind, name, answered)
+        self._create(kind, name, answered)
+
+    def _create(self, kind: Any, name: str, answered: Callable[[Any, Any], Any]) -> None:
+        def routed(request: Any, response: Any) -> Any:
+            if self.forward_by is None:
+                return answered(request, response)
+            with self._site.present():
+                return self.forward_by.answer(name, kind, request, response, answered)
+
+        allow_later(self._node.create_service(kind, self._name_of(name), routed))
 
     def _concluded(self, name: str, request: Any, response: Any, error: Exception | None, tell: Tell) -> Any:
         """Return a response with how the request ended, and what is true now."""

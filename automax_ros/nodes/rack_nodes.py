@@ -33,6 +33,7 @@ from automax_ros.nodes.guarded_node import SIM_TIME, follows_clock
 from automax_ros.nodes.managed import ACTIVE, INACTIVE
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
+from automax_ros.nodes.operator_sharing import share_operator
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.nodes.rack_duties import HeldRack
 from automax_ros.nodes.rack_node import Follower, RackNode
@@ -134,6 +135,7 @@ class RackNodes:
         if manager is not None:
             self.rack.observers.add(Follower(manager))
         self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
+        self._desk = None if self.bus is None else share_operator(self.nodes, self.bus)
         self.notes = self._begin_with(arguments)
 
     def _begin_with(self, arguments: RosArguments) -> list[str]:
@@ -273,6 +275,8 @@ class RackNodes:
             self.rack.operations.stop_tasks()
             if self._begun:
                 self.stream.end()
+        if self._desk is not None:
+            self._desk.close()
         for node in (*self.nodes, *self._own):
             if self._executor is not None:
                 self._executor.remove_node(node)
