@@ -127,7 +127,8 @@ class BusLink:
         """Note whether the rack stands otherwise than before."""
         cause = self._rack.operations.stopped
         if not self._adopting and cause != self.standing.cause:
-            self.standing = Standing(operation.at_ns, self.seat, cause)
+            # Two at one instant, or before the start, have their order too.
+            self.standing = Standing(max(operation.at_ns, self.standing.at_ns + 1), self.seat, cause)
 
     # from other processes
 

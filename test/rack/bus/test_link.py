@@ -175,6 +175,18 @@ def test_a_stop_all_of_one_stops_all_and_outputs_are_off_everywhere(config):
     assert one.rack.operations.stopped is None
 
 
+def test_a_stop_and_a_run_at_one_instant_are_told_in_their_order(config):
+    home, one, _ = processes = cut(config)
+    assert {process.rack.now_ns for process in processes} == {0}
+    for _ in range(2):
+        home.rack.operations.stop_all("by hand")
+        one.link.adopt(home.link.standing)
+        assert one.rack.operations.stopped is not None
+        one.rack.operations.run_all()
+        home.link.adopt(one.link.standing)
+        assert home.rack.operations.stopped is None
+
+
 def test_a_process_that_joins_takes_over_what_the_others_hold(config):
     home, one, two = processes = cut(config)
     for process in processes:

@@ -1,0 +1,131 @@
+"""An operator of a rack of several processes: what is asked at common memory is done where its object is."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+from rack.bus.parts import SEATS, config_in
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.rack import Rack
+
+PATIENCE_NS = 30 * NS_PER_S
+RUN_ID = 77
+
+
+@pytest.fixture
+def racks(tmp_path, ros_domain_id):
+    """Three processes' parts of a rack, each on a thread of its own here."""
+    from rclpy.context import Context
+    from rclpy.executors import SingleThreadedExecutor
+
+    from automax_ros.nodes.bus import Seating
+    from automax_ros.nodes.rack_nodes import RackNodes
+
+    config = config_in(tmp_path)
+    context = Context()
+    context.init(args=["--ros-args", "--disable-stdout-logs"])
+    executor = SingleThreadedExecutor(context=context)
+    parts = [RackNodes(Rack(config, local=s), context=context, seating=Seating(SEATS, RUN_ID)) for s in SEATS]
+    for part in parts:
+        part.add_to(executor)
+    while not all(part.bus.epoch_ns for part in parts):
+        executor.spin_once(timeout_sec=0.05)
+    for part in parts:
+        part.start()
+    yield {"executor": executor, "parts": parts}
+    for part in parts:
+        part.close()
+    executor.shutdown()
+    context.try_shutdown()
+
+
+@pytest.fixture
+def ask(racks):
+    """Ask a service of the rack: by its name and the fields of the request."""
+    import threading
+
+    from automax_msgs import srv
+    from std_srvs.srv import Trigger
+
+    from automax_ros.nodes.operating import RackClient
+
+    ended = threading.Event()
+
+    def spin():
+        while not ended.is_set():
+            racks["executor"].spin_once(timeout_sec=0.02)
+
+    spinning = threading.Thread(target=spin)
+    spinning.start()
+    kinds = {name: getattr(srv, name) for name in dir(srv)} | {"Trigger": Trigger}
+
+    def call(client, kind, service, **fields):
+        return client.call(kinds[kind], service, kinds[kind].Request(**fields), PATIENCE_NS)
+
+    with RackClient("/cut1") as client:
+        client.find(PATIENCE_NS)
+        yield partial(call, client)
+    ended.set()
+    spinning.join()
+
+
+def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
+    home, one, two = (part.rack for part in racks["parts"])
+    told = ask("ReadTasks", "tasks")
+    assert told.ok
+    assert {(task.task, task.module) for task in told.tasks} == {
+        ("ONE", "processor_1"),
+        ("TWO", "processor_2"),
+        ("WIND_A", "udc_10"),
+    }
+    assert ask("ReadStatus", "status").tasks == 3
+    assert ask("OperateTask", "stop", task="ONE").ok
+    assert one.task("ONE").status.value == "stopped"
+    again = ask("OperateTask", "run", task="NONE")
+    assert not again.ok
+    assert "NONE" in again.reason
+    # Commons are the home's, locals their task's; the answer has them in the order in which they were asked for.
+    found = ask("ReadValues", "get", names=["ONE.N%", "A%", "ONE.N%"])
+    assert found.found == ["ONE.N%", "A%"]
+    assert int(found.values[0]) == one.task("ONE").value("N%") > 0
+    assert ask("OperateTask", "run", task="one").ok
+    assert ask("SetValue", "force", name="ONE.N%", value="5").ok
+    assert ask("SetValue", "force", name="A%", value="100").ok
+    held = ask("ReadValues", "forces")
+    assert dict(zip(held.found, held.values, strict=True)) == {"A%": "100", "ONE.N%": "5"}
+    assert ask("Unforce", "unforce").forced == []
+    assert one.forces() == two.forces() == home.forces() == []
+
+
+def test_a_stop_all_and_a_run_all_concern_every_process(ask, racks):
+    home, one, two = (part.rack for part in racks["parts"])
+    assert ask("Trigger", "stop_all").success
+    wait(lambda: all(rack.operations.stopped for rack in (home, one, two)))
+    assert {task.status.value for rack in (one, two) for task in rack.tasks} == {"stopped"}
+    assert ask("Trigger", "run_all").success
+    assert {task.status.value for rack in (one, two) for task in rack.tasks} == {"running"}
+    wait(lambda: not any(rack.operations.stopped for rack in (home, one, two)))
+    refused = ask("Trigger", "pause")
+    assert not refused.success
+    assert "several processes" in refused.message
+
+
+def test_a_source_is_reloaded_where_its_task_runs(ask, racks):
+    _, one, _ = (part.rack for part in racks["parts"])
+    source = one.sources["ONE"].text.replace("INPUT2=1", "INPUT2=3")
+    assert ask("Reload", "reload", task="ONE", source=source).ok
+    assert "INPUT2=3" in one.sources["ONE"].text
+    wrong = ask("Reload", "reload", task="ONE", source="10 NONSENSE\n")
+    assert not wrong.ok
+    assert wrong.findings
+
+
+def wait(condition) -> None:
+    import time
+
+    deadline = time.monotonic_ns() + PATIENCE_NS
+    while not condition():
+        assert time.monotonic_ns() < deadline
+        time.sleep(0.02)
