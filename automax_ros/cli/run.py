@@ -2,7 +2,8 @@
 
 On the wall clock the rack's modules are ROS 2 nodes in this process, until Ctrl-C or for --duration seconds. With
 --simulated time passes as fast as the machine can and nothing of ROS is started: the same rack gives the same bag, byte
-for byte.
+for byte; with --simulated --ros the nodes are there too, and the rack sends /clock. With `--ros-args -p
+use_sim_time:=true` it follows another's /clock.
 """
 
 from __future__ import annotations

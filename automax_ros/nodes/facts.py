@@ -10,13 +10,17 @@ Facts = dict[str, tuple[bool | int | float | str, str]]
 """Value and description by name."""
 
 
-def rack_facts(rack: Rack, run_id: int) -> Facts:
+def run_facts(run_id: int) -> Facts:
+    """Return those of one run, which are known once it begins: processes of a distributed rack agree on its number."""
+    return {"run_id": (run_id, "number of the run, as in VariableTable")}
+
+
+def rack_facts(rack: Rack) -> Facts:
     """Return those of a whole rack."""
     config = rack.config
     return {
         "rack": (config.name, "the rack's name"),
         "config": (str(config.path.absolute()), "its YAML file"),
-        "run_id": (run_id, "number of its run, as in VariableTable"),
         "executive": (f"{config.executive / 10:.1f}", "version of its executive software"),
         "execution": (config.execution.value, "what time a scan takes: none (ideal), or the manual's (modeled)"),
         "operator": (config.operator, "whether it has the services of an operator"),

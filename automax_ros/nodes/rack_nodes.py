@@ -29,6 +29,7 @@ from automax_ros.core.types import Value
 from automax_ros.nodes.bus import RackBus, Seating
 from automax_ros.nodes.clock import RackClock
 from automax_ros.nodes.door import Door
+from automax_ros.nodes.facts import run_facts
 from automax_ros.nodes.guarded_node import SIM_TIME, follows_clock
 from automax_ros.nodes.managed import ACTIVE, INACTIVE
 from automax_ros.nodes.managed_module import ManagedModuleNode
@@ -193,6 +194,8 @@ class RackNodes:
                 self.rack.start(settings)
             else:
                 self._start_together(self.bus, settings)
+            if self.rack.part.is_home:
+                self.nodes[0].declare_facts(run_facts(self.stream.run_id))
             for node in (*self._own, *self._managed()):
                 node.follow(ACTIVE)
 

@@ -57,7 +57,7 @@ def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
     made: list[ModuleNode] = []
     if site.is_home:
         made.append(CommonMemoryNode(site))
-        made[0].declare_facts(rack_facts(site.rack, site.stream.run_id))
+        made[0].declare_facts(rack_facts(site.rack))
         if site.rack.config.operator:
             made.append(OperatorNode(site))
     for module in site.rack.modules:

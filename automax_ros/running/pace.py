@@ -6,10 +6,16 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Protocol
 
+from automax_ros.core.ticks import NS_PER_MS
+
 Wait = Callable[[float], object]
 """Spends at most a time in s, 0 or more; it may return early."""
 Turn = AbstractContextManager[object]
 """What keeps other threads from the rack while it is held."""
+
+
+BREATH_S, BREATH_PERIOD_NS = 0.0001, 2 * NS_PER_MS
+"""A pace that never waits lets other threads have their turn for so long, each so many ns of the wall clock."""
 
 
 class Pace(Protocol):
@@ -50,12 +56,15 @@ def by_steps(
 ) -> None:
     """Step a pace until something is over; ``chore`` is called with the time, each so many ns of the wall clock."""
     act, period_ns = chore
-    next_chore = wall()
+    next_chore = next_breath = wall()
     while not is_over():
         with turn:
             pause_s = pace.step()
-        if act is not None and wall() >= next_chore:
-            next_chore = wall() + period_ns
+        now = wall()
+        if act is not None and now >= next_chore:
+            next_chore = now + period_ns
             with turn:
                 act(pace.now_ns)
-        wait(pause_s)
+        if pause_s > 0 or now >= next_breath:
+            wait(max(pause_s, BREATH_S))
+            next_breath = wall() + BREATH_PERIOD_NS

@@ -49,7 +49,7 @@ class SimulatedPacer:
             tell: gets the time once all is done that happens up to and at it.
             rate: how many times faster than the wall clock, above 0; None is as fast as it goes.
             clock: the wall clock in ns, monotonic; only for ``rate`` and ``on_idle``.
-            wait: spends at most a time in s; with 0 it lets others in.
+            wait: spends at most a time in s.
             turn: held while the scheduler's time passes.
         """
         self._scheduler, self._tell, self._rate = scheduler, tell, rate
