@@ -20,6 +20,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.rcl import library
 from automax_ros.nodes.taking import taker_of
+from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import message_class, ros_qos
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.modules.network import CYCLE_NS
@@ -33,6 +34,8 @@ from automax_ros.wire.messages import NetworkDrop
 from automax_ros.wire.qos import NETWORK
 from automax_ros.wire.topics import Topic
 
+TELL_INTERVAL_S = 0.2
+"""What changes on the network is logged at most this often."""
 TYPE = "automax_msgs/msg/NetworkDrop"
 MOST_WAITING = NETWORK.depth
 """Messages that wait for the next cycle; of more the oldest are lost, as they would be on DDS's side."""
@@ -51,6 +54,7 @@ class NetworkNode(ModuleNode):
         name = network_topic(site.rack.config.namespace, module.network)
         self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
         self._told: tuple[object, ...] = ("", (), ())
+        self._throttle = Throttle(TELL_INTERVAL_S)
         self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
         site.door.add(_Cable(self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK)), self._waiting))
         module.connect(self._send)
@@ -86,16 +90,17 @@ class NetworkNode(ModuleNode):
             self._module.receive(known, damaged=arrived.count(None))
         status = self._module.status()
         told = (status.code, status.lost, status.rivals)
-        if told != self._told:
+        if told != self._told and self._throttle.passes():
             self._told = told
             self._tell(status)
             self.site.diagnostics.look()
 
     def _tell(self, status: NetworkStatus) -> None:
         network, log = self._module.network, self.get_logger()
-        for rival in status.rivals:
-            text = f"network {network}: {rival} uses a drop that is another's: give each module drops of its own"
-            self.site.health.note("two modules with one drop", rival, lambda text=text: text)  # type: ignore[misc]
+        if status.rivals:
+            who = ", ".join(map(str, status.rivals))
+            text = f"network {network}: drops of another module are used by {who}: give each module drops of its own"
+            self.site.health.note("two modules with one drop", network, lambda: text)
             log.error(text)
         if status.lost:
             log.warning(f"network {network}: {_sentence(status)}")

@@ -1,11 +1,12 @@
 """A network module 57C404 of a running rack: its registers, and what it exchanges with the other racks of a network.
 
 Once in a cycle of 5.5 ms of rack time it sends, as long as it has power: the master the broadcast registers and its
-half of each drop that it hears or that a variable of its rack file stands on; a slave, while it hears the master, its
+half of each drop on which a variable of its rack file stands or to which a task has written since the power came
+(decision: a drop of its own is not sent because a stranger claims to be there); a slave, while it hears the master, its
 half of the drops that it represents. What arrives is written into registers by the module, between two scans, at the
 instant at which it arrives, and recorded like any other write: a replay needs no network. The length of the cycle is
-ours, after the tick of a Processor (decision): no source at hand prints one. A host that is late skips cycles, which
-do not count as time-outs (decision).
+ours, after the tick of a Processor (decision): no source at hand prints one. A host that is late skips cycles, which do
+not count as time-outs (decision).
 
 A lost drop keeps the values that came last; its status bits are cleared and the module shows the code C until it is
 heard again; that no task stops for it is ours (decision). STOP ALL clears outputs, so that the others see 0; the depth
@@ -20,6 +21,7 @@ Counters show what they have counted at every sixteenth cycle (decision: each sh
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
@@ -33,6 +35,7 @@ from automax_ros.rack.modules.network_registers import (
     DEPTH,
     DONE,
     INVALID,
+    LAST_DROP,
     MASTER,
     OVERRUNS,
     OWN_DROP,
@@ -82,6 +85,9 @@ class NetworkModule:
         self._hearing = Hearing(self._named if self._is_master else (MASTER,))
         self._key = EventKey(EventClass.IO, config.slot, "network")
         self._event: ScheduledEvent | None = None
+        self._written: set[int] = set()
+        if self._is_master:
+            self._watch_writes()
         self._send: Send | None = None
         self._sequence = 0
         self._forget()
@@ -148,6 +154,7 @@ class NetworkModule:
             "depth": self._depth,
             "defined": self._defined,
             "sequence": self._sequence,
+            "written": sorted(self._written),
             "bits": list(self._bits),
             "count": dict(self._count),
             **self._hearing.state(),
@@ -163,6 +170,7 @@ class NetworkModule:
             raise ValueError(f"{self.config.name} has another state")
         self._depth, self._defined, self._sequence = state["depth"], state["defined"], state["sequence"]
         self._bits, self._count = list(state["bits"]), dict(state["count"])
+        self._written.update(state["written"])
         self._hearing.load(state["drops"], state["rivals"])
         if state["next_ns"] is not None:
             self._begin(state["next_ns"])
@@ -181,8 +189,15 @@ class NetworkModule:
         drops = {place.register // AREA for place in places if place is not None and place.bank == self._view}
         return sorted(drops - {MASTER})
 
+    def _watch_writes(self) -> None:
+        """Note to which drops a task writes that no variable stands on."""
+        for drop in range(1, LAST_DROP + 1):
+            for number in from_master(drop) if drop not in self._named else ():
+                self._parts.memory.watch(self._view, number, partial(self._written.add, drop))
+
     def _forget(self) -> None:
         self._depth, self._defined = 1, False
+        self._written.clear()
         self._bits = [0] * len(STATUS)
         self._count = dict.fromkeys(_COUNTERS, 0)
         self._hearing.clear()
@@ -245,7 +260,7 @@ class NetworkModule:
         """Return the drops of which it sends a half in each cycle."""
         if not self._is_master:
             return self._own
-        return [MASTER, *sorted({*self._hearing.heard, *self._named})]
+        return [MASTER, *sorted({*self._named, *self._written})]
 
     def _frame(self, drop: int) -> Frame:
         numbers = from_master(drop) if self._is_master else from_slave(drop)
@@ -257,7 +272,7 @@ class NetworkModule:
         from_the_master = frame.station == MASTER
         if self._is_master == from_the_master:
             if from_the_master or not set(self._own).isdisjoint(frame.drops):
-                self._hearing.rivals[sender] = 0
+                self._hearing.meet(sender)
             return
         if from_the_master and frame.drop != MASTER and frame.drop not in self._own:
             return

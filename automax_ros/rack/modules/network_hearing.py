@@ -14,6 +14,8 @@ from typing import Any
 from automax_ros.rack.modules.network_port import Frame, Sender
 
 TIMEOUT_CYCLES, MISSES = 4, 4
+MOST_RIVALS = 8
+"""Senders that are told apart as rivals at one time (decision): a stranger can call itself anything."""
 _WRAP = 1 << 32
 
 
@@ -56,13 +58,18 @@ class Hearing:
         """Take in whose frame it is; return how many frames of the drop were missed, None where it is a rival's."""
         known = self.drops.setdefault(frame.drop, Drop())
         if known.is_heard and known.sender != sender:
-            self.rivals[sender] = 0
+            self.meet(sender)
             return None
         missed = (frame.sequence - known.sequence - 1) % _WRAP if known.is_heard else 0
         if missed >= _WRAP // 2:  # an older one, that another has overtaken
             return None
         known.sender, known.sequence, known.defined, known.silent = sender, frame.sequence, frame.defined, 0
         return missed
+
+    def meet(self, rival: Sender) -> None:
+        """Remember who sends what is another's."""
+        if rival in self.rivals or len(self.rivals) < MOST_RIVALS:
+            self.rivals[rival] = 0
 
     def cycle(self) -> int:
         """Let a cycle pass; return how many receive time-outs there were."""

@@ -9,7 +9,7 @@ import pytest
 
 from automax_ros.rack.loader import load
 from automax_ros.rack.modules.network import CYCLE_NS
-from automax_ros.rack.modules.network_hearing import MISSES, TIMEOUT_CYCLES, Hearing
+from automax_ros.rack.modules.network_hearing import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, Hearing
 from automax_ros.rack.modules.network_port import Frame, Sender
 from automax_ros.rack.modules.network_registers import greatest_depth, registers_of
 from automax_ros.rack.rack import Rack
@@ -180,7 +180,7 @@ def test_counters(cable, wind):
     before = dict(module.status().counters)
     cable.cycles(32)
     after = dict(module.status().counters)
-    assert after["received"] - before["received"] == 3 * 32, "the broadcast registers and two drops"
+    assert after["received"] - before["received"] == 2 * 32, "the broadcast registers and drop 3: nothing is at drop 4"
     assert after["transmitted"] - before["transmitted"] == 2 * 32
     assert after["timeouts"] == after["missed"] == after["unreadable"] == 0
     assert 0 < wind.value("RECEIVED%") <= after["received"]
@@ -332,6 +332,18 @@ def test_a_task_that_writes_the_wrong_half_is_an_error(tmp_path):
     config = load(tmp_path / "rack.yaml").config
     assert config is not None
     assert [item.code for item in check_tasks(config)[0].result.diagnostics] == ["AMX4017"]
+
+
+def test_strangers_with_many_names_are_a_few_rivals(cable, line):
+    for number in range(1000):
+        station(line).receive(
+            [(Sender(number, 1, f"R{number}"), sound()), (Sender(number, 2, "X"), sound(station=9, depth=1, drop=9))]
+        )
+    assert len(station(line).status().rivals) == MOST_RIVALS
+    before = len(cable.carried)
+    cable.cycles(1)
+    sent = [frame.drop for rack, frame in cable.carried[before:] if rack is line]
+    assert sent == [0, 3], "nobody makes the master send more"
 
 
 def test_a_sequence_goes_on_at_0():
