@@ -58,7 +58,7 @@ def page(family: Family, examples: Sequence[Example]) -> str:
 def described(block: Block) -> Iterator[str]:
     """Yield the lines that describe a block."""
     yield from (f"## {block.name}", "", f"{block.title}, section {block.section}. Runs on {runs_on(block)}.", "")
-    yield from ("```", block.function, "```", "")
+    yield from ("```text", block.function, "```", "")
     yield from markdown_table(
         ["input", "symbol", "type", "needed", "form", "meaning"], shortened(input_rows(block), block.inputs)
     )
@@ -79,7 +79,7 @@ def described(block: Block) -> Iterator[str]:
     yield ""
     times = [list(row) for row in time_rows(block)]
     yield from markdown_table(["Processor", "execution time, microseconds"], times) if times else (UNKNOWN_TIME,)
-    yield from ("", "```", *template(block).splitlines(), "```")
+    yield from ("", "```text", *template(block).splitlines(), "```")
 
 
 def example_of(block: Block, examples: Sequence[Example]) -> Iterator[str]:

@@ -368,6 +368,6 @@ def test_docs_show_what_is_printed(automax):
     blocks = [part.removesuffix("```") for part in text.split("```")[1::2]]
     automax.write("SPEED.BLK", blocks[0].removeprefix("blk\n"))
     for block in blocks[1:]:
-        command, _, shown = block.strip("\n").partition("\n")
+        command, _, shown = block.removeprefix("console\n").strip("\n").partition("\n")
         result = automax(*command.removeprefix("$ automax ").split())
         assert (result.out + result.err).rstrip("\n") == shown

@@ -30,7 +30,7 @@ def compared(automax, table, *options):
 
 def session():
     """The commands of the page's session with what they print."""
-    text = re.search(r"```\n(\$ .*?)```", PAGE.read_text(encoding="utf-8"), re.S)[1]
+    text = re.search(r"```console\n(\$ .*?)```", PAGE.read_text(encoding="utf-8"), re.S)[1]
     parts = re.split(r"^\$ (.*)\n", text, flags=re.M)[1:]
     return list(zip(parts[::2], parts[1::2], strict=True))
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import jsonschema
 import pytest
+from yaml_core import data_of
 
 import automax_ros.core
 from automax_ros.rack.loader import KEYS, load, schema
@@ -18,8 +19,6 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.rack_verbs import rack_verbs
 from automax_ros.rack.stimuli.schema import VERB_SCHEMAS
 from automax_ros.rack.stimuli.schema import schema as stimuli_schema
-
-from .yaml_core import data_of
 
 ROOT = Path(__file__).parents[2]
 FAULTY = Path(__file__).parent / "faulty"

@@ -1,0 +1,162 @@
+"""Every example of the documentation is executed, and does what its page says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+from yaml_core import data_of
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declaration import Platform
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.problems import Severity
+from automax_ros.language.checks.checker import check
+from automax_ros.language.syntax.task_kind import is_task_file
+from automax_ros.rack.loader import KEYS, load
+from automax_ros.rack.loader import schema as rack_schema
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.stimuli.schema import schema as stimuli_schema
+
+from .fences import PAGES, ROOT, Fence, fences
+from .scratch import commands, execute, prepare, session, shows, standing_in, write
+
+EXAMPLES = [fence for page in PAGES for fence in fences(page)]
+LANGUAGES = {"python", "yaml", "json", "sh", "console", "blk", "bas", "cnf", "csv", "ebnf", "text", "xml", "cmake"}
+SHOWN_ONLY = {"text", "csv", "ebnf", "xml", "cmake"}
+"""What is not executed: pictures, usage, tables that other examples read, the grammar (test/language/grammar.py)."""
+MOST_NOT_RUN = 12
+"""Blocks that cannot be executed; a new one must be worth it."""
+
+
+def ids(fence: Fence) -> str:
+    return str(fence)
+
+
+def test_there_are_examples():
+    assert len(EXAMPLES) > 100
+    assert {fence.language for fence in EXAMPLES} <= LANGUAGES
+    assert len([fence for fence in EXAMPLES if fence.language not in SHOWN_ONLY]) > 60
+
+
+def test_what_is_not_run_says_why():
+    not_run = [fence for fence in EXAMPLES if fence.note.startswith("not run: ")]
+    assert len(not_run) <= MOST_NOT_RUN
+    for fence in not_run:
+        assert len(fence.note.removeprefix("not run: ").split()) >= 4, fence
+
+
+@pytest.mark.parametrize("fence", [fence for fence in EXAMPLES if fence.note.startswith("run by ")], ids=ids)
+def test_what_another_test_runs_is_read_there(fence):
+    path = ROOT / fence.note.removeprefix("run by ").split()[0]
+    text = path.read_text(encoding="utf-8")
+    assert fence.page.name in text or fence.page.parent.name in text
+
+
+def here(*languages: str) -> list[Fence]:
+    return [fence for fence in EXAMPLES if fence.language in languages and fence.runs_here]
+
+
+@pytest.mark.parametrize("fence", here("json"), ids=ids)
+def test_json(fence):
+    json.loads(fence.text)
+
+
+def stub_tasks(path: Path) -> None:
+    """Write an empty task for each that a rack file names and the page does not show."""
+    for slot in data_of(path.read_text(encoding="utf-8"))["slots"].values():
+        for name, task in (slot.get("tasks") or {}).items():
+            file = path.parent / task.get("file", f"{name}.BLK")
+            if not file.exists() and not file.with_suffix(".BAS").exists():
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text("10 END\n" if file.suffix == ".BAS" else "10 CALL SCAN_LOOP(TICKS=4)\n20 END\n")
+
+
+@pytest.mark.parametrize("fence", here("yaml"), ids=ids)
+def test_yaml(fence, tmp_path):
+    """A rack file has no errors; a part of one, and stimuli, have the right form."""
+    data = data_of(fence.text)
+    if isinstance(data, list):
+        jsonschema.validate(data, json.loads(json.dumps(stimuli_schema())))
+    elif "rack" in data and "slots" in data:
+        prepare(fence.page, tmp_path)
+        path = tmp_path / "rack.yaml"
+        path.write_text(fence.text, encoding="utf-8")
+        stub_tasks(path)
+        result = load(path)
+        assert [item for item in result.diagnostics if item.severity is Severity.ERROR] == []
+    else:
+        assert set(data) <= set(KEYS)
+        part = {**rack_schema(), "required": []}
+        jsonschema.validate(data, json.loads(json.dumps(part)))
+
+
+@pytest.mark.parametrize("fence", here("blk", "bas"), ids=ids)
+def test_tasks(fence):
+    """A task has no errors; a part of one neither, with what makes it whole. Its commons are whatever it declares."""
+    text = fence.text
+    if "END\n" not in text:
+        text += "30000 CALL SCAN_LOOP(TICKS=4)\n" if "SCAN_LOOP" not in text else ""
+        text += "30010 END\n"
+    target = Platform(fence.word("target") or "automax")
+    source = SourceText(fence.file or f"PAGE.{fence.language.upper()}", text)
+    tick = 500_000 if target is Platform.UDC else 5_500_000
+    result = check(source, name="PAGE", catalogue=CATALOGUE, target=target, tick_ns=tick, commons=None)
+    assert [item for item in result.diagnostics if item.severity is Severity.ERROR] == []
+
+
+@pytest.mark.parametrize("fence", here("cnf"), ids=ids)
+def test_configuration_tasks(fence, tmp_path):
+    (tmp_path / "RACK.CNF").write_text(fence.text)
+    assert execute("automax import RACK.CNF", tmp_path).code in (0, 1)
+    assert (tmp_path / "rack.yaml").is_file()
+
+
+def racks_of_pages() -> list[Path]:
+    """Pages that show a rack file under its name, and its tasks under theirs."""
+    return [page for page in PAGES if {"rack.yaml"} & {fence.file for fence in fences(page) if fence.runs_here}]
+
+
+@pytest.mark.parametrize("page", racks_of_pages(), ids=lambda page: page.name)
+def test_racks_with_their_tasks(page, tmp_path):
+    """What a page shows as files of one rack fits together."""
+    prepare(page, tmp_path)
+    stub_tasks(tmp_path / "rack.yaml")
+    config = load(tmp_path / "rack.yaml").config
+    assert config is not None
+    rack = Rack(config)
+    rack.start()
+    rack.run(0.5)
+    assert rack.operations.stopped is None
+    shown = {Path(fence.file).stem for fence in fences(page) if is_task_file(fence.file)}
+    assert {task.name for task in rack.tasks if task.error_log.count} & shown == set()
+
+
+def shell_pages() -> list[Path]:
+    return list(dict.fromkeys(fence.page for fence in here("sh", "console", "python") if not fence.word("live")))
+
+
+@pytest.mark.parametrize("page", shell_pages(), ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_commands_and_programs(page, tmp_path):
+    """In the order of the page, in one folder, the programs of a page in one interpreter."""
+    prepare(page, tmp_path)
+    names: dict[str, object] = {"__name__": "__page__"}
+    for fence in fences(page):
+        write(fence, tmp_path)
+        if not fence.runs_here or fence.word("live"):
+            continue
+        code = int(fence.word("exit") or 0)
+        if fence.language == "sh":
+            ended = [(command, execute(command, tmp_path)) for command in commands(fence.text)]
+            assert [(command, result) for command, result in ended[:-1] if result.code not in (0, code)] == [], fence
+            assert ended[-1][1].code == code, (str(fence), ended[-1])
+        elif fence.language == "console":
+            for command, shown in session(fence.text):
+                result = execute(command, tmp_path)
+                assert result.code == code, (str(fence), command, result.text)
+                assert shows(result.text, shown) == "", (str(fence), command, result.text)
+        elif fence.language == "python":
+            with standing_in(tmp_path):
+                exec(compile(fence.text, str(fence), "exec"), names)
