@@ -1,4 +1,4 @@
-"""What README shows of the command line works as it stands there."""
+"""What README.md shows of the command line works as it stands there."""
 
 import re
 import shlex

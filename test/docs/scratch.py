@@ -9,7 +9,8 @@ import re
 import shlex
 import shutil
 import subprocess
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,9 +18,17 @@ from automax_ros.cli.main import main
 
 from .fences import ROOT, Fence, fences
 
-STAGES = Path(__file__).parent / "stages"
-"""Folders of files that a page's examples need and do not show, by the name of the page."""
-LONGEST_S = 3.0
+STAGES = {
+    "docs/old_files.md": "old_files",
+    "docs/rack_yaml.md": "tasks",
+    "docs/recordings.md": "pm1",
+    "docs/stepping.md": "pm1",
+    "docs/stimuli.md": "pm1",
+}
+"""The folder of stages/ with the files that a page's examples need and do not show."""
+RECORDED = {"docs/recordings.md"}
+"""Pages whose examples begin with a recording."""
+LONGEST_S = 6.0
 """Simulated seconds that a run of an example lasts: its pages say more, to no other effect on whether it runs."""
 DURATION = re.compile(r"(--duration )([0-9.]+)")
 
@@ -37,9 +46,14 @@ def prepare(page: Path, folder: Path) -> None:
     for name in ("config", "bags", "examples"):
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name)
-    stage = STAGES / page.relative_to(ROOT).with_suffix("").as_posix().replace("/", "_")
-    if stage.is_dir():
-        shutil.copytree(stage, folder, dirs_exist_ok=True)
+    name = page.relative_to(ROOT).as_posix()
+    if name in STAGES:
+        shutil.copytree(Path(__file__).parent / "stages" / STAGES[name], folder, dirs_exist_ok=True)
+    if name in RECORDED:
+        made = execute(
+            "automax run rack.yaml --simulated --duration 6 --set REF%=1000 --set RUN@=1 --record out", folder
+        )
+        assert made.code == 0, made.text
     for fence in reversed(fences(page)):  # of two of one name the first: the second is written where it stands
         write(fence, folder)
 
@@ -67,7 +81,12 @@ def commands(text: str) -> Iterator[str]:
     for line in text.replace("\\\n", " ").splitlines():
         plain = re.sub(r"(^|\s)#.*$", "", line).strip()
         if plain:
-            yield plain.replace(".venv/bin/automax", "automax")
+            yield DURATION.sub(shorter, plain.replace(".venv/bin/automax", "automax"))
+
+
+def shorter(match: re.Match[str]) -> str:
+    """A duration as the tests have it."""
+    return f"{match[1]}{min(LONGEST_S, float(match[2])):g}"
 
 
 def session(text: str) -> Iterator[tuple[str, list[str]]]:
@@ -77,10 +96,19 @@ def session(text: str) -> Iterator[tuple[str, list[str]]]:
         yield next(commands(command)), shown.splitlines()
 
 
-def execute(command: str, folder: Path) -> Ended:
-    """Run a command line in a folder: `automax` in this process, which saves the imports, all else in a shell."""
-    command = DURATION.sub(lambda match: f"{match[1]}{min(LONGEST_S, float(match[2])):g}", command)
+def execute(command: str, folder: Path, typed: Sequence[str] = ()) -> Ended:
+    """Run a command line in a folder: `automax` in this process, which saves the imports, all else in a shell.
+
+    What is ``typed`` comes on its standard input.
+    """
     words = shlex.split(command)
+    if typed:
+        program = [sys.executable, "-m", "automax_ros.cli.main", *words[1:]]
+        lines = "".join(f"{line}\n" for line in typed)
+        result = subprocess.run(
+            program, cwd=folder, input=lines, capture_output=True, text=True, timeout=100, check=False
+        )
+        return Ended(result.returncode, result.stdout + result.stderr)
     if words[0] != "automax" or {"&&", "|", ";"} & set(words):
         result = subprocess.run(
             ["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=100, check=False

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 import jsonschema
@@ -11,6 +13,7 @@ from yaml_core import data_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Platform
+from automax_ros.cli.main import module_of, parsers
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import Severity
 from automax_ros.language.checks.checker import check
@@ -27,6 +30,8 @@ EXAMPLES = [fence for page in PAGES for fence in fences(page)]
 LANGUAGES = {"python", "yaml", "json", "sh", "console", "blk", "bas", "cnf", "csv", "ebnf", "text", "xml", "cmake"}
 SHOWN_ONLY = {"text", "csv", "ebnf", "xml", "cmake"}
 """What is not executed: pictures, usage, tables that other examples read, the grammar (test/language/grammar.py)."""
+PROMPT, GREETING = "step> ", "help lists the commands"
+"""What `automax step` prints on a terminal only."""
 MOST_NOT_RUN = 12
 """Blocks that cannot be executed; a new one must be worth it."""
 
@@ -110,8 +115,8 @@ def test_tasks(fence):
 @pytest.mark.parametrize("fence", here("cnf"), ids=ids)
 def test_configuration_tasks(fence, tmp_path):
     (tmp_path / "RACK.CNF").write_text(fence.text)
-    assert execute("automax import RACK.CNF", tmp_path).code in (0, 1)
-    assert (tmp_path / "rack.yaml").is_file()
+    result = execute("automax import RACK.CNF --output rack.yaml", tmp_path)
+    assert (tmp_path / "rack.yaml").is_file(), result.text
 
 
 def racks_of_pages() -> list[Path]:
@@ -131,7 +136,18 @@ def test_racks_with_their_tasks(page, tmp_path):
     rack.run(0.5)
     assert rack.operations.stopped is None
     shown = {Path(fence.file).stem for fence in fences(page) if is_task_file(fence.file)}
-    assert {task.name for task in rack.tasks if task.error_log.count} & shown == set()
+    assert {task.name for task in rack.tasks if task.errors.count} & shown == set()
+
+
+@pytest.mark.parametrize("fence", [fence for fence in EXAMPLES if fence.language in ("sh", "console")], ids=ids)
+def test_every_command_can_be_given(fence):
+    """The arguments of every `automax` are right, also where it is not run here."""
+    given = [command for command, _ in session(fence.text)] if fence.language == "console" else commands(fence.text)
+    for command in given:
+        for part in re.split(r"&&|\||;", command):
+            words = shlex.split(part.partition(" >")[0])
+            if words and words[0] == "automax" and "<" not in words:
+                parsers({words[1]: module_of(words[1])})[0].parse_args(words[1:])
 
 
 def shell_pages() -> list[Path]:
@@ -154,9 +170,11 @@ def test_commands_and_programs(page, tmp_path):
             assert ended[-1][1].code == code, (str(fence), ended[-1])
         elif fence.language == "console":
             for command, shown in session(fence.text):
-                result = execute(command, tmp_path)
+                typed = [line.removeprefix(PROMPT) for line in shown if line.startswith(PROMPT)]
+                result = execute(command, tmp_path, typed)
                 assert result.code == code, (str(fence), command, result.text)
-                assert shows(result.text, shown) == "", (str(fence), command, result.text)
+                printed = [line for line in shown if not line.startswith((PROMPT, GREETING))]
+                assert shows(result.text, printed) == "", (str(fence), command, result.text)
         elif fence.language == "python":
             with standing_in(tmp_path):
                 exec(compile(fence.text, str(fence), "exec"), names)
