@@ -28,7 +28,7 @@ STAGES = {
 """The folder of stages/ with the files that a page's examples need and do not show."""
 RECORDED = {"docs/recordings.md"}
 """Pages whose examples begin with a recording."""
-LONGEST_S = 6.0
+LONGEST_S = 3.0
 """Simulated seconds that a run of an example lasts: its pages say more, to no other effect on whether it runs."""
 DURATION = re.compile(r"(--duration )([0-9.]+)")
 

@@ -145,7 +145,7 @@ def test_every_command_can_be_given(fence):
     given = [command for command, _ in session(fence.text)] if fence.language == "console" else commands(fence.text)
     for command in given:
         for part in re.split(r"&&|\||;", command):
-            words = shlex.split(part.partition(" >")[0])
+            words = shlex.split(part.partition(" >")[0].partition(" --ros-args")[0])
             if words and words[0] == "automax" and "<" not in words:
                 parsers({words[1]: module_of(words[1])})[0].parse_args(words[1:])
 
