@@ -1,0 +1,129 @@
+"""A rack in seven processes: it starts together, scans as in one process, loses processes and goes on, ends in order."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+from automax_ros.bags.reader import BagReader
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.rack.loader import load
+
+from .distributed import RINGS, SEATS, Distributed, Line, copied
+from .support import automax, wait_until
+
+TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
+STOP = "- {at: 3.0, stop: [CML, RING_1, RING_2, RING_3, RING_4, SPEED, WIND_A]}\n"
+TICK_NS = 5_500_000
+RING_COMMONS = {f"{name}_{ring}!" for ring in RINGS for name in ("N", "SEEN", "SUM")}
+
+
+def inputs_and_sums(bag: Path, config) -> dict[tuple[str, int], tuple[int, int]]:
+    """What each scan of the ring latched of the line's reference and how far it brought its sum, by task and time."""
+    names = [variable.name for variable in config.variables]
+    found = {}
+    held: dict[tuple[str, int], float] = {}
+    for item in BagReader(bag).messages(types={"automax_msgs/msg/Scan"}):
+        scan = item.message
+        if not scan.task.startswith("RING") or scan.scan == 0:
+            continue
+        for view, value in zip(scan.latched.variable, scan.latched.value, strict=True):
+            held[scan.task, view] = value
+        values = {names[view]: held[task, view] for task, view in held if task == scan.task}
+        total = f"SUM_{scan.task[-1]}!"
+        committed = dict(zip(scan.committed.variable, scan.committed.value, strict=True))
+        after = committed.get(names.index(total), values[total])
+        found[scan.task, ns_of(scan)] = (int(values["LINE_REF%"]), int(after - values[total]))
+    return found
+
+
+def ns_of(scan) -> int:
+    return int(scan.stamp)
+
+
+def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
+    """The same stimuli give each scan the same inputs at the same rack time; at rest all images hold the same."""
+    rack = copied(tmp_path, more=STOP)
+    own, bag = tmp_path / "own", tmp_path / "bag"
+    stimuli = rack / "stimuli.yaml"
+    assert automax("run", rack, "--simulated", "--duration", "5", "--stimuli", stimuli, "--record", own).code == 0
+    with Distributed(rack, "--duration", "5", "--record", bag) as run:
+        ended = run.end()
+    assert ended.code == 0, ended
+    report = run.report
+    assert set(report["tasks"]) == TASKS
+    assert {name: told["deaths"] for name, told in report["processes"].items()} == dict.fromkeys(SEATS, 0)
+    assert {name: told["differs"] for name, told in report["processes"].items()} == {name: [] for name in SEATS}
+    due = 3 * NS_PER_S // TICK_NS + 1
+    for ring in RINGS:
+        task = report["tasks"][f"RING_{ring}"]
+        assert task["scans"] + task["skipped"] <= due, "what the host has made late at the end is not counted any more"
+        assert report["commons"][f"N_{ring}!"] == task["scans"], "no write was lost, none came twice"
+    config = load(rack / "rack.yaml").config
+    alone, together = inputs_and_sums(own, config), inputs_and_sums(bag, config)
+    began = min(time_ns for _, time_ns in alone)
+    start = min(time_ns for _, time_ns in together)
+    shift = (start - began) // TICK_NS * TICK_NS
+    print(len(alone), len(together), start - began)
+    assert {(task, time_ns - shift): seen for (task, time_ns), seen in together.items()}.items() <= alone.items()
+    assert len(together) > 0.5 * sum(report["tasks"][f"RING_{ring}"]["scans"] for ring in RINGS)
+
+
+def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_domain_id, tmp_path):
+    rack = copied(tmp_path)
+    with Distributed(rack) as run, Line() as line:
+        line.until_it_scans()
+        for name, seat in (("processor_2", 2), ("udc_10", 10), ("common_memory", 0)):
+            before, life = dict(line.values), line.processes[seat].process
+            run.kill(name)
+            line.until_new(seat, life)
+            line.until_it_scans()
+            assert all(line.values[f"N_{ring}"] > before[f"N_{ring}"] for ring in RINGS), "counters go on"
+        line.halt()
+        ended = run.end(signal.SIGTERM)
+    assert (ended.code, ended.err.count("Traceback")) == (0, 0), ended
+    report = run.report
+    deaths = {name: told["deaths"] for name, told in report["processes"].items()}
+    assert deaths == dict.fromkeys(SEATS, 0) | {"processor_2": 1, "udc_10": 1, "common_memory": 1}
+    for name, told in report["processes"].items():
+        assert told["told"]
+        assert not RING_COMMONS & set(told["differs"]), name
+    for name in ("processor_2", "udc_10", "common_memory"):
+        assert f"{name} was ended by SIGKILL: it is started again in " in ended.out
+    for ring in (1, 3, 4):
+        halted = report["commons"][f"N_{ring}!"]
+        assert 0 < halted <= report["tasks"][f"RING_{ring}"]["scans"], "each scan of a life counts once"
+
+
+def test_stop_all_when_a_process_is_lost(ros_domain_id, tmp_path):
+    rack = copied(tmp_path, rule="stop_all")
+    with Distributed(rack, "--no-restart") as run, Line() as line:
+        line.until_it_scans()
+        epoch_ns = line.processes[0].epoch_ns
+        killed_ns = time.time_ns()
+        run.kill("processor_3")
+        line.until(lambda: all(item.stopped for seat, item in line.processes.items() if seat != 3), "all stop")
+        ended = run.end(signal.SIGINT)
+    report = run.report
+    noticed_ns = epoch_ns + round(report["stopped"]["time_s"] * NS_PER_S)
+    print(f"noticed {(noticed_ns - killed_ns) / NS_PER_MS:.1f} ms after the kill")
+    assert 0 <= noticed_ns - killed_ns < 5 * NS_PER_S
+    assert (report["stopped"]["code"], ended.code) == ("31", 1)
+    assert "processor_3 is lost" in report["stopped"]["reason"]
+    assert {task["status"] for task in report["tasks"].values()} == {"stopped"}
+    assert sorted(report["tasks"]) == sorted(TASKS - {"RING_3"})
+    assert report["processes"]["processor_3"] == {"deaths": 1, "told": False, "differs": []}
+
+
+def test_processes_end_with_whoever_started_them(ros_domain_id, tmp_path):
+    rack = copied(tmp_path)
+    with Distributed(rack) as run:
+        wait_until(lambda: len(run.seats) == len(SEATS))
+        second = automax("run", rack, "--distributed")
+        assert (second.code, "runs already" in second.err) == (2, True)
+        whole = automax("run", rack)
+        assert (whole.code, "distributed over several processes" in whole.err) == (2, True)
+        pids = list(run.seats.values())
+        run.send(signal.SIGKILL)
+        wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids))
