@@ -53,6 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the process ends"
     )
+    parser.add_argument(
+        "--lead",
+        type=seconds_above_0,
+        metavar="S",
+        help="seconds from the moment at which all processes are there to the start, as that of common memory has it "
+        "(default: 0.4)",
+    )
     add_set_argument(parser)
     add_watch_argument(parser, "the first published ones")
     parser.add_argument(
@@ -110,7 +117,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
         arguments.report,
         arguments.allow_outside,
         ros,
-        SeatPlan(seat, seats, arguments.run_id, arguments.watched),
+        SeatPlan(seat, seats, arguments.run_id, arguments.watched, arguments.lead),
     )
     try:
         from automax_ros.cli.run_live import run_live

@@ -31,13 +31,15 @@ class SeatPlan:
     """The part of a run of a distributed rack that is in this process.
 
     ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 to take that of the processes that
-    are there, or a new one. ``watched``: another process has started this one.
+    are there, or a new one. ``watched``: another process has started this one. ``lead_ns`` is how long after all are
+    there the rack starts, None for the usual.
     """
 
     seat: Seat
     seats: tuple[Seat, ...]
     run_id: int = 0
     watched: bool = False
+    lead_ns: int | None = None
 
 
 @dataclass(frozen=True)

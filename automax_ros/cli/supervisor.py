@@ -169,7 +169,8 @@ class Supervisor:
             if place.post.ends_run or not in_order:
                 self._end(GRACE_NS if in_order else 0)
             return
-        place.start_ns = place.restarts.died(self._clock()) if self._restart else None
+        again_ns = place.restarts.died(self._clock())
+        place.start_ns = again_ns if self._restart else None
         again_s = None if place.start_ns is None else max(0, place.start_ns - self._clock()) / NS_PER_S
         self._listener.died(place.post.name, _how(code), again_s)
         if place.start_ns is None:

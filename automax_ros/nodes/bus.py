@@ -63,12 +63,14 @@ class Seating:
     """How a rack is cut into processes.
 
     ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the one that is there. ``is_common``
-    says whether what happens now happens in every process by itself, as stimuli do.
+    says whether what happens now happens in every process by itself, as stimuli do. ``lead_ns``: so far the start
+    lies ahead of the moment at which all are there, as the home says it.
     """
 
     seats: Sequence[tuple[int, ...]]
     run_id: int = 0
     is_common: Callable[[], bool] = lambda: False
+    lead_ns: int = LEAD_NS
 
 
 class RackBus:
@@ -91,7 +93,7 @@ class RackBus:
         self.seats = {min(slots): tuple(slots) for slots in seats}
         self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
-        self._watch = ProcessWatch()
+        self._watch, self._lead_ns = ProcessWatch(), seating.lead_ns
         self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
         self.link = BusLink(rack, min(own), self._send, seating.is_common)
         self.stage, self.joining = Stage.JOINING, False
@@ -214,7 +216,7 @@ class RackBus:
             self.stage = Stage.READY
             others = [peer.stage == Stage.READY for peer in peers.by_seat.values()]
             if self._rack.part.is_home and all(others):
-                peers.epoch_ns = time.time_ns() + LEAD_NS
+                peers.epoch_ns = time.time_ns() + self._lead_ns
                 self.stage = Stage.RUNNING
 
     def _asks(self) -> int:

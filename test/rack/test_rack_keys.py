@@ -159,4 +159,4 @@ def test_every_documented_key_is_tried():
     rows = [re.match(r"\| `(\w+)` \|", row) for table in tables for row in table.splitlines()]
     keys = {match[1] for match in rows if match}
     assert keys == {*CHANGES, *OPERATION, *UDC, *PLANT, "module", "operator", "slot", "register", "bit"}
-    assert "`on_module_loss` | `stop_all` or `hold` | `stop_all` | No effect yet" in text
+    assert "`on_module_loss` | `stop_all` or `hold` | `stop_all` | What a rack that is [distributed]" in text

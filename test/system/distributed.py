@@ -6,8 +6,11 @@ import json
 import os
 import shutil
 import signal
+import time
 from pathlib import Path
 from typing import Any
+
+from automax_ros.core.ticks import NS_PER_S
 
 from .support import RACKS, Automax, Client, wait_until
 
@@ -66,7 +69,7 @@ class Distributed(Automax):
 
 
 class Line(Client):
-    """What a test sees of LINE4 in the graph: its counters, and who takes part."""
+    """What a test sees of LINE4 in the graph: its counters, who takes part, and the wall clock at rack time 0."""
 
     def __init__(self) -> None:
         from automax_msgs.msg import Presence
@@ -75,12 +78,14 @@ class Line(Client):
         super().__init__("line_client")
         self.values: dict[str, int] = {}
         self.processes: dict[int, Any] = {}
+        self.began_ns = 0
         for ring in RINGS:
             for name in (f"N_{ring}", f"SEEN_{ring}", f"SUM_{ring}"):
                 self._follow(Int32, name)
 
         def heard(presence: Any) -> None:
             self.processes[presence.seat] = presence
+            self.began_ns = max(self.began_ns, presence.epoch_ns)
 
         self.node.create_subscription(Presence, "/line4/bus/presence", heard, 100)
 
@@ -92,6 +97,14 @@ class Line(Client):
 
         qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.node.create_subscription(kind, f"/line4/common/{name}", came, qos)
+
+    def listen_raw(self, type_name: str, topic: str) -> list[bytes]:
+        """Take the messages of a topic as they are."""
+        from automax_ros.nodes.topics import message_class
+
+        received: list[bytes] = []
+        self.node.create_subscription(message_class(type_name), topic, received.append, 50_000, raw=True)
+        return received
 
     def until_it_scans(self) -> None:
         """Wait until all processes run and all counters move."""
@@ -126,3 +139,28 @@ class Line(Client):
             lambda: all(self.values.get(f"SEEN_{n}") == self.values.get(f"N_{FEED[n]}", -1) for n in RINGS),
             "the ring stands still",
         )
+        self._until_heard()
+
+    def until_quiet(self, received: list[bytes], quiet_s: float = 2.0) -> None:
+        """Wait until nothing has come for a while after something came, and all have taken what was sent."""
+        seen = (len(received), time.monotonic())
+
+        def is_quiet() -> bool:
+            nonlocal seen
+            if len(received) != seen[0]:
+                seen = len(received), time.monotonic()
+            return seen[0] > 0 and time.monotonic() - seen[1] > quiet_s
+
+        self.until(is_quiet, "silence")
+        self._until_heard()
+
+    def _until_heard(self) -> None:
+        """Wait until all processes have had the time to take what was sent until now."""
+        from builtin_interfaces.msg import Time
+
+        def later(stamp: Time) -> bool:
+            return int(stamp.sec * NS_PER_S + stamp.nanosec) > since_ns
+
+        for _ in range(3):
+            since_ns = time.time_ns() + NS_PER_S // 2
+            self.until(lambda: all(later(item.stamp) for item in self.processes.values()), "a word of all processes")
