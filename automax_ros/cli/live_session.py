@@ -17,7 +17,7 @@ from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.stimuli_file import stimulation as stimulation_of
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.nodes.bus import Seating
+from automax_ros.nodes.bus import LEAD_NS, Seating
 from automax_ros.nodes.discovery_range import range_text
 from automax_ros.nodes.guarded_node import follows_clock
 from automax_ros.nodes.launcher import LiveRack
@@ -153,7 +153,8 @@ class LiveSession:
         seat = self.plan.seat
         if seat is None:
             return None
-        return Seating([item.slots for item in seat.seats], seat.run_id, lambda: self._stimulation.is_common)
+        lead_ns = LEAD_NS if seat.lead_ns is None else seat.lead_ns
+        return Seating([item.slots for item in seat.seats], seat.run_id, lambda: self._stimulation.is_common, lead_ns)
 
     def _all_are_there(self, stop: StopRequest) -> bool:
         """Wait for the other processes of a distributed rack; FALSE where a stop is requested first."""

@@ -136,7 +136,7 @@ class _Watch:
                 self._screen.progress(merged_progress(_in_order(self._names, self._progress)))
         elif isinstance(told, Summary):
             self._summaries[name] = told
-        else:
+        elif told.report:  # one that has not begun has nothing to report
             self._reports[name] = told.report
 
     def complained(self, name: str, line: str) -> None:
