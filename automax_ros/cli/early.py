@@ -17,16 +17,28 @@ def end_at_once(number: int, _: object) -> None:
     os._exit(_SIGNALLED + number)
 
 
-def until_work_begins() -> None:
-    """Let SIGINT, SIGTERM and SIGHUP end the program at once; one that is ignored stays so."""
+def end_well(_: int, __: object) -> None:
+    """End a program that runs until it is stopped."""
+    os._exit(0)
+
+
+EARLY = (end_at_once, end_well)
+
+
+def until_work_begins(*, ends_well: bool) -> None:
+    """Let SIGINT, SIGTERM and SIGHUP end the program at once; one that is ignored stays so.
+
+    ``ends_well``: with exit code 0, since to be stopped is its end (decision: launch files and supervisors take another
+    code for a failure, and the person cannot know how far the program has come).
+    """
     for number in _NUMBERS:
         if _signal.getsignal(number) != _signal.SIG_IGN:
-            _signal.signal(number, end_at_once)
+            _signal.signal(number, end_well if ends_well else end_at_once)
 
 
 def work_begins() -> None:
     """Let Ctrl-C be an exception again, so that a command cleans up; nothing changes without ``until_work_begins``."""
-    if _signal.getsignal(_signal.SIGINT) is end_at_once:
+    if _signal.getsignal(_signal.SIGINT) in EARLY:
         _signal.signal(_signal.SIGINT, _signal.default_int_handler)
 
 

@@ -56,6 +56,8 @@ A dash in the name is an underscore in the module's; a word of Python has one at
 
 ROS_ARGUMENTS = "--ros-args"
 """What the ROS arguments of a command line begin with."""
+UNTIL_STOPPED = ("run", "node", "record", "play")
+"""The subcommands that go on until somebody stops them."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
 BROKEN_PIPE = 141
@@ -64,7 +66,7 @@ BROKEN_PIPE = 141
 
 def entry() -> NoReturn:
     """Run `automax` as the program of this process: once the exit code stands, no signal changes it any more."""
-    early.until_work_begins()
+    early.until_work_begins(ends_well=_name(sys.argv[1:]) in UNTIL_STOPPED)
     code = main()
     try:
         early.work_has_ended()
@@ -99,8 +101,7 @@ def _run(argv: list[str]) -> int:
     name: str | None = None
     try:
         words, ros = _split(argv)
-        # The options before the subcommand take no values, so the first word is its name.
-        name = next((word for word in words if not word.startswith("-")), None)
+        name = _name(words)
         if name is not None and name not in SUBCOMMANDS:
             raise _unknown(name)
         module = module_of(name) if name is not None else None
@@ -121,6 +122,11 @@ def _run(argv: list[str]) -> int:
         return 2
     except SystemExit as stop:  # argparse's way to end after --help, --version and wrong usage
         return _exit_code(stop.code)
+
+
+def _name(words: Sequence[str]) -> str | None:
+    """Return the subcommand: the options before it take no values, so it is the first word."""
+    return next((word for word in words if not word.startswith("-")), None)
 
 
 def _split(argv: list[str]) -> tuple[list[str], RosArguments | None]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from automax_ros.cli.early import end_at_once
+from automax_ros.cli.early import EARLY
 
 _SIGNALLED = 128
 """Exit code of a command that a signal has ended, less the signal's number: what the shell adds."""
@@ -103,7 +103,7 @@ def ended_by_signals() -> Iterator[None]:
     before = {}
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) in (signal.SIG_DFL, end_at_once):
+            if signal.getsignal(number) in (signal.SIG_DFL, *EARLY):
                 before[number] = signal.signal(number, end)
     try:
         yield

@@ -277,7 +277,7 @@ class RackNodes:
                 self.bus.leave()
             self.rack.operations.stop_tasks()
             if self._begun:
-                self.stream.end()
+                self._send_last()
         if self._desk is not None:
             self._desk.close()
         for node in (*self.nodes, *self._own):
@@ -285,6 +285,13 @@ class RackNodes:
                 self._executor.remove_node(node)
             node.destroy_node()
         self._door.close()
+
+    def _send_last(self) -> None:
+        try:
+            self.stream.end()
+        except Exception:
+            if self._context.ok():  # else ROS was shut down, as rclpy's own handlers of signals do
+                raise
 
     def __enter__(self) -> RackNodes:
         """Return itself."""
@@ -312,7 +319,8 @@ class RackNodes:
                     wait_s = self._pacer.step()
                 time.sleep(wait_s)
         except Exception as error:
-            self._report(f"rack {self.rack.config.name} has ended", error)
+            if self._context.ok():  # else ROS was shut down, and nobody is left to be told
+                self._report(f"rack {self.rack.config.name} has ended", error)
 
     def _report(self, what: str, error: Exception) -> None:
         self.nodes[0].guard.report(what, error)
