@@ -16,6 +16,7 @@ from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.stimuli_file import stimulation as stimulation_of
+from automax_ros.cli.tunings import begin_with
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.bus import LEAD_NS, Seating
 from automax_ros.nodes.discovery_range import range_text
@@ -70,6 +71,7 @@ class LiveSession:
                 rack, plan.ros, self._seating(), process=process, manager=manager, simulated=plan.simulated
             )
             self._ending.callback(self.live.close)
+            begin_with(rack, plan.tunings)
             rack.observers.add(self._operated)
             self._display = StatusDisplay(rack, plan.watch, live=True, health=self.live.health, screen=plan.screen)
             self._recording = RecordingWatch(self._recorder(), self._display)

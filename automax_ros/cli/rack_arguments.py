@@ -81,10 +81,10 @@ def _tunable_hint(config: RackConfig, text: str) -> str | None:
         symbol = result.program.symbols.get(name.removeprefix(f"{task.name}.")) if result.program is not None else None
         if symbol is not None and symbol.tuning is not None:
             slot = next(item.slot for item in config.task_modules if task in item.tasks)
-            command = (
-                f"ros2 param set /{config.namespace}/processor_{slot} {task.name}.{bare_name(symbol.name)} {value}"
-            )
-            return f"{symbol.name} is a tunable of task {task.name}: change CURRENT= in it, or while it runs: {command}"
+            full = f"{task.name}.{bare_name(symbol.name)}"
+            command = f"ros2 param set /{config.namespace}/processor_{slot} {full} {value}"
+            cure = f"`automax run` takes --set {full}={value}; while it runs: {command}"
+            return f"{symbol.name} is a tunable of task {task.name}: {cure}"
     return None
 
 

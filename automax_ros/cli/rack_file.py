@@ -19,15 +19,16 @@ _CANNOT_BE_READ = "AMX6000"
 _NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
 
 
-def add_set_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--set``, any number of times, as ``settings``."""
+def add_set_argument(parser: argparse.ArgumentParser, *, tunables: bool = False) -> None:
+    """Add ``--set``, any number of times, as ``settings``; it may take ``tunables``, too."""
+    what = "a common variable, or tune TASK.NAME," if tunables else "a common variable"
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="NAME=VALUE",
         dest="settings",
-        help="write a common variable before the tasks start; may be given again",
+        help=f"write {what} before the tasks start; may be given again",
     )
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError
 from automax_ros.cli.numbers import option_number
 from automax_ros.cli.output_files import held_for_writing, require_different_files, require_folder, require_writable
-from automax_ros.cli.rack_arguments import config_of, namespace_of, print_refused, settings_of, usable_config
+from automax_ros.cli.rack_arguments import config_of, namespace_of, print_refused, usable_config
 from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
 from automax_ros.cli.record_options import add_record_arguments, recording_options
 from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
@@ -24,10 +24,12 @@ from automax_ros.cli.run_plan import RunPlan
 from automax_ros.cli.run_simulated import run_simulated
 from automax_ros.cli.signals import CutShort, StopRequest, stop_signals
 from automax_ros.cli.stimuli_file import StimuliRefused
+from automax_ros.cli.tunings import split_settings
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.watch import add_watch_argument, watch_list
 from automax_ros.cli.window import seconds_above_0
 from automax_ros.core.faults import Fault
+from automax_ros.core.types import bare_name
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import RackError
@@ -77,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
     )
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
-    add_set_argument(parser)
+    add_set_argument(parser, tunables=True)
     add_record_arguments(parser)
     add_watch_argument(parser, "the first published ones")
     parser.add_argument(
@@ -177,12 +179,16 @@ def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
     if simulated is not None:  # whoever sends /clock does not follow it
         ros = ros.without("use_sim_time")
     config = replace(config, namespace=ros.placed(config.namespace))
+    settings, tunings = split_settings(config, arguments.settings)
+    if tunings and arguments.distributed:
+        text = f"{tunings[0].task}.{bare_name(tunings[0].name)}"
+        raise UsageError(f"--set: {text} is a tunable", f"of a distributed rack: --ros-args -p {text}:=VALUE")
     return RunPlan(
         config,
         arguments.duration,
         arguments.record,
         recording_options(arguments, config),
-        tuple(settings_of(config, arguments.settings)),
+        tuple(settings),
         tuple(watched_commons(config, arguments.watch)),
         arguments.state,
         arguments.stimuli,
@@ -190,6 +196,7 @@ def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
         arguments.allow_outside,
         ros,
         simulated=simulated,
+        tunings=tuple(tunings),
     )
 
 

@@ -13,6 +13,7 @@ from automax_ros.cli.output_files import write_report
 from automax_ros.cli.seat_talk import ToldScreen, tell_report
 from automax_ros.cli.status import Person, Screen
 from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.tunings import Tuning
 from automax_ros.core.types import Value
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.config import RackConfig
@@ -50,7 +51,7 @@ class RunPlan:
     named for values that outlive the run, if any. ``stimuli`` is the file of what happens to the rack, ``report`` that
     in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
     command line says to ROS. ``seat`` is the part of the rack that is run, None for all of it.
-    ``simulated`` is simulated time where the rack has ROS nodes all the same.
+    ``simulated`` is simulated time where the rack has ROS nodes all the same. ``tunings`` is what ``--set`` tunes.
     """
 
     config: RackConfig
@@ -66,6 +67,7 @@ class RunPlan:
     ros: RosArguments = NO_ARGUMENTS
     seat: SeatPlan | None = None
     simulated: SimulatedTime | None = None
+    tunings: tuple[Tuning, ...] = ()
 
     @property
     def is_watched(self) -> bool:

@@ -9,6 +9,7 @@ from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
 from automax_ros.cli.stimuli_file import stimulation as stimulation_of
+from automax_ros.cli.tunings import begin_with
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.player import Stimulation
@@ -30,6 +31,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     display = StatusDisplay(rack, plan.watch, live=False)
     recording = RecordingWatch(recorder, display)
     state = StateKeeping(rack, plan.state)
+    begin_with(rack, plan.tunings)
     end_ns = _ENDLESS_NS if plan.duration_ns is None else plan.duration_ns
     try:
         if recorder is not None:

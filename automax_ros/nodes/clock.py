@@ -33,7 +33,7 @@ CLOCK = "/clock"
 _TYPE = "rosgraph_msgs/msg/Clock"
 _TOLD = QosProfile("reliable", "volatile", "keep_last", 10)
 _HEARD = QosProfile("best_effort", "volatile", "keep_last", 1000)
-"""Publishers of ``/clock`` may be of either kind; so many wait while the rack is busy."""
+"""Publishers of ``/clock`` may be of either kind; this many wait while the rack is busy."""
 _MOST_BYTES = 64
 _LATEST_NS = (1 << 31) * NS_PER_S
 _WAIT_S = 0.05
@@ -102,7 +102,7 @@ class RackClock:
             message = decode(_TYPE, payload or b"")
             assert isinstance(message, Clock)
             if not 0 <= message.clock < _LATEST_NS:
-                raise CdrError(f"{message.clock} ns is no time of a clock")
+                raise CdrError(f"{message.clock} ns is not a time that a clock tells")
         except CdrError as error:
             text = f"{CLOCK}: {error}"
             self._site.health.note(MALFORMED, CLOCK, lambda: text)

@@ -1,7 +1,7 @@
 """Parameters that a command line gives nodes at the start: ``-p`` and ``--params-file``, in their order, the last wins.
 
 rcl gives them to the nodes, too, but tells nobody of a file's key that no node has, nor of a name that no node
-declares: both are lost without a word. So they are read here as well, in rcl's words, with their places.
+declares: both are lost silently. So they are read here as well, in rcl's words, with their places.
 
 - A node's key is its full name, ``/pm1/processor_1``; ``*`` stands for one part of it, ``**`` for any number. One
   without a slash in front means what ends so: ``processor_1`` (decision: rcl would look for ``/processor_1``).

@@ -1,9 +1,9 @@
 """Parameters with which a rack starts: tunables get the values that the command line gives; what has no use is told.
 
 The order of what counts more (decision): a source's ``CURRENT=`` < the value kept from the last run < ``--params-file``
-and ``-p``. They are set as a client would set them, before the rack runs, so that they are recorded with the states at
-the start, and kept. One that the task refuses keeps the rack from starting. A whole number is taken for a REAL
-(decision: ``KP: 1`` is meant, though ROS tells the types apart).
+and ``-p`` < ``--set`` of the command. They are set as a client would set them, before the rack runs, so that they are
+recorded with the states at the start, and kept. One that the task refuses keeps the rack from starting. A whole number
+is taken for a REAL (decision: ``KP: 1`` is meant, though ROS tells the types apart).
 
 Names of tasks are unique in a rack, so a tunable reaches its task from the node ``rack`` as well (decision: launch
 gives parameters to the node that it has named).
@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from automax_ros.core.text import did_you_mean, quoted
-from automax_ros.nodes.guarded_node import MAIN_NODE
+from automax_ros.nodes.guarded_node import MAIN_NODE, SIM_TIME
 from automax_ros.nodes.ros_arguments import RosArguments
 from automax_ros.nodes.ros_parameters import GivenParameter, RosArgumentsError
 from automax_ros.nodes.tunable_parameters import TunableParameters
@@ -24,7 +24,8 @@ from automax_ros.rack.config import RackConfig
 
 MOST_TOLD = 10
 """Most parameters without use that are told one by one."""
-_OWN_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+_ONE_TIME = "use_sim_time is for a whole rack: give it to all nodes, or to the node rack"
+_OWN_OF_ROS = (SIM_TIME, "start_type_description_service", "qos_overrides.")
 """Parameters that rclpy declares, or may."""
 
 
@@ -61,6 +62,8 @@ def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[s
     """
     told: dict[tuple[str, str], str] = {}
     for item in arguments.parameters:
+        if item.name == SIM_TIME and item.value is True and not _reaches_rack(item, arguments, config):
+            told[item.key, item.name] = f"{item.place}: {_ONE_TIME}"
         if item.name.startswith(_OWN_OF_ROS):
             continue
         reached = _reached(item, arguments, config, declared)
@@ -71,6 +74,11 @@ def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[s
     texts = [text for text in told.values() if text]
     more = [f"{len(texts) - MOST_TOLD} more parameters reach nobody"] if texts[MOST_TOLD:] else []
     return [*texts[:MOST_TOLD], *more]
+
+
+def _reaches_rack(item: GivenParameter, arguments: RosArguments, config: RackConfig) -> bool:
+    only = replace(arguments, parameters=(item,))
+    return bool(only.given_to(MAIN_NODE, config.namespace, main=True))
 
 
 def _names(config: RackConfig, declared: Mapping[str, Iterable[str]]) -> set[str]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -25,7 +26,7 @@ class TunableParameters:
         """Take a node; ``present`` is entered while a task is tuned."""
         self._node, self._rack, self._present = node, rack, present
         self._tunables: dict[str, Tunable] = {}
-        self._is_following = False
+        self._following = 0
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._tune)
 
@@ -64,12 +65,23 @@ class TunableParameters:
             for name, item in self._tunables.items()
             if item.task is task and self._node.get_parameter(name).value != item.initial
         ]
-        if changed and not self._is_following:
-            self._is_following = True
-            try:
+        if changed and not self._is_own_doing:
+            with self._following_now():
                 self._node.set_parameters(changed)
-            finally:
-                self._is_following = False
+
+    @property
+    def _is_own_doing(self) -> bool:
+        """Whether this thread sets parameters because of tunables, or tunables because of parameters."""
+        return self._following == threading.get_ident()
+
+    @contextmanager
+    def _following_now(self) -> Iterator[None]:
+        """Only in the rack's present, where one thread is at a time."""
+        self._following = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._following = 0
 
     def _check(self, parameters: list[Parameter[Any]]) -> SetParametersResult:
         """Refuse what a task would refuse, before any of the parameters is set; those that are not tunables pass."""
@@ -86,12 +98,8 @@ class TunableParameters:
     def _tune(self, parameters: list[Parameter[Any]]) -> None:
         """Tune tasks by the parameters that have been set."""
         chosen = [(self._tunables[item.name], item.value) for item in parameters if item.name in self._tunables]
-        if not chosen or self._is_following:
+        if not chosen or self._is_own_doing:
             return
-        self._is_following = True
-        try:
-            with self._present():
-                for tunable, value in chosen:
-                    self._rack.tune(tunable.task, tunable.variable, value)
-        finally:
-            self._is_following = False
+        with self._present(), self._following_now():
+            for tunable, value in chosen:
+                self._rack.tune(tunable.task, tunable.variable, value)

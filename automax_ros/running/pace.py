@@ -15,7 +15,7 @@ Turn = AbstractContextManager[object]
 
 
 BREATH_S, BREATH_PERIOD_NS = 0.0001, 2 * NS_PER_MS
-"""A pace that never waits lets other threads have their turn for so long, each so many ns of the wall clock."""
+"""A pace that never waits lets other threads have their turn: how long, and how often (ns of the wall clock)."""
 
 
 class Pace(Protocol):
@@ -54,7 +54,7 @@ def by_steps(
     turn: Turn,
     chore: tuple[Callable[[int], None] | None, int],
 ) -> None:
-    """Step a pace until something is over; ``chore`` is called with the time, each so many ns of the wall clock."""
+    """Step a pace until something is over; ``chore`` is what gets the time, and its period (ns of the wall clock)."""
     act, period_ns = chore
     next_chore = next_breath = wall()
     while not is_over():

@@ -120,15 +120,51 @@ def test_bad_setting_is_wrong_usage(run, text, words):
     assert result.out == ""
 
 
-@pytest.mark.parametrize("name", ["KP%", "task.kp%"])
-def test_setting_of_a_tunable_says_how_to_tune(automax, name):
+@pytest.fixture
+def tuned(automax):
+    """Call `automax run` for a task with a tunable KP% from 0 to 9, which it writes to REF%."""
     automax.write("rack.yaml", RACK)
-    automax.write("TASK.BLK", TASK.replace("20 LOCAL NIL%,", "20 LOCAL KP% [CURRENT=3], NIL%,"))
-    result = automax("run", "rack.yaml", "--simulated", "--duration", "1", "--set", f"{name}=5")
+    task = TASK.replace("20 LOCAL NIL%,", "20 LOCAL KP% [CURRENT=3, LOW=0, HIGH=9], NIL%,")
+    automax.write("TASK.BLK", task.replace("120 IF", "115 REF% = KP%\n120 IF"))
+    return lambda *options: automax("run", "rack.yaml", "--simulated", "--duration", "1", *options)
+
+
+def test_setting_of_a_tunable_says_how_to_tune(tuned):
+    result = tuned("--set", "KP%=5")
     assert (result.code, result.out) == (2, "")
     assert "no common variable" in result.err
-    assert "hint: KP% is a tunable of task TASK: change CURRENT= in it" in result.err
+    assert "hint: KP% is a tunable of task TASK: `automax run` takes --set TASK.KP=5" in result.err
     assert result.err.endswith("ros2 param set /line1/processor_0 TASK.KP 5\n")
+
+
+@pytest.mark.parametrize("name", ["TASK.KP", "task.kp%"])
+def test_tunable_is_set_for_a_run(tuned, name):
+    assert "REF%=3 " in tuned("--watch", "REF%,RUN@").out
+    result = tuned("--set", f"{name}=5", "--watch", "REF%,RUN@")
+    assert (result.code, result.err) == (0, "")
+    assert "REF%=5 " in result.out
+
+
+def test_tunable_of_the_command_line_counts_more_than_the_kept_one(tuned, tmp_path):
+    state = tmp_path / "state"
+    assert tuned("--set", "TASK.KP=5", "--state", str(state)).code == 0
+    assert "REF%=5 " in tuned("--state", str(state), "--watch", "REF%,RUN@").out
+    assert "REF%=7 " in tuned("--state", str(state), "--set", "TASK.KP=7", "--watch", "REF%,RUN@").out
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("TASK.KP=10", "--set TASK.KP%: "),
+        ("TASK.KP=1.5", "'1.5' is not a value for KP%"),
+        ("TASK.KQ=1", "task TASK has no tunable"),
+        ("TUSK.KP=1", "no common variable"),
+    ],
+)
+def test_tunable_that_cannot_be_set_is_wrong_usage(tuned, text, said):
+    result = tuned("--set", text)
+    assert (result.code, result.out) == (2, "")
+    assert said in result.err
 
 
 def test_elements_of_arrays_are_set(run):

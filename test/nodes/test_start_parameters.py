@@ -109,6 +109,7 @@ def test_key_of_a_file_that_no_node_has_is_told_with_its_line(started, tmp_path)
         ("use_sim_time:=false", None),
         ("processor_1:use_sim_time:=false", None),
         ("rack:FAST.TRIM:=1", None),
+        ("udc_3:use_sim_time:=true", "use_sim_time is for a whole rack: give it to all nodes, or to the node rack"),
     ],
 )
 def test_what_reaches_nobody_is_told_once(started, rule, told):
