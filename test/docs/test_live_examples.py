@@ -49,7 +49,7 @@ def programs(rack: str) -> Iterator[list[str]]:
                 yield words[1:]
 
 
-@pytest.mark.parametrize("name", ["section_drive"])
+@pytest.mark.parametrize("name", ["section_drive", pytest.param("dc_drive", marks=pytest.mark.soak)])
 def test_programs_in_python(name, environment, tmp_path):
     """Each ends by itself and says nothing on standard error."""
     found = of(name, "python")
