@@ -15,9 +15,9 @@ ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "automax_ros" / "wire" / "message_types.json"
 OWN = "automax_msgs"
 # Parts of services' answers; no recording holds them.
-SERVED = frozenset({"LoggedError", "TaskInfo"})
+SERVED = frozenset({"LoggedError"})
 # Tables of a rack that is live, and their lines; no recording holds them: what they show is in it in other ways.
-LIVE = frozenset({"Force", "ForceTable", "ScanStatistics", "TaskStatistics", "TaskTable"})
+LIVE = frozenset({"Force", "ForceTable", "ScanStatistics", "TaskStatistics"})
 STANDARD = (
     "builtin_interfaces/msg/Time",
     "rosgraph_msgs/msg/Clock",

@@ -15,7 +15,7 @@ OVERRUNS = "overruns"
 
 
 class RackHealth:
-    """Tells how one rack stands, and what went wrong around it.
+    """Says how one rack stands, and what went wrong around it.
 
     ERROR while a fault has stopped it; WARN while it is halted, without power or stopped by command, and where scans
     were skipped or something was refused since the last report; else OK.

@@ -1,6 +1,7 @@
 """The tables of a live rack on topics: ``tasks`` and ``forces`` (latched, on change), ``statistics`` (each second).
 
-Each process of a rack sends the tasks and statistics of its own modules; forces are told where common memory is. A
+The process of common memory sends forces and the tasks of the whole rack, which it joins from the parts of the others
+(``joined_tasks``); each process sends the statistics of its own modules. A
 table is looked at once per second of rack time, and soon after each operation, ten times per second at most (decision).
 """
 
@@ -14,6 +15,7 @@ from builtin_interfaces.msg import Time
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S, NS_PER_US
 from automax_ros.core.values import source_text
+from automax_ros.nodes.joined_tasks import PARTS, JoinedTasks
 from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.topics import ros_qos
 from automax_ros.rack.executive import most_forces
@@ -44,7 +46,9 @@ class Tables:
     def __init__(self, node: ModuleNode) -> None:
         """Create the publishers; the first tables go out with the rack's start."""
         self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
-        self._tasks = node.create_publisher(TaskTable, "tasks", ros_qos(LATCHED))
+        part = self._rack.part
+        self._tasks = node.create_publisher(TaskTable, "tasks" if part.is_home else PARTS, ros_qos(LATCHED))
+        self._joined = JoinedTasks(node, self._soon) if part.is_home and not part.is_whole else None
         self._statistics = node.create_publisher(ScanStatistics, "statistics", STATISTICS_DEPTH)
         self._forces = (
             node.create_publisher(ForceTable, "forces", ros_qos(LATCHED)) if self._rack.part.is_home else None
@@ -69,6 +73,9 @@ class Tables:
 
     def operated(self, operation: Operation) -> None:  # noqa: ARG002
         """Look at the tables after what happens at this instant."""
+        self._soon()
+
+    def _soon(self) -> None:
         if is_halted(self._pace):
             self.look(self._rack.now_ns)
         elif not self._is_pending:
@@ -82,7 +89,10 @@ class Tables:
     def look(self, now_ns: int) -> None:
         """Send the tables that have changed."""
         tasks = [(module, item) for module in self._rack.task_modules for item in module.tasks]
-        infos = [task_fields(self._rack, module, item) for module, item in tasks]
+        infos: list[Mapping[str, Any]] = [task_fields(self._rack, module, item) for module, item in tasks]
+        if self._joined is not None:
+            infos += [item._asdict() for item in self._joined.tasks(now_ns)]
+            infos.sort(key=lambda info: info["slot"])
         counted = [{key: value for key, value in info.items() if key not in _UNCOUNTED} for info in infos]
         if self._is_new(TaskTable, counted):
             self._tasks.publish(TaskTable(**self._head(now_ns), tasks=[TaskInfo(**info) for info in infos]))
@@ -95,6 +105,8 @@ class Tables:
             self._forces.publish(ForceTable(**self._head(now_ns), most=most, forces=lines))
 
     def _report(self, now_ns: int) -> None:
+        if not self._rack.part.is_home:
+            self._sent.clear()  # so the home knows that this process lives
         self.look(now_ns)
         passed_ns, self._reported_ns = now_ns - self._reported_ns, now_ns
         tasks = [statistics_of(module, item, passed_ns) for module in self._rack.task_modules for item in module.tasks]

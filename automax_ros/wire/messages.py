@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from automax_ros.core.kinds import Direction
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence
+from automax_ros.wire.task_table import TaskInfo, TaskTable
 from automax_ros.wire.values import NO_VALUES, Values
 
 
@@ -288,7 +289,9 @@ _OWN = (
     Presence,
     Scan,
     ScanError,
+    TaskInfo,
     TaskState,
+    TaskTable,
     Values,
     Variable,
     VariableTable,

@@ -101,7 +101,7 @@ def test_installed_services_are_those_of_today_and_known_to_ros() -> None:
 def test_hashes_are_those_of_rosbags_for_jazzy() -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     standard = [name for name in message_types() if not name.startswith("automax_msgs")]
-    assert len(standard) == 15
+    assert len(standard) == 17
     assert {name: message_types()[name].hash for name in standard} == {
         name: store.hash_rihs01(name) for name in standard
     }
