@@ -122,6 +122,30 @@ def test_a_source_is_reloaded_where_its_task_runs(ask, racks):
     assert wrong.findings
 
 
+def test_the_table_of_tasks_is_that_of_all_processes(ask, racks):
+    """It is joined where common memory is; the tasks of a process that has ended are no longer in it."""
+    from automax_msgs.msg import ScanStatistics, TaskTable
+    from system.support import Client
+
+    with Client() as client:
+        tables = client.listen(TaskTable, "/cut1/tasks", latched=True, depth=1)
+        statistics = client.listen(ScanStatistics, "/cut1/statistics")
+        whole = [("ONE", "processor_1", 1), ("TWO", "processor_2", 2), ("WIND_A", "udc_10", 10)]
+
+        def shown() -> list[tuple[str, str, int]]:
+            return [(item.task, item.module, item.slot) for item in tables[-1].tasks] if tables else []
+
+        client.until(lambda: shown() == whole, "the table of all tasks")
+        assert tables[-1].run_id == RUN_ID
+        assert len(client.node.get_publishers_info_by_topic("/cut1/tasks")) == 1
+        assert ask("OperateTask", "stop", task="ONE").ok
+        client.until(lambda: tables[-1].tasks[0].status == "stopped", "a task that stands")
+        client.until(lambda: {item.module for told in statistics for item in told.tasks} == {x[1] for x in whole})
+        assert all(len({item.slot in (2, 10) for item in told.tasks}) <= 1 for told in statistics)
+        racks["parts"][2].close()
+        client.until(lambda: shown() == whole[:1], "the table without the process that has ended")
+
+
 def wait(condition) -> None:
     import time
 
