@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.S)
-SIMULATED, OPERATED, REAL_TIME, IN_ROS = EXAMPLES
+SIMULATED, OPERATED, REAL_TIME, IN_ROS, TWO_RACKS = EXAMPLES
 
 
 def ran(program: str, domain: int) -> str:
@@ -52,3 +52,9 @@ def test_a_rack_in_a_process_and_executor_of_its_user(ros_domain_id):
     seen = json.loads(ran(IN_ROS, ros_domain_id))
     assert len(seen) == 20
     assert seen == sorted(seen), "the ramp of the line goes up"
+
+
+@pytest.mark.timeout(110)
+def test_two_racks_in_one_process_and_an_executor_with_threads(ros_domain_id):
+    """What the winder knows of the line came over their network; the executor's thread has ended."""
+    assert int(ran(TWO_RACKS, ros_domain_id)) > 10
