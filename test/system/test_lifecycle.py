@@ -9,9 +9,10 @@ from nodes.managing import ACTIVE, INACTIVE, UNCONFIGURED, Manager
 
 from automax_ros.bags.reader import BagReader
 
-from .support import RACKS, TYPES, Automax, Client
+from .support import RACKS, ROOT, TYPES, Automax, Client, automax
 
 WAITS = "is unconfigured"
+OPERATED = RACKS / "operated" / "rack.yaml"
 
 
 @pytest.fixture
@@ -74,6 +75,26 @@ def test_a_manager_brings_a_rack_up_and_down_again(ros_domain_id, rack, tmp_path
     for folder in (bag, bag.with_name("bag_2")):
         whats = [item.message.what for item in BagReader(folder).messages(topics={"/operated/operations"})]
         assert whats == (["stop_all", "run_all", "stop_all"] if folder == bag else [])
+
+
+def test_the_page_shows_how_it_is_done_by_hand(ros_domain_id, tmp_path):
+    """The commands of docs/ros.md, one after the other."""
+    page = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")
+    found = re.search(r"<!-- run by test/system/test_lifecycle.py -->\n```sh\n(.*?)```", page, re.DOTALL)
+    assert found is not None
+    file = tmp_path / "rack.yaml"
+    file.write_text(OPERATED.read_text().replace("rack: OPERATED", "rack: PM1").replace(", critical: true", ""))
+    for name in ("LINE.BLK", "SPEED.BLK"):
+        shutil.copy(OPERATED.with_name(name), tmp_path)
+    with Automax("run", file, "--no-autostart") as process:
+        process.wait_for_line(WAITS)
+        printed = []
+        for command in found[1].splitlines():
+            ended = automax(*command.split()[1:], "--timeout", "30")
+            assert (ended.code, ended.err) == (0, ""), command
+            printed.append(ended.out)
+        assert printed == ["done\n", "done\n", "done\n", "inactive\n", "done\n"]
+        assert process.end().code == 0
 
 
 def test_without_an_operator_a_manager_may_start_a_rack_but_not_stop_it(ros_domain_id):
