@@ -48,10 +48,11 @@ def groups_of(name: str) -> list[str]:
 
 
 def status_names(config: RackConfig) -> list[str]:
-    """Return the names of all statuses of a rack in one process."""
+    """Return the names of all statuses of a rack, in one process or in one for each module."""
     space = config.namespace
     names = [f"{space}/rack: {config.name}"]
     names += [f"{space}/{module.name}: {module.model}" for module in config.modules]
+    names += [f"{space}/{module.name}: process" for module in config.modules]
     names += [f"{space}/{module.name}: {task.name}" for module, task in config.placed_tasks]
     for item in driven_plants(config):
         node = "_".join(filter(None, ("drive_plant", str(item.slot), item.drive)))

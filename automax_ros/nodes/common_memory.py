@@ -19,6 +19,7 @@ from std_msgs.msg import String
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import Value
+from automax_ros.nodes.guarded_node import MAIN_NODE
 from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.rack_health import RackHealth
@@ -61,7 +62,7 @@ class CommonMemoryNode(ModuleNode):
                 _ValueInlet(self, view, variable, topic)
         joint_inlets(self)
         stream.add_sink(outlets.get)
-        self.diagnose(RackHealth(site).statuses)
+        self.diagnose(RackHealth(site, f"{MAIN_NODE}: {rack.config.name}").statuses)
         self.diagnose(self._module_health)
 
     def _with_files(self, publish: Take) -> Take:

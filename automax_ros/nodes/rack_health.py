@@ -1,4 +1,7 @@
-"""The health of a rack as a whole, as ``/diagnostics`` has it: ``pm1/rack: PM1``."""
+"""The health of a rack as a whole, as ``/diagnostics`` has it: ``pm1/rack: PM1``.
+
+Of a rack in several processes each other process has a status of its own in its place: ``pm1/processor_3: process``.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from automax_ros.core.text import count_of
 from automax_ros.nodes.diagnostics import status_of
-from automax_ros.nodes.guarded_node import MAIN_NODE
 from automax_ros.nodes.module_node import Site
 from automax_ros.rack.halting import is_halted
 from automax_ros.running.task import Status
@@ -15,15 +17,15 @@ OVERRUNS = "overruns"
 
 
 class RackHealth:
-    """Says how one rack stands, and what went wrong around it.
+    """Says how one rack stands, and what went wrong around it, as far as it is in this process.
 
     ERROR while a fault has stopped it; WARN while it is halted, without power or stopped by command, and where scans
     were skipped or something was refused since the last report; else OK.
     """
 
-    def __init__(self, site: Site) -> None:
-        """Take a rack."""
-        self._site = site
+    def __init__(self, site: Site, part: str) -> None:
+        """Take a rack; ``part`` is what the status is called, without the rack's namespace."""
+        self._site, self._part = site, part
 
     def statuses(self, now_ns: int) -> list[DiagnosticStatus]:
         """Return the rack's status."""
@@ -47,7 +49,7 @@ class RackHealth:
             "stopped_by": cause.task if cause is not None else "",
         }
         values |= {kind: str(number) for kind, number in sorted(counts.items())}
-        name = f"{rack.config.namespace}/{MAIN_NODE}: {rack.config.name}"
+        name = f"{rack.config.namespace}/{self._part}"
         return [status_of(name, rack.config.name, level, text, values)]
 
     def _judged(self, skipped: int, troubles: int) -> tuple[bytes, str]:

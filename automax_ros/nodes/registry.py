@@ -15,6 +15,7 @@ from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.network import NetworkNode
 from automax_ros.nodes.operator import OperatorNode
 from automax_ros.nodes.processor import ProcessorNode
+from automax_ros.nodes.rack_health import RackHealth
 from automax_ros.nodes.tables import Tables
 from automax_ros.nodes.udc import UdcNode
 from automax_ros.rack.modules.analog_io import ANALOG_IO
@@ -66,5 +67,7 @@ def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
             made.append(node(site, module))
             made[-1].declare_facts(module_facts(module.config))
     made += (DrivePlantNode(site, driven) for driven in site.rack.part.driven)
+    if not site.is_home:
+        made[0].diagnose(RackHealth(site, f"{made[0].get_name()}: process").statuses)
     Tables(made[0])
     return tuple(made)

@@ -72,7 +72,7 @@ class World:
         publisher = SimpleNamespace(publish=self._note)
         node = SimpleNamespace(create_publisher=lambda *_: publisher)
         self.diagnostics.begin(self.rack, self.stream, self.pacer, node)
-        self.diagnostics.add(RackHealth(site).statuses)
+        self.diagnostics.add(RackHealth(site, "rack: LINE1").statuses)
         self.diagnostics.add(self._task)
         self.pacer.begin()
         self.stream.begin(EPOCH_NS)
