@@ -75,7 +75,7 @@ class SimulatedPacer:
         """Nothing: the present is the last instant that was carried out."""
 
     def halt(self) -> None:
-        """Let time stand still; ``while_halted`` is called every now and then, and the clock tells what is stepped."""
+        """Let time stand still; ``while_halted`` is called every now and then, and the clock says what is stepped."""
         self.halted = True
 
     def resume(self) -> None:

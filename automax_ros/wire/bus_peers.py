@@ -17,7 +17,7 @@ BEAT_NS = 20 * NS_PER_MS
 SILENCE_NS = 75 * NS_PER_MS
 """A process of another host that has said nothing for so long is lost (decision: it is noticed within 100 ms)."""
 HUNG_NS = 1000 * NS_PER_MS
-"""One of this host that lives by the kernel's word may be held up for so long (decision): a busy host is no fault."""
+"""One of this host that lives by the kernel's word may be held up for so long (decision): a busy host is not lost."""
 HELD_UP_NS = 45 * NS_PER_MS
 """Who was held up for so long itself judges nobody until it has heard what came meanwhile."""
 
@@ -74,7 +74,7 @@ class Peers:
 
     ``process``, ``seat`` and ``slots`` are this process's own, ``fingerprint`` that of its rack file and sources;
     ``run_id`` is 0 while it knows of no run: then it joins the one that it hears of. ``lost`` are seats whose process
-    has gone without a word and has not come back. ``lives`` tells of a process of this host whether it lives, and None
+    has gone silently and has not come back. ``lives`` tells of a process of this host whether it lives, and None
     of others.
     """
 

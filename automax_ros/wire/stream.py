@@ -70,7 +70,7 @@ class RackStream:
         self.variables_topic = Topic(f"{space}/variables", "automax_msgs/msg/VariableTable", LATCHED)
         self.snapshot_topic = Topic(f"{space}/backplane/snapshot", "automax_msgs/msg/CommonImage", LATCHED)
         slots = [module.config.slot for module in rack.task_modules]
-        # Where common memory is in another process the first module with tasks tells what is done here.
+        # Where common memory is in another process the first module with tasks says what is done here.
         teller = None if rack.part.is_home else next(iter(slots), None)
         self.operations_topic = Topic(f"{space}/operations", "automax_msgs/msg/Operation", OPERATION, teller)
         self.backplane_topic = Topic(f"{space}/backplane", "automax_msgs/msg/CommonWrite", SCAN)
