@@ -46,6 +46,21 @@ class Guard:
         """Let no exception leave a service; a request that fails is refused."""
         service.callback = self._answering(service.callback, service.srv_type, service.srv_name)
 
+    def refusal(self, name: str, kind: Any, error: Exception) -> Any:
+        """Report a request to the service ``name`` that failed or was not read, and return the response to it.
+
+        A result that says so is one, however many parameters were to be set (decision: who asks looks at the first).
+        """
+        self.report(f"a request to {name} was refused", error)
+        reason = str(error)[:MOST_TOLD]
+        if kind is SetParameters:
+            return kind.Response(results=[SetParametersResult(successful=False, reason=reason)])
+        response = _refusal(kind, None, reason)
+        for field, value in (("ok", False), ("reason", reason), ("success", False), ("message", reason)):
+            if hasattr(response, field):
+                setattr(response, field, value)
+        return response
+
     def serve(self, executor: Any, context: Context, seconds: float) -> None:
         """Let an executor carry out what has come, or wait for it at most a time (s).
 

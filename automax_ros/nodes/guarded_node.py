@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.nodes.door import Door
 from automax_ros.nodes.guard import Guard
+from automax_ros.nodes.rcl import library
+from automax_ros.nodes.requests import ServiceWay
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.ros_parameters import RosArgumentsError
 from automax_ros.running.health import Health
@@ -27,10 +30,13 @@ _OF_RCLPY = (SIM_TIME, "start_type_description_service")
 class GuardedNode(Node):  # type: ignore[misc]
     """A node with a guard for the services that rclpy gives it."""
 
+    _door: Door | None = None
+
     def __init__(
         self, name: str, namespace: str, context: Context, health: Health, arguments: RosArguments = NO_ARGUMENTS
     ) -> None:
         """Join the graph; ``namespace`` is the rack's, without a slash at its head."""
+        self._adopted: set[Any] = set()
         follows = follows_clock(arguments, namespace)
         own_time = [Parameter(SIM_TIME, value=follows)]
         space = f"/{namespace}"
@@ -58,6 +64,34 @@ class GuardedNode(Node):  # type: ignore[misc]
                 reason = f"{self.get_name()} has no parameter {quoted(parameter.name)}"
                 return SetParametersResult(successful=False, reason=f"{reason}: {hint}" if hint else reason)
         return super().set_parameters_atomically(parameter_list)
+
+    def served_by(self, door: Door) -> None:
+        """Let requests come in at a door, to services that are created later too; before an executor has the node.
+
+        Where rcl is not found an executor serves them, as ever.
+        """
+        self._door = door
+        self.adopt_services()
+
+    def adopt_services(self) -> None:
+        """Let requests to services that rclpy has made since come in at the door, if there is one."""
+        rcl = library()
+        if rcl is None or self._door is None:
+            return
+        for service in self.services:
+            self._adopted.add(service)
+            self._door.add(ServiceWay(rcl, service, partial(self.guard.refusal, service.srv_name)))
+
+    @property
+    def services(self) -> Iterator[Any]:
+        """What an executor serves: not the services whose requests come in at a door."""
+        return iter([service for service in super().services if service not in self._adopted])
+
+    def create_service(self, *arguments: Any, **options: Any) -> Any:
+        """Create a service as rclpy does."""
+        made = super().create_service(*arguments, **options)
+        self.adopt_services()
+        return made
 
 
 def follows_clock(arguments: RosArguments, namespace: str) -> bool:

@@ -35,6 +35,7 @@ class ManagedModuleNode(Managed, ModuleNode):
         self.work = Background(self)
         self._duties_of_tasks = ModuleDuties(self, module)
         self.manage(self._duties_of_tasks, self.guard, self._enter)
+        self.adopt_services()
         self.follow(INACTIVE)
 
     def follow_tasks(self) -> None:

@@ -77,6 +77,7 @@ class ModuleNode(GuardedNode):
         """Join the graph."""
         super().__init__(name, site.rack.config.namespace, site.context, site.health, site.arguments)
         self.site = site
+        self.served_by(site.door)
 
     @property
     def subscriptions(self) -> Iterator[Any]:

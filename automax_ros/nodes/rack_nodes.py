@@ -128,6 +128,7 @@ class RackNodes:
             manager = RackNode(
                 self.rack.config.namespace, self._context, self.health, HeldRack(self), self._enter, arguments
             )
+            manager.served_by(self._door)
             manager.follow(INACTIVE)
             self._own = (manager,)
         self.manager = manager
