@@ -23,10 +23,10 @@ from rosidl_parser.definition import (
 OF_A_MESSAGE = 64
 OF_A_TEXT = 16
 CHARACTERS = 16
-"""A message in a sequence weighs 64, a text 16 and 1 for each 16 characters, a number 1 (measured: about 5 us, 0.3 us,
-and 0.05 us)."""
 MOST = 1 << 16
-"""Heaviest request that is read (decision): 1,000 parameters, 4,000 texts, 65,000 numbers, or 1 MB of text."""
+"""Heaviest request that is read (decision): a message in a sequence weighs 64, a text 16 and 1 for each 16 characters,
+a number 1. So 680 parameters, 3,800 texts, 65,000 numbers or 1 MB of text are the most. rclpy's conversion takes 30 to
+50 us for a parameter, 0.02 us for a text, 0.006 us for a number (measured on a busy machine)."""
 
 
 class TooHeavy(Exception):
@@ -60,6 +60,19 @@ def weight(kind: Any, address: int) -> int:
     """
     structure, weigh = _structure(kind)
     return weigh(structure.from_address(address))
+
+
+def sequences(kind: Any, address: int) -> list[tuple[str, Any, Any, int]]:
+    """Return the sequences of messages in a message: field, class of the items, the sequence, bytes of an item.
+
+    It has ``data``, the address of the items, and ``size``, their number.
+    """
+    message = _structure(kind)[0].from_address(address)
+    return [
+        (name, _class(slot.value_type), getattr(message, name), ctypes.sizeof(_part(slot.value_type)[0]))
+        for name, slot in zip(kind.get_fields_and_field_types(), kind.SLOT_TYPES, strict=True)
+        if isinstance(slot, AbstractSequence) and isinstance(slot.value_type, NamespacedType)
+    ]
 
 
 @functools.cache

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from automax_ros.nodes.later import Later
-from automax_ros.nodes.message_weight import weight
+from automax_ros.nodes.message_weight import sequences, weight
 from automax_ros.nodes.rcl import OK, TAKE_FAILED, Library, RequestId, ServiceInfo, capsule_pointer
 
 Refuse = Callable[[Any, Exception], Any]
@@ -27,7 +27,7 @@ class ServiceWay:
         """Take the service over: no executor may serve it any more."""
         self.name, self.handle = service.srv_name, service.handle
         self._rcl, self._service, self._kind, self._refuse = rcl, service, service.srv_type, refuse
-        self._request, self._response = _Conversion(self._kind.Request), _Conversion(self._kind.Response)
+        self._request, self._response = Conversion(self._kind.Request), Conversion(self._kind.Response)
         self._info = ServiceInfo()
         service.send_response = self.respond
 
@@ -48,7 +48,7 @@ class ServiceWay:
             header = RequestId.from_buffer_copy(self._info.request_id)
             try:
                 weight(self._kind.Request, raw)
-                request = self._request.to_python(raw)
+                request = self._request.read(raw)
                 response = self._service.callback(request, self._kind.Response())
             except Exception as error:
                 response = self._refuse(self._kind, error)
@@ -85,11 +85,11 @@ class ServiceWay:
             self._response.destroy(raw)
 
 
-class _Conversion:
+class Conversion:
     """The functions that generated code has for a message, from C and to C."""
 
     def __init__(self, kind: Any) -> None:
-        code = kind.__class__
+        self._kind, code = kind, kind.__class__
         address = capsule_pointer
         # With the interpreter (PYFUNCTYPE) where Python objects are made or read; an exception of theirs is raised.
         self.create = ctypes.CFUNCTYPE(ctypes.c_void_p)(address(code._CREATE_ROS_MESSAGE))
@@ -98,3 +98,19 @@ class _Conversion:
         self.from_python = ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.py_object, ctypes.c_void_p)(
             address(code._CONVERT_FROM_PY)
         )
+
+    def read(self, raw: int) -> Any:
+        """Return the message, the items of its sequences of messages one by one: between two others may go on."""
+        found = sequences(self._kind, raw)
+        counts = [sequence.size for _, _, sequence, _ in found]
+        try:
+            for _, _, sequence, _ in found:
+                sequence.size = 0
+            message = self.to_python(raw)
+        finally:
+            for (_, _, sequence, _), count in zip(found, counts, strict=True):
+                sequence.size = count
+        for name, kind, sequence, size in found:
+            item = Conversion(kind).to_python
+            setattr(message, name, [item(sequence.data + place * size) for place in range(sequence.size)])
+        return message

@@ -1,0 +1,76 @@
+"""One thread at a time, and the one that scans goes first."""
+
+import threading
+import time
+
+from automax_ros.nodes.turns import Turns
+
+
+def test_visitor_enters_within_itself():
+    turns = Turns()
+    with turns, turns:
+        pass
+    with turns.scanner, turns:
+        pass
+
+
+def test_nobody_enters_while_another_is_in():
+    turns, inside, most = Turns(), [], []
+
+    def visit(entry):
+        for _ in range(200):
+            with entry:
+                inside.append(1)
+                most.append(len(inside))
+                inside.pop()
+
+    threads = [threading.Thread(target=visit, args=(entry,)) for entry in (turns, turns, turns.scanner)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert max(most) == 1
+    assert len(most) == 600
+
+
+def test_scan_waits_for_one_visit_at_most():
+    """A visitor that comes again and again at once would keep a plain lock from the one that waits."""
+    turns, visits, stop = Turns(), [], threading.Event()
+
+    def visit():
+        while not stop.is_set():
+            with turns:
+                visits.append(1)
+                time.sleep(0.002)
+
+    visitor = threading.Thread(target=visit)
+    visitor.start()
+    between = []
+    try:
+        for _ in range(20):
+            before = len(visits)
+            with turns.scanner:
+                between.append(len(visits) - before)
+            time.sleep(0.001)
+    finally:
+        stop.set()
+        visitor.join()
+    assert max(between) <= 2, between  # the visit that goes on, and one that had looked just before
+
+
+def test_visitor_enters_again_within_itself_while_a_scan_waits():
+    """Else both would wait for each other."""
+    turns, scanned = Turns(), threading.Event()
+
+    def scan():
+        with turns.scanner:
+            scanned.set()
+
+    scanner = threading.Thread(target=scan)
+    with turns:
+        scanner.start()
+        time.sleep(0.02)
+        with turns:
+            assert not scanned.is_set()
+    scanner.join(10.0)
+    assert scanned.is_set()
