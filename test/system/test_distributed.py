@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import signal
 import time
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
+from random import Random
+
+import pytest
 
 from automax_ros.bags.reader import BagReader
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
@@ -20,6 +24,7 @@ from .support import automax, wait_until
 TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
 STOP = "- {at: 3.0, stop: [CML, RING_1, RING_2, RING_3, RING_4, SPEED, WIND_A]}\n"
 TICK_NS = 5_500_000
+KILLS = 100
 RING_COMMONS = {f"{name}_{ring}!" for ring in RINGS for name in ("N", "SEEN", "SUM")}
 
 
@@ -128,3 +133,40 @@ def test_processes_end_with_whoever_started_them(ros_domain_id, tmp_path):
         pids = list(run.seats.values())
         run.send(signal.SIGKILL)
         wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids))
+
+
+@pytest.mark.soak
+def test_seven_processes_scan_on_time_on_a_quiet_machine(ros_domain_id, tmp_path):
+    with Distributed(copied(tmp_path), "--duration", "60") as run:
+        run.process.wait(180)
+        assert run.end().code == 0
+    tasks = run.report["tasks"].values()
+    skipped, done = (sum(task[key] for task in tasks) for key in ("skipped", "scans"))
+    print(f"{done} scans, {skipped} skipped: {100 * skipped / (done + skipped):.4f} %")
+    assert skipped < 0.001 * (done + skipped)
+
+
+@pytest.mark.soak
+def test_a_hundred_random_kills(ros_domain_id, tmp_path):
+    """Nobody else is disturbed, no value is wrong, nothing hangs; each death is noticed and made good."""
+    random = Random(5)
+    places = dict(zip(SEATS, (0, 1, 2, 3, 4, 5, 10), strict=True))
+    killed: Counter[str] = Counter()
+    with Distributed(copied(tmp_path)) as run, Line() as line:
+        line.until_it_scans()
+        for _ in range(KILLS):
+            name = random.choice(SEATS)
+            before, life = dict(line.values), line.processes[places[name]].process
+            run.kill(name)
+            killed[name] += 1
+            line.until_new(places[name], life)
+            line.until_it_scans()
+            assert all(line.values[f"N_{ring}"] > before[f"N_{ring}"] for ring in RINGS), f"after a kill of {name}"
+            # Three deaths of one process within 10 s would be too many.
+            line.spin(random.uniform(0, 4))
+        line.halt()
+        ended = run.end(signal.SIGTERM)
+    assert (ended.code, ended.err.count("Traceback")) == (0, 0), ended
+    report = run.report
+    assert {name: told["deaths"] for name, told in report["processes"].items() if told["deaths"]} == killed
+    assert not any(RING_COMMONS & set(told["differs"]) for told in report["processes"].values())
