@@ -107,7 +107,7 @@ def _seconds(time_ns: int) -> str:
 def _opening(plan: RunPlan, seats: Sequence[Seat], domain: int) -> str:
     config = plan.config
     return (
-        f"rack {config.name} in {len(seats)} process{'' if len(seats) == 1 else 'es'}: "
+        f"rack {config.name} in {count_of(len(seats), 'process')}: "
         f"{', '.join(seat.words for seat in seats)}\n"
         f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"
     )

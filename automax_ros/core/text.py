@@ -29,8 +29,8 @@ def quoted(text: str, *, marks: str = "'", limit: int = 40) -> str:
 
 
 def count_of(number: int, thing: str) -> str:
-    """Return a number of things: ``1 scan``, ``2 scans``."""
-    return f"{number} {thing}{'' if number == 1 else 's'}"
+    """Return a number of things: ``1 scan``, ``2 scans``, ``2 processes``."""
+    return f"{number} {thing}{'' if number == 1 else 'es' if thing.endswith('s') else 's'}"
 
 
 def table(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> list[str]:
