@@ -1,4 +1,4 @@
-"""Programs as launch files start them: --ros-args, ROS_NAMESPACE, simulated time with nodes."""
+"""Programs as launch files and docs/ros.md start them: --ros-args, ROS_NAMESPACE, simulated time with nodes."""
 
 import json
 import os
