@@ -1,6 +1,7 @@
 """Parameters of a command line: read as rcl reads them, for the nodes that rcl means, with their places."""
 
 import itertools
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from automax_ros.nodes.ros_arguments import split_arguments
 from automax_ros.nodes.ros_parameters import GivenParameter, RosArgumentsError, parameter_of, parameters_of
 
+ROOT = Path(__file__).parents[2]
 FILE = """\
 /pm1/processor_1:
   ros__parameters:
@@ -194,3 +196,11 @@ def test_the_last_one_counts(tmp_path):
     for first, second in itertools.permutations(rules):
         _, ros = split_arguments(["--ros-args", first, rules[first], second, rules[second]], {})
         assert ros.given_to("x", "pm1")["A"].value == (2 if second == "--params-file" else 1)
+
+
+def test_file_of_the_page(tmp_path):
+    """The example of docs/ros.md gives what the page says."""
+    page = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")
+    example = page.partition("<!-- run by test/nodes/test_ros_parameters.py -->\n```yaml\n")[2].partition("```")[0]
+    (found,) = read(tmp_path, example)
+    assert (found.key, found.name, found.value) == ("/pm1/processor_2", "SPEED.KP_SPEED", 1.2)
