@@ -2,27 +2,38 @@
 
 Every option of `automax run` is a launch argument; `ros2 launch automax_ros rack.launch.py --show-args` lists them.
 PushRosNamespace, SetParameter and SetRemap of a launch file that includes this one hold for the rack's nodes. A
-STOP ALL is the event `RackStopped` (automax_ros/nodes/launch_events.py); the end of the rack ends the launch.
+STOP ALL is the event `RackStopped` (automax_ros/nodes/launch_events.py); the end of the rack ends the launch. With
+lifecycle:=true the rack is a LifecycleNode, which this file configures and activates unless autostart:=false, and which
+heeds ChangeState of others.
 """
 
 import shlex
+from pathlib import Path
+from typing import Any
 
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler, Shutdown
 from launch.event_handler import EventHandler
 from launch.event_handlers import OnProcessIO
+from launch.events import matches_action
 from launch.events.process import ProcessIO
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode, Node
+from launch_ros.event_handlers import OnStateTransition
+from launch_ros.events.lifecycle import ChangeState
 from launch_ros.substitutions import FindPackageShare
+from lifecycle_msgs.msg import Transition
 
 from automax_ros.cli.arguments import Option, commands
 from automax_ros.nodes.launch_events import RackStopped, stops_of
+from automax_ros.rack.loader import load
 
 PACKAGE = "automax_ros"
 YES_NO = ["true", "false"]
 NEGATED = "--no-"
 """An option `--no-restart` is the argument `restart`, true unless somebody says false."""
+AWAITS = "--no-autostart"
+"""What lets the rack wait for a lifecycle manager."""
 OTHERWISE = {"--help", "--distributed", "--set"}
 """Options that are not an argument of their own name and kind."""
 
@@ -70,6 +81,28 @@ def words_of(context: LaunchContext) -> list[str]:
     return words
 
 
+def whole_namespace(outer: str, config: str) -> str:
+    """The namespace of the node `rack`: that which was given, and the rack's own, also where its file has errors."""
+    path = Path(config)
+    own = load(path / "rack.yaml" if path.is_dir() else path, allow_outside=True).namespace
+    return "/".join(filter(None, (outer.rstrip("/"), own)))
+
+
+def autostart(rack: LifecycleNode) -> list[Action]:
+    """What configures the rack as soon as it is there, and activates it then."""
+
+    def ask(transition: int) -> EmitEvent:
+        return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(rack), transition_id=transition))
+
+    is_configured = OnStateTransition(
+        target_lifecycle_node=rack,
+        start_state="configuring",
+        goal_state="inactive",
+        entities=[ask(Transition.TRANSITION_ACTIVATE)],
+    )
+    return [RegisterEventHandler(is_configured), ask(Transition.TRANSITION_CONFIGURE)]
+
+
 def tell_stops(event: ProcessIO) -> list[Action]:
     """An event for each STOP ALL in what the rack has printed."""
     return [EmitEvent(event=stop) for stop in stops_of(event.text)]
@@ -84,18 +117,24 @@ def start_rack(context: LaunchContext) -> list[Action]:
     parameters = [value("params_file")] if value("params_file") else []
     if value("use_sim_time") == "true":
         parameters.append({"use_sim_time": True})
-    rack = Node(
-        package=PACKAGE,
-        executable="automax",
-        arguments=words_of(context),
-        namespace=value("namespace") or None,
-        parameters=parameters or None,
-        ros_arguments=["--log-level", value("log_level")] if value("log_level") else None,
-        output="screen",
-        on_exit=Shutdown(reason="the rack has ended"),
-    )
+    words, is_managed = words_of(context), value("lifecycle") == "true"
+    node: dict[str, Any] = {
+        "package": PACKAGE,
+        "executable": "automax",
+        "arguments": [*words, AWAITS] if is_managed and AWAITS not in words else words,
+        "namespace": value("namespace") or None,
+        "parameters": parameters or None,
+        "ros_arguments": ["--log-level", value("log_level")] if value("log_level") else None,
+        "output": "screen",
+        "on_exit": Shutdown(reason="the rack has ended"),
+    }
+    if is_managed:
+        node |= {"name": "rack", "namespace": whole_namespace(value("namespace"), value("config"))}
+    rack = LifecycleNode(**node) if is_managed else Node(**node)
     told = OnProcessIO(target_action=rack, on_stdout=tell_stops, on_stderr=tell_stops)
     actions: list[Action] = [RegisterEventHandler(told), rack]
+    if is_managed and AWAITS not in words:
+        actions += autostart(rack)
     if value("on_stop_all") == "shutdown":
         end = Shutdown(reason="the rack's tasks were stopped")
         actions.insert(0, RegisterEventHandler(EventHandler(matcher=RackStopped.is_event, entities=[end])))
@@ -122,6 +161,12 @@ def generate_launch_description() -> LaunchDescription:
             ),
             DeclareLaunchArgument(
                 "use_sim_time", default_value="false", choices=YES_NO, description="follow /clock, scan by scan"
+            ),
+            DeclareLaunchArgument(
+                "lifecycle",
+                default_value="false",
+                choices=YES_NO,
+                description="a LifecycleNode of launch_ros, whose transitions launch knows and asks for",
             ),
             DeclareLaunchArgument(
                 "on_stop_all",

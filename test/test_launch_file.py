@@ -8,13 +8,24 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from automax_ros.cli.arguments import commands
+from automax_ros.nodes.ros_arguments import split_arguments
 from automax_ros.rack.loader import load
 from automax_ros.rack.standing import StopCause
 
 ROOT = Path(__file__).parent.parent
 FILE = ROOT / "launch" / "rack.launch.py"
 EXAMPLES = sorted((ROOT / "examples").glob("*/*.launch.py"))
-NOT_OPTIONS = {"config", "mode", "namespace", "params_file", "use_sim_time", "log_level", "set", "on_stop_all"}
+NOT_OPTIONS = {
+    "config",
+    "mode",
+    "namespace",
+    "params_file",
+    "use_sim_time",
+    "log_level",
+    "set",
+    "on_stop_all",
+    "lifecycle",
+}
 EVENTS = "automax_ros.nodes.launch_events"
 
 
@@ -41,11 +52,14 @@ def launch(monkeypatch):
         "launch.actions": {name: kept(name) for name in actions},
         "launch.event_handler": {"EventHandler": kept("EventHandler")},
         "launch.event_handlers": {"OnProcessIO": kept("OnProcessIO")},
-        "launch.events": {},
+        "launch.events": {"matches_action": lambda action: lambda other: other is action},
         "launch.events.process": {"ProcessIO": object},
         "launch.substitutions": {"LaunchConfiguration": Configuration, "PathJoinSubstitution": kept("path")},
         "launch_ros": {},
-        "launch_ros.actions": {"Node": kept("Node")},
+        "launch_ros.actions": {"LifecycleNode": kept("LifecycleNode"), "Node": kept("Node")},
+        "launch_ros.event_handlers": {"OnStateTransition": kept("OnStateTransition")},
+        "launch_ros.events": {},
+        "launch_ros.events.lifecycle": {"ChangeState": kept("ChangeState")},
         "launch_ros.substitutions": {"FindPackageShare": kept("share")},
     }
     for name, members in contents.items():
@@ -113,6 +127,25 @@ def test_every_option_of_run_is_a_launch_argument_that_names_it(launch_file):
         assert len(words) == 1 + flags[words[0]].takes_value, words
         reached.add(words[0])
     assert reached | {"--distributed", "--set"} == flags.keys()
+
+
+def test_a_lifecycle_node_is_where_launch_looks_for_it(launch_file):
+    """launch_ros asks /NAMESPACE/NAME for its transitions: the rack takes the whole namespace as its own."""
+    from lifecycle_msgs.msg import Transition
+
+    rack = str(ROOT / "config" / "section_drive" / "rack.yaml")
+    for outer, whole in {"": "pm1", "plant": "plant/pm1", "/plant/": "/plant/pm1"}.items():
+        _, node, handler, first = started(launch_file, lifecycle="true", config=rack, namespace=outer)
+        assert (node.kind, node.name, node.namespace) == ("LifecycleNode", "rack", whole)
+        assert split_arguments(["--ros-args", "-r", f"__ns:=/{whole.strip('/')}"])[1].placed("pm1") == whole.strip("/")
+        assert node.arguments == ["run", rack, "--no-autostart"]
+        assert first.event.transition_id == Transition.TRANSITION_CONFIGURE
+        assert first.event.lifecycle_node_matcher(node)
+        (then,) = handler.args
+        assert (then.start_state, then.goal_state) == ("configuring", "inactive")
+        assert [item.event.transition_id for item in then.entities] == [Transition.TRANSITION_ACTIVATE]
+    _, node = started(launch_file, lifecycle="true", autostart="false", config=rack)
+    assert node.arguments == ["run", rack, "--no-autostart"]
 
 
 def test_a_stop_all_is_an_event(launch_file):

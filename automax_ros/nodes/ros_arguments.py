@@ -4,7 +4,8 @@ Names are ours to read, since a rack is many nodes in a namespace of its own; al
 words as they stand. Nothing here needs ROS but ``checked``.
 
 - ``__ns`` is where the rack's own namespace goes into: with ``-r __ns:=/plant`` rack PM1 is ``/plant/pm1`` (decision:
-  rcl would put all nodes into ``/plant``, and two racks of one launch file could not be told apart). Without it
+  rcl would put all nodes into ``/plant``, and two racks of one launch file could not be told apart). One that ends in
+  the rack's own, ``/plant/pm1``, is the rack's whole (decision: a LifecycleNode of launch_ros says it so). Without it
   ROS_NAMESPACE says so, which rcl does not read (decision: ROS 1 and several launch systems set it).
 - ``__node`` names the program's main node, for a rack ``rack``; ``NODE:__node`` names another (decision: rcl would
   give all nodes of the process that one name).
@@ -56,7 +57,9 @@ class RosArguments:
     given: bool = False
 
     def placed(self, namespace: str) -> str:
-        """Return a namespace, without slashes at its ends, inside the given one."""
+        """Return a namespace, without slashes at its ends, inside the given one, unless that ends in it already."""
+        if f"/{self.namespace}".endswith(f"/{namespace}"):
+            return self.namespace
         return f"{self.namespace}/{namespace}".strip("/")
 
     def name_of(self, node: str, *, main: bool = False) -> str:

@@ -39,7 +39,17 @@ def test_namespace_is_where_the_racks_own_goes_into():
 
 
 @pytest.mark.parametrize(
-    ("text", "placed"), [("/plant", "plant/pm1"), ("plant/", "plant/pm1"), ("/", "pm1"), ("", "pm1")]
+    ("text", "placed"),
+    [
+        ("/plant", "plant/pm1"),
+        ("plant/", "plant/pm1"),
+        ("/", "pm1"),
+        ("", "pm1"),
+        ("/pm1", "pm1"),
+        ("/plant/pm1", "plant/pm1"),
+        ("/xpm1", "xpm1/pm1"),
+        ("/pm1/plant", "pm1/plant/pm1"),
+    ],
 )
 def test_namespace_of_the_environment(text, placed):
     assert split("run", ROS_NAMESPACE=text)[1].placed("pm1") == placed
