@@ -50,6 +50,8 @@ def _command(parser: argparse.ArgumentParser, words: tuple[str, ...], title: str
     options: list[Option] = []
     positionals: list[Option] = []
     for action in parser._actions:
+        if action.help == argparse.SUPPRESS:  # for our own processes
+            continue
         if isinstance(action, argparse._SubParsersAction):
             inner += _inner(action, words)
         elif action.option_strings:
@@ -68,7 +70,7 @@ def _inner(action: argparse._SubParsersAction[argparse.ArgumentParser], words: S
 
 
 def _option(action: argparse.Action) -> Option:
-    text = "" if action.help in (None, argparse.SUPPRESS) else str(action.help) % _values_of(action)
+    text = str(action.help) % _values_of(action) if action.help else ""
     metavar = action.metavar if isinstance(action.metavar, str) else " ".join(action.metavar or ())
     takes_value = action.nargs != 0
     return Option(
