@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from automax_ros.nodes.ros_arguments import split_arguments
 from automax_ros.nodes.ros_parameters import GivenParameter, RosArgumentsError, parameter_of, parameters_of
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack
 
 ROOT = Path(__file__).parents[2]
 FILE = """\
@@ -199,8 +201,11 @@ def test_the_last_one_counts(tmp_path):
 
 
 def test_file_of_the_page(tmp_path):
-    """The example of docs/ros.md gives what the page says."""
+    """The example of docs/ros.md names a tunable of the section drive, and a value that its task takes."""
     page = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")
     example = page.partition("<!-- run by test/nodes/test_ros_parameters.py -->\n```yaml\n")[2].partition("```")[0]
     (found,) = read(tmp_path, example)
-    assert (found.key, found.name, found.value) == ("/pm1/processor_2", "SPEED.KP_SPEED", 1.2)
+    rack = Rack(load(ROOT / "config" / "section_drive" / "rack.yaml").config)
+    task, _, name = found.name.partition(".")
+    assert found.key == f"/{rack.config.namespace}/processor_{rack.task(task).slot}"
+    assert rack.task(task).tuning(name, found.value) == found.value
