@@ -51,7 +51,7 @@ MOST_BYTES = 64 << 20
 """Longest image that is read; writes and presences may be a hundredth of it."""
 MODULE_LOST = "31"
 """The hardware's code when a module does not answer on the backplane: bus error (decision: so is one that is lost)."""
-_PRESENCE = "bus/presence"
+PRESENCE = "bus/presence"
 
 
 class SeatTaken(Fault):
@@ -107,10 +107,10 @@ class RackBus:
         qos = ros_qos(BUS)
         self._writes = node.create_publisher(BusWriteClass, "bus", qos)
         self._images = node.create_publisher(BusImageClass, "bus/image", qos)
-        self._presences = node.create_publisher(PresenceClass, _PRESENCE, _presence_qos())
+        self._presences = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
         self._hear("bus", qos, BusWrite, self._take_write, MOST_BYTES // 100)
         self._hear("bus/image", qos, BusImage, self._take_image, MOST_BYTES)
-        self._hear(_PRESENCE, _presence_qos(), Presence, self._take_presence, MOST_BYTES // 100)
+        self._hear(PRESENCE, presence_qos(), Presence, self._take_presence, MOST_BYTES // 100)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(BEAT_NS / NS_PER_S, node.inside("the bus", self._beat), clock=steady)
 
@@ -276,7 +276,7 @@ class RackBus:
 
     def _take_presence(self, presence: Presence, sender: bytes) -> None:
         if self._participants.get(presence.process, sender) != sender:
-            self._refuse(_PRESENCE, "a word in another process's name")
+            self._refuse(PRESENCE, "a word in another process's name")
             return
         found = self.peers.heard(presence, time.monotonic_ns())
         if found is Heard.OWN:
@@ -309,7 +309,8 @@ class RackBus:
             self._waiting.append(take)
 
 
-def _presence_qos() -> QoSProfile:
+def presence_qos() -> QoSProfile:
+    """Return the quality of service of presences."""
     return QoSProfile(
         depth=10,
         reliability=ReliabilityPolicy.RELIABLE,

@@ -31,6 +31,7 @@ from automax_ros.nodes.clock import RackClock
 from automax_ros.nodes.door import Door
 from automax_ros.nodes.facts import run_facts
 from automax_ros.nodes.guarded_node import SIM_TIME, follows_clock
+from automax_ros.nodes.herald import Herald
 from automax_ros.nodes.managed import ACTIVE, INACTIVE
 from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
@@ -137,6 +138,8 @@ class RackNodes:
         if manager is not None:
             self.rack.observers.add(Follower(manager))
         self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
+        if seating is None:
+            Herald(self._site, self.nodes[0])
         self._desk = None if self.bus is None else share_operator(self.nodes, self.bus)
         self.notes = self._begin_with(arguments)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections import Counter
@@ -19,7 +20,7 @@ from automax_ros.wire.cdr import decode
 from automax_ros.wire.messages import NAMES, Scan
 
 from .distributed import RINGS, SEATS, Distributed, Line, copied
-from .support import automax, wait_until
+from .support import TYPES, Automax, automax, wait_until
 
 TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
 STOP = "- {at: 3.0, stop: [CML, RING_1, RING_2, RING_3, RING_4, SPEED, WIND_A]}\n"
@@ -170,3 +171,18 @@ def test_a_hundred_random_kills(ros_domain_id, tmp_path):
     report = run.report
     assert {name: told["deaths"] for name, told in report["processes"].items() if told["deaths"]} == killed
     assert not any(RING_COMMONS & set(told["differs"]) for told in report["processes"].values())
+
+
+def test_two_racks_of_one_name_are_told_to_both(ros_domain_id, tmp_path):
+    """Locks in different folders stand for different hosts."""
+    environments = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        environments.append({**os.environ, "TMPDIR": str(tmp_path / name)})
+    with (
+        Automax("run", TYPES, environment=environments[0]) as one,
+        Automax("run", TYPES, environment=environments[1]) as two,
+    ):
+        for process in (one, two):
+            process.wait_for_line("another rack is called TYPES: what the two send cannot be told apart")
+        assert [process.end(signal.SIGTERM).code for process in (one, two)] == [0, 0]
