@@ -30,7 +30,7 @@ from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.running.views import Write
 
 ERROR_INTERVAL_S = 1.0
-"""A task's run-time errors are reported at most this often ..."""
+"""A STOP ALL, and a task's run-time errors, are reported at most this often ..."""
 ERRORS_SHOWN = 5
 """... and then this many of one scan."""
 
@@ -51,6 +51,7 @@ class ProcessorNode(ManagedModuleNode):
         }
         self.tunables = TunableParameters(self, rack, site.present)
         self.tunables.declare(self._tasks)
+        self._stop_throttle = Throttle(ERROR_INTERVAL_S)
         self._error_throttles = {task.name: Throttle(ERROR_INTERVAL_S) for task in self._tasks}
         stream.add_sink(outlets.get)
         rack.observe(self)
@@ -85,7 +86,7 @@ class ProcessorNode(ManagedModuleNode):
 
     def operated(self, operation: Operation) -> None:
         """Report a STOP ALL, and the health of the tasks after each operation on one of them."""
-        if operation.what == "stop_all":
+        if operation.what == "stop_all" and operation.ok and self._stop_throttle.passes():
             self.get_logger().error(f"STOP ALL: {operation.reason}")
         concerned = [task for task in self._tasks if operation.concerns(task.name)]
         if operation.ok and operation.what in ("reload", "power_on"):

@@ -81,6 +81,7 @@ def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
         ("WIND_A", "udc_10"),
     }
     assert ask("ReadStatus", "status").tasks == 3
+    wait(lambda: one.task("ONE").scan_number > 0)
     assert ask("OperateTask", "stop", task="ONE").ok
     assert one.task("ONE").status.value == "stopped"
     again = ask("OperateTask", "run", task="NONE")

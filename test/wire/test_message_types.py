@@ -66,6 +66,19 @@ def test_what_only_services_answer_with_is_in_no_recording() -> None:
 
 
 @pytest.mark.parametrize("path", sorted(DEFINITIONS.glob("srv/*.srv")), ids=lambda path: path.stem)
+def test_services_are_described_in_full(path: Path) -> None:
+    """What it does, then each field, or group of fields, after its description."""
+    request, _, response = path.read_text().partition("---\n")
+    assert request.startswith("# ")
+    assert response.startswith(("# FALSE: ", "string rack"))
+    for part in (request.partition("\n\n")[2], response):
+        before = ""
+        for line in part.splitlines():
+            assert not line or line.startswith("#") or before, f"{line}: nothing says what it is"
+            before = line
+
+
+@pytest.mark.parametrize("path", sorted(DEFINITIONS.glob("srv/*.srv")), ids=lambda path: path.stem)
 def test_services_are_built_with_the_fields_of_their_definitions(path: Path) -> None:
     service = getattr(importlib.import_module("automax_msgs.srv"), path.stem)
     for part, text in zip((service.Request, service.Response), path.read_text().split("---"), strict=True):
