@@ -1,7 +1,7 @@
 """What stands after --ros-args: what is ours to read, what goes on to rcl, and what neither takes."""
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.nodes.discovery_range import choose_range, range_text
@@ -136,6 +136,7 @@ def test_what_rcl_refuses(text, said):
     assert "/src/" not in str(caught.value)
 
 
+@settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.text(alphabet="-rp_:=/aZ.", max_size=8), max_size=12))
 def test_any_words_are_taken_or_refused(words):
     """What is left is what stood outside, in its order."""
