@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import shutil
 import signal
 from collections.abc import Iterator
 from itertools import pairwise
@@ -228,3 +229,18 @@ def test_yaml_file_names_the_rack_and_is_compared_with_what_runs(running, tmp_pa
     assert ended.out.count("warning") == 1
     stored = {item.name: item.data for item in BagReader(bag).attachments()}
     assert stored["SLOW.BLK"] == (TYPES.parent / "SLOW.BLK").read_bytes()
+
+
+def test_folder_that_vanishes_is_one_error_that_names_the_cure(ros_domain_id, tmp_path):
+    """As a disk that is pulled out."""
+    bag = tmp_path / "bag"
+    with Automax("run", TYPES) as rack:
+        rack.wait_for_line(READY)
+        with Automax("record", "TYPES", "--output", bag) as recorder:
+            recorder.wait_for_line(BEGUN)
+            shutil.rmtree(bag)
+            ended = recorder.end(signal.SIGINT)
+    assert ended.code == 1
+    assert ended.err.count("error[AMX6801]") == 1
+    assert "`automax bag repair`" in ended.err
+    assert "Traceback" not in ended.err
