@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import shutil
 import signal
 from collections.abc import Iterator
 from itertools import pairwise
