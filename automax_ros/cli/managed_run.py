@@ -21,7 +21,7 @@ from automax_ros.cli.stimuli_file import StimuliRefused
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.core.diagnostics import render
 from automax_ros.core.faults import Fault
-from automax_ros.nodes.managed import ACTIVATE, CLEANUP, CONFIGURE, FINALIZED, TransitionRefused
+from automax_ros.nodes.managed import ACTIVATE, CLEANUP, CONFIGURE, FINALIZED, SHUTDOWN, Pending, TransitionRefused
 from automax_ros.nodes.managed_module import NOT_OPERATED
 from automax_ros.nodes.process import RosProcess
 from automax_ros.nodes.rack_node import RackNode
@@ -112,12 +112,12 @@ class ManagedRun:
     def refusal(self, transition: str) -> str | None:
         """Without an operator only a rack that was never active may be managed (decision: somebody must start it).
 
-        One that runs in several processes is configured by starting them (decision).
+        One that runs in several processes is configured and ended by starting and ending them (decision).
         """
         plan = None if self._session is None else self._session.plan
         if plan is None:
             return None
-        if plan.seat is not None and transition == CLEANUP:
+        if plan.seat is not None and transition in (CLEANUP, SHUTDOWN):
             return _PARTS_END
         return NOT_OPERATED if self._was_active and not plan.config.operator else None
 
@@ -131,14 +131,14 @@ class ManagedRun:
             self._tell(fault)
             raise TransitionRefused(str(fault) or "the stimuli have errors") from fault
 
-    def activate(self) -> None:
+    def activate(self) -> Pending | None:
         """Start the rack, or put all of its tasks into RUN again."""
         session = self._expected()
         if session.has_begun:
-            self._operate(session.live.nodes.activate)
-        else:
-            self._start(session)
+            return self._operate(session.live.nodes.activate)
+        self._start(session)
         self._was_active = True
+        return None
 
     def deactivate(self) -> None:
         """STOP ALL."""
@@ -192,9 +192,9 @@ class ManagedRun:
         assert self._session is not None, "only a configured node has this transition"
         return self._session
 
-    def _operate(self, operation: Callable[[], None]) -> None:
+    def _operate(self, operation: Callable[[], Pending | None]) -> Pending | None:
         try:
-            operation()
+            return operation()
         except OperationRefused as refused:
             raise TransitionRefused(str(refused)) from refused
 

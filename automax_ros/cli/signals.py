@@ -36,7 +36,7 @@ class StopRequest:
 
     @contextmanager
     def cut_short(self) -> Iterator[None]:
-        """Let a signal end the block at once, by CutShort: for long work that leaves nothing.
+        """Let a signal end the block at once, by CutShort: for long work whose result alone matters.
 
         Raises:
             CutShort: a signal has come, in the block or before.

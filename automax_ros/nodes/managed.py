@@ -75,7 +75,7 @@ class Duties(Protocol):
         """Read and compile."""
         ...
 
-    def activate(self) -> None:
+    def activate(self) -> Pending | None:
         """RUN."""
         ...
 

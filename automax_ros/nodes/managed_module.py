@@ -18,11 +18,14 @@ from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.rack.installation import Prepared
 from automax_ros.rack.module_tasks import ModuleTasks
 from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.observers import Operation
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.orders import Orders, ReloadRefused
 
 NOT_OPERATED = "the rack's YAML file does not say `operator: true`"
 """Why nobody outside may ask for a transition that stops or runs tasks."""
+DEACTIVATED = "the node rack was deactivated"
+"""The reason of the STOP ALL that makes the modules' nodes inactive too, in whatever process they are."""
 _BEFORE_THE_RACK = "the rack has not been activated yet: activate its node rack first"
 
 
@@ -37,6 +40,13 @@ class ManagedModuleNode(Managed, ModuleNode):
         self.manage(self._duties_of_tasks, self.guard, self._enter)
         self.adopt_services()
         self.follow(INACTIVE)
+
+    def follow_operation(self, operation: Operation) -> None:
+        """Take the state that an operation has brought the tasks into."""
+        if operation.what == "stop_all" and operation.reason == DEACTIVATED:
+            self.follow(INACTIVE)
+        elif operation.ok:
+            self.follow_tasks()
 
     def follow_tasks(self) -> None:
         """Take the state that the tasks are in."""

@@ -25,7 +25,7 @@ from std_srvs.srv import Trigger
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
-from automax_ros.nodes.later import allow_later
+from automax_ros.nodes.later import Later, allow_later
 from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.operator_forward import Forwarding
 from automax_ros.nodes.reloading import Reloading
@@ -69,7 +69,7 @@ class OperatorDesk:
         self._serve(OperateTask, "delete", lambda request, _: orders.delete(request.task), self._task_now)
         for name in ("clear", "clear_errors"):
             self._serve(OperateTask, name, lambda request, _: orders.clear_errors(request.task), self._task_now)
-        self._serve(Trigger, "run_all", lambda *_: orders.run_all(), self._running_now)
+        self._run_all = self._serve(Trigger, "run_all", lambda *_: orders.run_all(), self._running_now)
         self._serve(Trigger, "stop_all", lambda *_: orders.stop_all(), self._running_now)
         self._serve(Trigger, "pause", lambda *_: self._halting.halt(), self._time_now)
         self._serve(Trigger, "resume", lambda *_: self._halting.resume(), self._time_now)
@@ -93,7 +93,21 @@ class OperatorDesk:
         """End; a source that is being compiled is not installed."""
         self._reloading.close()
 
-    def _serve(self, kind: Any, name: str, act: Act, tell: Tell = _nothing) -> None:
+    def run_everywhere(self, done: Callable[[str], None]) -> None:
+        """Put all tasks into RUN, in all processes of a distributed rack; ``done`` is told why not, "" if they run."""
+
+        def respond(response: Any) -> None:
+            done("" if response.success else response.message or "refused")
+
+        answer = self._run_all(Trigger.Request(), Trigger.Response())
+        if isinstance(answer, Later):
+            answer.begin(respond)
+        else:
+            respond(answer)
+
+    def _serve(self, kind: Any, name: str, act: Act, tell: Tell = _nothing) -> Callable[[Any, Any], Any]:
+        """Create a service, and return what answers it: a response, or ``Later``."""
+
         def answered(request: Any, response: Any) -> Any:
             with self._site.present():
                 error: Exception | None = None
@@ -103,9 +117,9 @@ class OperatorDesk:
                     error = raised
                 return self._concluded(name, request, response, error, tell)
 
-        self._create(kind, name, answered)
+        return self._create(kind, name, answered)
 
-    def _create(self, kind: Any, name: str, answered: Callable[[Any, Any], Any]) -> None:
+    def _create(self, kind: Any, name: str, answered: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
         def routed(request: Any, response: Any) -> Any:
             if self.forward_by is None:
                 return answered(request, response)
@@ -113,6 +127,7 @@ class OperatorDesk:
                 return self.forward_by.answer(name, kind, request, response, answered)
 
         allow_later(self._node.create_service(kind, self._name_of(name), routed))
+        return routed
 
     def _concluded(self, name: str, request: Any, response: Any, error: Exception | None, tell: Tell) -> Any:
         """Return a response with how the request ended, and what is true now."""

@@ -91,8 +91,7 @@ class ProcessorNode(ManagedModuleNode):
         concerned = [task for task in self._tasks if operation.concerns(task.name)]
         if operation.ok and operation.what in ("reload", "power_on"):
             self.tunables.declare(concerned)
-        if operation.ok:
-            self.follow_tasks()
+        self.follow_operation(operation)
 
     def _health(self, now_ns: int) -> list[DiagnosticStatus]:
         tasks = [self._status(task, now_ns) for task in self._tasks]

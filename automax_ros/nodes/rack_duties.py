@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from automax_ros.nodes.managed import ACTIVATE, DEACTIVATE, TransitionRefused
+from automax_ros.nodes.managed import ACTIVATE, DEACTIVATE, Pending, TransitionRefused
 from automax_ros.nodes.managed_module import NOT_OPERATED
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
@@ -20,7 +20,7 @@ class Held(Protocol):
         """Whether the program has started it."""
         ...
 
-    def activate(self) -> None:
+    def activate(self) -> Pending | None:
         """Put all tasks that rest into RUN."""
         ...
 
@@ -43,10 +43,10 @@ class HeldRack:
             return "the program that holds this rack starts and closes it"
         return None
 
-    def activate(self) -> None:
+    def activate(self) -> Pending | None:
         """Put all tasks that rest into RUN."""
         try:
-            self._held.activate()
+            return self._held.activate()
         except OperationRefused as refused:
             raise TransitionRefused(str(refused)) from refused
 

@@ -32,9 +32,10 @@ from automax_ros.nodes.door import Door
 from automax_ros.nodes.facts import run_facts
 from automax_ros.nodes.guarded_node import SIM_TIME, follows_clock
 from automax_ros.nodes.herald import Herald
-from automax_ros.nodes.managed import ACTIVE, INACTIVE
-from automax_ros.nodes.managed_module import ManagedModuleNode
+from automax_ros.nodes.managed import ACTIVE, INACTIVE, Pending, TransitionRefused
+from automax_ros.nodes.managed_module import DEACTIVATED, ManagedModuleNode
 from automax_ros.nodes.module_node import Site
+from automax_ros.nodes.operator import OperatorNode
 from automax_ros.nodes.operator_sharing import share_operator
 from automax_ros.nodes.processor import ProcessorNode
 from automax_ros.nodes.rack_duties import HeldRack
@@ -208,25 +209,28 @@ class RackNodes:
         """Whether ``start`` was called."""
         return self._begun
 
-    def activate(self) -> None:
-        """Put all tasks that rest into RUN.
+    def activate(self) -> Pending | None:
+        """Put all tasks that rest into RUN, those in other processes too, whose answers are waited for.
 
         Raises:
             OperationRefused: the rack refuses it (``Operations.run_all``).
         """
+        operator = next((node for node in self.nodes if isinstance(node, OperatorNode)), None)
+        if self.bus is not None and operator is not None:
+            desk = operator.desk
+            return Pending(lambda done: desk.run_everywhere(lambda why: done(TransitionRefused(why) if why else None)))
         with self._site.present():
             self.rack.operations.run_all()
+        return None
 
     def deactivate(self) -> None:
-        """STOP ALL, and let the modules' nodes be inactive too.
+        """STOP ALL, in all processes; the modules' nodes are inactive then too.
 
         Raises:
             OperationRefused: the power is off.
         """
         with self._site.present():
-            self.rack.operations.stop_all("the node rack was deactivated")
-            for node in self._managed():
-                node.follow(INACTIVE)
+            self.rack.operations.stop_all(DEACTIVATED)
 
     def await_others(self, should_stop: Callable[[], bool]) -> bool:
         """Wait until the other processes of a distributed rack are there; FALSE where asked to stop.

@@ -112,6 +112,30 @@ def test_without_an_operator_a_manager_may_start_a_rack_but_not_stop_it(ros_doma
     assert (ended.code, ended.err) == (0, "")
 
 
+def test_transitions_of_a_distributed_rack_reach_all_processes(ros_domain_id, tmp_path):
+    from std_msgs.msg import Int32
+
+    folder = tmp_path / "rack"
+    shutil.copytree(TYPES.parent, folder)
+    file = folder / "rack.yaml"
+    file.write_text(file.read_text().replace("rack: TYPES", "rack: TYPES\noperator: true\non_module_loss: hold"))
+    modules = ("processor_1", "processor_2")
+    with Automax("run", file, "--distributed", "--no-restart") as process, Client() as client:
+        process.wait_for_line("Ctrl-C ends the run")
+        manager = manager_of(client, "/types")
+        client.until(lambda: all(manager.state(node) == ACTIVE for node in ("rack", *modules)))
+        counts = client.listen(Int32, "/types/common/COUNT", latched=True, depth=1)
+        client.until(lambda: bool(counts) and counts[-1].data > 0, "a scan of processor_1")
+        assert not manager.ask("rack", "cleanup")
+        assert not manager.ask("rack", "shutdown"), "its processes are ended by who started them"
+        assert manager.ask("rack", "deactivate")
+        client.until(lambda: all(manager.state(node) == INACTIVE for node in ("rack", *modules)))
+        stopped = counts[-1].data
+        assert manager.ask("rack", "activate")
+        client.until(lambda: all(manager.state(node) == ACTIVE for node in ("rack", *modules)))
+        client.until(lambda: counts[-1].data > stopped + 1, "a scan of processor_1, again")
+
+
 def test_a_fault_leaves_the_node_active(ros_domain_id):
     """A manager that finds a node inactive without having asked for it brings the system down."""
     from std_msgs.msg import Bool
