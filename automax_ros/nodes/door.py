@@ -5,7 +5,7 @@ The thread is woken by counters that DDS's own threads count up (no Python runs 
 most ``MOST_A_ROUND`` in turn, lets scans go first (``Turns``), and rests a millisecond. What comes is taken on a thread
 of its own, not by callbacks of an executor or by looks between scans (decision: EventsExecutor queues an event for each
 message without bound; a message of 10 MB holds up the thread that takes it for 10 to 70 ms; a look at a topic costs
-1.5 us, half a core with 300 topics each millisecond. All measured on two cores of a virtual machine, docs/ros.md).
+1.5 us, half a core with 300 topics each millisecond). All measured on two cores of a virtual machine (docs/ros.md).
 """
 
 from __future__ import annotations
