@@ -141,15 +141,16 @@ class Line(Client):
         )
         self._until_heard()
 
-    def until_quiet(self, received: list[bytes], quiet_s: float = 2.0) -> None:
-        """Wait until nothing has come for a while after something came, and all have taken what was sent."""
+    def until_quiet(self, received: list[bytes], after_ns: int, quiet_s: float = 2.0) -> None:
+        """Wait until nothing has come for a while after a rack time, and all have taken what was sent."""
         seen = (len(received), time.monotonic())
 
         def is_quiet() -> bool:
             nonlocal seen
             if len(received) != seen[0]:
                 seen = len(received), time.monotonic()
-            return seen[0] > 0 and time.monotonic() - seen[1] > quiet_s
+            is_over = self.began_ns and time.time_ns() > self.began_ns + after_ns
+            return bool(is_over) and time.monotonic() - seen[1] > quiet_s
 
         self.until(is_quiet, "silence")
         self._until_heard()

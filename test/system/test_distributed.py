@@ -46,6 +46,7 @@ def recorded(bag: Path) -> list[Scan]:
     return [item.message for item in BagReader(bag).messages(types={NAMES[Scan]})]
 
 
+@pytest.mark.timeout(300)
 def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
     """The same stimuli give each scan the same inputs at the same rack time; at rest all images hold the same."""
     rack = copied(tmp_path, more=STOP)
@@ -55,7 +56,7 @@ def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
     with Line() as line:
         scans = line.listen_raw(NAMES[Scan], "/line4/scans")
         with Distributed(rack, "--record", bag) as run:
-            line.until_quiet(scans)
+            line.until_quiet(scans, 3 * NS_PER_S)
             ended = run.end(signal.SIGTERM)
     assert ended.code == 0, ended
     report = run.report
@@ -78,6 +79,7 @@ def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
     assert seen_by(recorded(bag), config, line.began_ns).items() <= alone.items()
 
 
+@pytest.mark.timeout(300)
 def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_domain_id, tmp_path):
     rack = copied(tmp_path)
     with Distributed(rack) as run, Line() as line:
@@ -104,6 +106,7 @@ def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_do
         assert 0 < halted <= report["tasks"][f"RING_{ring}"]["scans"], "each scan of a life counts once"
 
 
+@pytest.mark.timeout(300)
 def test_stop_all_when_a_process_is_lost(ros_domain_id, tmp_path):
     rack = copied(tmp_path, rule="stop_all")
     with Distributed(rack, "--no-restart") as run, Line() as line:
@@ -137,6 +140,7 @@ def test_processes_end_with_whoever_started_them(ros_domain_id, tmp_path):
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(600)
 def test_seven_processes_scan_on_time_on_a_quiet_machine(ros_domain_id, tmp_path):
     with Distributed(copied(tmp_path), "--duration", "60") as run:
         run.process.wait(180)
@@ -148,6 +152,7 @@ def test_seven_processes_scan_on_time_on_a_quiet_machine(ros_domain_id, tmp_path
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(7200)
 def test_a_hundred_random_kills(ros_domain_id, tmp_path):
     """Nobody else is disturbed, no value is wrong, nothing hangs; each death is noticed and made good."""
     random = Random(5)
