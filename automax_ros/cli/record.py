@@ -264,7 +264,7 @@ class _Session:
             self._line.message(f"  {count_of(lost, 'value')} of common topics did not come; the write log has them")
         if recording.malformed:
             self._line.message(f"  {count_of(recording.malformed, 'malformed message')} left out")
-        foreign = sum(self._recorder.binding.refused.values())
+        foreign = self._recorder.binding.refused
         if foreign:
             self._line.message(f"  {count_of(foreign, 'message')} of other programs left out")
         for item in recording.lacks if recording.first_stamp is not None else ():

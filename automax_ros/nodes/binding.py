@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from dataclasses import dataclass, field
 
 from rclpy.node import Node
 
@@ -22,10 +23,20 @@ SILENT_NS = 3 * NS_PER_S
 """A rack that sends nothing for so long while another of its name sends a table has been started again (decision: one
 that was killed stands in the graph for up to 20 s)."""
 LOOK_NS = NS_PER_S // 4
+GRACE_NS = NS_PER_S
+"""A process of the rack may be heard for so long before its presence is."""
 MOST_TABLES = 16
 """Most tables of others that are kept."""
 MOST_PROCESSES = 64
 """Most processes of one rack."""
+
+
+@dataclass
+class Stranger:
+    """A program that is not known to be the rack's: since when (ns), and how much it sent on each topic."""
+
+    since_ns: int
+    sent: Counter[str] = field(default_factory=Counter)
 
 
 class Binding:
@@ -39,7 +50,8 @@ class Binding:
         self._last_ns = self._next_ns = 0
         self._has_rival = False
         self._tables: dict[bytes, Taken] = {}
-        self.refused: Counter[str] = Counter()
+        self._strangers: dict[bytes, Stranger] = {}
+        self._told: set[str] = set()
         self.news: list[str] = []
         self.tells_senders = library() is not None
 
@@ -55,6 +67,7 @@ class Binding:
         """Let another process of the same run be one of the rack's."""
         if len(self._others) < MOST_PROCESSES:
             self._others.add(participant(sender))
+            self._strangers.pop(participant(sender), None)
 
     @property
     def is_there(self) -> bool:
@@ -73,10 +86,26 @@ class Binding:
         if sender == self._home or sender in self._others:
             self._last_ns = time.monotonic_ns()
             return True
-        if not self.refused[topic]:
-            self.news.append(f"left out what another program publishes on {topic}: it is not the rack that is recorded")
-        self.refused[topic] += 1
+        if sender not in self._strangers and len(self._strangers) >= MOST_PROCESSES:
+            sender = b""
+        self._strangers.setdefault(sender, Stranger(time.monotonic_ns())).sent[topic] += 1
         return False
+
+    @property
+    def refused(self) -> int:
+        """How many messages of other programs were left out."""
+        return sum(stranger.sent.total() for stranger in self._strangers.values())
+
+    def look(self) -> None:
+        """Tell of programs that publish on the rack's topics and have not turned out to be processes of it."""
+        now = time.monotonic_ns()
+        for stranger in self._strangers.values():
+            if now - stranger.since_ns > GRACE_NS:
+                for topic in stranger.sent.keys() - self._told:
+                    self._told.add(topic)
+                    self.news.append(
+                        f"left out what another program publishes on {topic}: it is not of the recorded rack"
+                    )
 
     def keep(self, table: Taken) -> None:
         """Keep a table that is not ours: it may turn out to be that of the rack's next run."""

@@ -179,6 +179,8 @@ class LiveRecorder:
         self._table = found.payload or b""
         table = table_of(self._table)
         self._run_id = table.run_id
+        if self._presences is None:
+            self._presences = RawSubscription(self._node, f"{self._space}/bus/presence", _PRESENCE)
         return table
 
     def files(self, stopping: Callable[[], bool]) -> list[RackFile]:
@@ -221,9 +223,6 @@ class LiveRecorder:
         first += [topics.snapshot, topics.scans, topics.states]
         self._subscriptions = [RawSubscription(self._node, name, kinds[name]) for name in first]
         self._files = RawSubscription(self._node, topics.config, _FILES)
-        presence = f"{self._space}/bus/presence"
-        if presence in offered:
-            self._presences = RawSubscription(self._node, presence, _PRESENCE)
         return self.recording
 
     def step(self) -> None:
@@ -260,6 +259,7 @@ class LiveRecorder:
 
     def _look(self) -> None:
         self._meet_processes()
+        self.binding.look()
         table = self.binding.successor()
         if table is not None:
             self._order.add(table.sent_ns, (self._topics.variables, table.payload or b""))
