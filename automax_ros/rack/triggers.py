@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+from automax_ros.core.ticks import UDC_TICK_NS
 from automax_ros.running.cml_task import CmlTask
 from automax_ros.running.events import Event, Events
 from automax_ros.running.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
@@ -14,6 +15,8 @@ Due = PeriodicAction
 """Is called when a scan is due, with the instant in ns and the number of instants skipped just before it."""
 
 
+LATE_NS = UDC_TICK_NS
+"""Lateness from which on a host may have skipped what interrupts."""
 _LAST = EventKey(EventClass.OBSERVE, 0, "")
 
 
@@ -69,7 +72,8 @@ class Timeout:
     """The time within which an event must be set again, once somebody waits for it.
 
     A host that is late makes the interrupts of a module late too, so no time runs out before all that is due has been
-    carried out.
+    carried out. Where it was late by ``LATE_NS`` or more the time begins anew: scans of a UDC were skipped, and the one
+    whose end interrupts may still be under way in modeled execution (decision).
     """
 
     def __init__(self, timeout_ns: int, key: EventKey, scheduler: Scheduler, expired: Callable[[], None]) -> None:
@@ -89,8 +93,11 @@ class Timeout:
             self._end = None
 
     def _over(self, now_ns: int) -> None:
-        if now_ns < self._scheduler.wall_ns:
-            self._end = self._scheduler.at(self._scheduler.wall_ns, _LAST, self._over)
+        wall_ns = self._scheduler.wall_ns
+        if wall_ns - now_ns >= LATE_NS:
+            self._end = self._scheduler.at(wall_ns + self._timeout_ns, self._key, self._over)
+        elif now_ns < wall_ns:
+            self._end = self._scheduler.at(wall_ns, _LAST, self._over)
         else:
             self._end = None
             self._expired()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.triggers import Timeout
@@ -53,6 +54,18 @@ def test_a_host_that_is_late_lets_no_time_run_out():
     assert expired == []
     scheduler.run_due(345)
     assert expired == [345], "after all that was late: the last interrupt came at 280"
+
+
+def test_after_a_long_delay_of_the_host_the_time_begins_anew():
+    """What interrupts may end only after the call that was late: a scan in modeled execution that is under way."""
+    scheduler, expired = Scheduler(), []
+    timeout = Timeout(5 * NS_PER_MS, KEY, scheduler, lambda: expired.append(scheduler.now_ns))
+    timeout.begin(0)
+    scheduler.run_due(20 * NS_PER_MS)
+    scheduler.run_due(25 * NS_PER_MS - 1)
+    assert expired == []
+    scheduler.run_due(25 * NS_PER_MS + 1000)
+    assert expired == [25 * NS_PER_MS + 1000], "20 ms and 5; late by less than a tick of a UDC it is over"
 
 
 def rack_of(tmp_path, execution: str = "ideal", **tasks: tuple[int, str]) -> Rack:
