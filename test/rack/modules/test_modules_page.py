@@ -53,7 +53,7 @@ def test_every_period_and_status_register_of_an_interrupt_is_an_output(model):
 
 
 def test_the_example_scans_every_22_ms(tmp_path):
-    task, rack_file = (re.search(rf"```{word}\n(.*?)```", PAGE, re.S)[1] for word in ("basic", "yaml"))
+    task, rack_file = (re.search(rf"```{word}[^\n]*\n(.*?)```", PAGE, re.S)[1] for word in ("blk", "yaml"))
     (tmp_path / "SPEED.BLK").write_text(task)
     (tmp_path / "rack.yaml").write_text(rack_file)
     config = load(tmp_path / "rack.yaml").config

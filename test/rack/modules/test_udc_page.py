@@ -42,10 +42,10 @@ def test_the_table_has_every_register_that_is_not_the_modules_own():
 
 
 def test_the_example_runs(tmp_path):
-    udc, line, _ = re.findall(r"```basic\n(.*?)```", PAGE, re.S)
+    udc, line, _ = re.findall(r"```blk[^\n]*\n(.*?)```", PAGE, re.S)
     (tmp_path / "WIND_A.BLK").write_text(udc)
     (tmp_path / "LINE.BLK").write_text(line)
-    (tmp_path / "rack.yaml").write_text(re.search(r"```yaml\n(.*?)```", PAGE, re.S)[1])
+    (tmp_path / "rack.yaml").write_text(re.search(r"```yaml[^\n]*\n(.*?)```", PAGE, re.S)[1])
     config = load(tmp_path / "rack.yaml").config
     assert config is not None
     assert [item.result.diagnostics for item in check_tasks(config)] == [[], []]
@@ -61,8 +61,8 @@ def test_the_example_runs(tmp_path):
 
 
 def test_the_example_with_a_plant_turns_its_motor(tmp_path):
-    (tmp_path / "WIND_A.BLK").write_text(re.findall(r"```basic\n(.*?)```", PAGE, re.S)[2])
-    (tmp_path / "rack.yaml").write_text(re.findall(r"```yaml\n(.*?)```", PAGE, re.S)[1])
+    (tmp_path / "WIND_A.BLK").write_text(re.findall(r"```blk[^\n]*\n(.*?)```", PAGE, re.S)[2])
+    (tmp_path / "rack.yaml").write_text(re.findall(r"```yaml[^\n]*\n(.*?)```", PAGE, re.S)[1])
     config = load(tmp_path / "rack.yaml").config
     assert config is not None
     assert [item.result.diagnostics for item in check_tasks(config)] == [[]]
