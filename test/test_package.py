@@ -32,9 +32,13 @@ ROOMS = [
 ]  # fmt: skip
 ROOMS_WITH_ROS = {"nodes", "cli"}
 ROS_PACKAGES = {
-    "ament_index_python", "automax_msgs", "builtin_interfaces", "diagnostic_msgs", "rcl_interfaces", "rclpy",
-    "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs",
+    "ament_index_python", "automax_msgs", "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch",
+    "launch_ros", "lifecycle_msgs", "rcl_interfaces", "rclpy", "rosgraph_msgs", "rosidl_parser", "sensor_msgs",
+    "std_msgs", "std_srvs",
 }  # fmt: skip
+ROSDEP_KEYS = {"lz4": "python3-lz4", "numpy": "python3-numpy", "yaml": "python3-yaml", "zstandard": "python3-zstandard"}
+WITHOUT_KEY = {"automax_ros", "matplotlib", "mcap"}
+"""Imported, but ours, wanted for pictures only, or without a key of rosdep."""
 
 
 def sources_of(room: str) -> list[Path]:
@@ -69,6 +73,15 @@ def test_package_xml_names_the_messages_and_the_build_type():
     assert "automax_msgs" in [element.text for element in package.findall("exec_depend")]
     messages = ElementTree.parse(ROOT / "msg_defs" / "package.xml")
     assert messages.findtext("member_of_group") == "rosidl_interface_packages"
+
+
+def test_package_xml_names_what_is_imported_and_nothing_else():
+    sources = [path for folder in ("automax_ros", "launch", "examples") for path in (ROOT / folder).rglob("*.py")]
+    imported = {name.partition(".")[0] for path in sources for _, name in imports_of(path)}
+    keys = {ROSDEP_KEYS.get(name, name) for name in imported - set(sys.stdlib_module_names) - WITHOUT_KEY}
+    package = ElementTree.parse(ROOT / "colcon" / "package.xml")
+    named = [element.text for element in package.findall("exec_depend")]
+    assert sorted(named) == sorted({*keys, "rosgraph_msgs"})  # /clock's type is made by its name
 
 
 def test_automax_is_the_console_script():
@@ -385,6 +398,18 @@ def test_missing_messages_name_the_command(monkeypatch):
     monkeypatch.setattr(environment, "_needed_changes", dict)
     with pytest.raises(RosUnavailable, match=r"cannot import automax_msgs .*`make setup`"):
         environment.prepare()
+
+
+@pytest.mark.parametrize("trouble", ["absent", "other fields"])
+def test_messages_of_another_version_name_the_command(monkeypatch, trouble):
+    """As after an update without `make setup`."""
+    messages = pytest.importorskip("automax_msgs.msg")
+    if trouble == "absent":
+        monkeypatch.delattr(messages, "TaskTable")
+    else:
+        monkeypatch.setattr(messages, "TaskTable", messages.TaskInfo)
+    with pytest.raises(RosUnavailable, match=r"another version .*TaskTable.*`(make setup|colcon build)`"):
+        environment.prepare(may_restart=False)
 
 
 def test_message_definitions_of_cmake_and_setup_agree():

@@ -35,7 +35,7 @@ def _asks(given: argparse.Namespace) -> list[Ask]:
 
 
 def _reason(_: str) -> str:
-    return "its log says why: the rack's console, and /rosout"
+    return "the rack's console and /rosout say why"
 
 
 LIFECYCLE = Action(

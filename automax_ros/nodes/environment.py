@@ -27,6 +27,7 @@ from pathlib import Path
 
 from automax_ros.core.faults import Fault
 from automax_ros.nodes.discovery_range import choose_range
+from automax_ros.wire.definitions import message_types
 
 SETUP_COMMAND = "make setup"
 COLCON_COMMAND = "colcon build"
@@ -132,6 +133,18 @@ def _check_imports() -> None:
             importlib.import_module(module)
         except ImportError as error:
             raise RosUnavailable(f"cannot import {module.partition('.')[0]} ({error}): {_cure()}") from error
+    _check_messages()
+
+
+def _check_messages() -> None:
+    """After an update of this package the installed automax_msgs may be an older one."""
+    for name, known in message_types().items():
+        package, _, short = name.split("/")
+        if package == "automax_msgs":
+            kind = getattr(importlib.import_module(f"{package}.msg"), short, None)
+            fields = [] if kind is None else list(kind.get_fields_and_field_types())
+            if fields != [field.name for field in known.definition.fields]:
+                raise RosUnavailable(f"automax_msgs is of another version than automax_ros ({short}): {_cure()}")
 
 
 def _cure() -> str:

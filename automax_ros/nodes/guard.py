@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from automax_ros.running.health import Health
 
-FAILED = "failed callback"
+FAILED, REFUSED = "failed callback", "refused request"
 """What ``Health`` counts them as."""
 MOST_TOLD, MOST_LOGGED = 300, 20
 """Most characters of an error, and most failures, that are logged: a client may go on and on."""
@@ -36,6 +36,10 @@ class Guard:
         self._health.note(FAILED, (what, type(error)), lambda: text)
         if self._health.counts[FAILED] <= MOST_LOGGED:
             self._log(text)
+
+    def refused(self, what: str, reason: str, key: str) -> None:
+        """Count a request that was refused with a reason, and tell the first one of a key."""
+        self._health.note(REFUSED, key, lambda: f"a request was refused: {what}: {reason}")
 
     def services(self, node: Node) -> None:
         """Let no exception leave the services that a node has now; a request that fails is refused."""

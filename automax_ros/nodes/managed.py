@@ -209,6 +209,7 @@ class Managed(LifecycleNodeMixin):  # type: ignore[misc]
 
     def _tell(self, transition: str, reason: str) -> None:
         self.get_logger().warning(f"transition {transition} refused: {reason}")
+        self._guard.refused(transition, reason[:MOST_TOLD], reason[:MOST_TOLD])
 
 
 def _name(transition: Any) -> str:

@@ -37,8 +37,6 @@ from automax_ros.running.task import Status
 
 PLACES = ("first", "second", "last")
 """What the error log keeps."""
-REFUSED = "refused request"
-"""What ``Health`` counts requests as that were not carried out."""
 MOST_TOLD = 300
 """Most characters of an unforeseen error that an answer tells."""
 Act = Callable[[Any, Any], object]
@@ -136,7 +134,7 @@ class OperatorDesk:
             reason = f"{type(error).__name__}: {reason[:MOST_TOLD]}"
             self._node.guard.report(f"a request to {name} was refused", error)
         elif error is not None:
-            self._site.health.note(REFUSED, name, lambda: f"a request was refused: {name}: {reason}")
+            self._node.guard.refused(name, reason, name)
         for field, value in (
             ("ok", error is None),
             ("reason", reason),
