@@ -55,7 +55,7 @@ class CommonMemoryNode(ModuleNode):
         self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
         self._files: list[RackFile] = []
         outlets[stream.operations_topic] = self._with_files(outlets[stream.operations_topic])
-        self._offer_files()
+        self.offer_files()
         for view, variable in enumerate(rack.config.variables):
             topic = stream.value_topic(view)
             if variable.direction is Direction.IN and topic is not None:
@@ -69,7 +69,7 @@ class CommonMemoryNode(ModuleNode):
         """Return what publishes an operation and, where it was a reload, the files that the rack runs from now."""
 
         def take(stamp: int, payload: bytes) -> None:
-            self._offer_files()
+            self.offer_files()
             publish(stamp, payload)
 
         return take
@@ -85,7 +85,8 @@ class CommonMemoryNode(ModuleNode):
         level, text = (DiagnosticStatus.OK, "running") if good else (DiagnosticStatus.WARN, "the battery was bad")
         return [self.status(module.model, level, text, module.slot, values)]
 
-    def _offer_files(self) -> None:
+    def offer_files(self) -> None:
+        """Send the rack's files again if one of them is another now."""
         rack = self.site.rack
         files = files_of(rack)
         if files != self._files:

@@ -13,6 +13,7 @@ from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
+from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import quoted
 from automax_ros.nodes.bus import RackBus
 from automax_ros.nodes.later import Later, Respond
@@ -45,10 +46,14 @@ class Share:
 
 
 class Forwarding:
-    """Forwards the requests of one node, that of the operator. ``bus`` knows who is there."""
+    """Forwards the requests of one node, that of the operator. ``bus`` knows who is there.
 
-    def __init__(self, node: ModuleNode, bus: RackBus) -> None:
+    ``reloaded`` is called when the source of a task elsewhere is another.
+    """
+
+    def __init__(self, node: ModuleNode, bus: RackBus, reloaded: Callable[[], None]) -> None:
         """Find out which process holds what."""
+        self._reloaded = reloaded
         config = node.site.rack.config
         self._node, self._bus, self._config = node, bus, config
         home = bus.peers.seat
@@ -77,9 +82,22 @@ class Forwarding:
                 answers[HERE] = local(share.request, kind.Response())
 
         def begin(respond: Respond) -> None:
-            _Round(self, service, kind, shares, answers, lambda: respond(_merged(response, request, shares, answers)))
+            _Round(self, service, kind, shares, answers, lambda: respond(end()))
+
+        def end() -> Any:
+            found = _merged(response, request, shares, answers)
+            if service == "reload" and _is_ok(found):
+                self._note_source(request)
+            return found
 
         return Later(begin)
+
+    def _note_source(self, request: Any) -> None:
+        """Keep what a task elsewhere runs from now on: whoever records the rack asks here for its files."""
+        name = request.task.strip().upper()
+        sources = self._node.site.rack.operations.installation.sources
+        sources[name] = SourceText(sources[name].name, request.source)
+        self._reloaded()
 
     def client(self, seat: int, service: str, kind: Any) -> Any:
         """Return the client of a service of another process."""

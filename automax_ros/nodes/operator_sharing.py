@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from automax_ros.nodes.bus import RackBus
+from automax_ros.nodes.common_memory import CommonMemoryNode
 from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.operator import OperatorNode
 from automax_ros.nodes.operator_desk import OperatorDesk
@@ -19,9 +20,10 @@ def share_operator(nodes: Sequence[ModuleNode], bus: RackBus) -> OperatorDesk | 
     Returns the desk that serves here, to be closed; None where the rack has no operator, or the node closes it.
     """
     rack = nodes[0].site.rack
+    memory = next((node for node in nodes if isinstance(node, CommonMemoryNode)), None)
     for node in nodes:
-        if isinstance(node, OperatorNode):
-            node.desk.forward_by = Forwarding(node, bus)
+        if isinstance(node, OperatorNode) and memory is not None:
+            node.desk.forward_by = Forwarding(node, bus, memory.offer_files)
     if rack.part.is_home or not rack.config.operator:
         return None
     return OperatorDesk(nodes[0], partial(operate_name, part_name(rack.config, rack.part.slots)))

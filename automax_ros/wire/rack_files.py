@@ -56,8 +56,10 @@ class RackFile:
 
 
 def files_of(rack: Rack) -> list[RackFile]:
-    """Return the files that a rack runs from."""
-    sources = [RackFile(source_name(name, source.name), source.text) for name, source in rack.sources.items()]
+    """Return the files that a rack runs from: also the sources of tasks that are in other processes."""
+    texts = rack.sources
+    texts |= {name: source for name, source in rack.operations.installation.sources.items() if name not in texts}
+    sources = [RackFile(source_name(name, source.name), source.text) for name, source in texts.items()]
     return [RackFile(RACK_FILE, rack.config.text), *sources]
 
 

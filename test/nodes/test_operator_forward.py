@@ -9,6 +9,7 @@ from rack.bus.parts import SEATS, config_in
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.rack import Rack
+from automax_ros.wire.rack_files import files_of
 
 PATIENCE_NS = 30 * NS_PER_S
 RUN_ID = 77
@@ -118,6 +119,10 @@ def test_a_source_is_reloaded_where_its_task_runs(ask, racks):
     source = one.sources["ONE"].text.replace("INPUT2=1", "INPUT2=3")
     assert ask("Reload", "reload", task="ONE", source=source).ok
     assert "INPUT2=3" in one.sources["ONE"].text
+    # Whoever records the rack asks at common memory for the sources of all.
+    files = {file.name: file.text for file in files_of(racks["parts"][0].rack)}
+    assert set(files) == {"rack.yaml", "ONE.BLK", "TWO.BLK", "WIND_A.BLK"}
+    assert files["ONE.BLK"] == source
     wrong = ask("Reload", "reload", task="ONE", source="10 NONSENSE\n")
     assert not wrong.ok
     assert wrong.findings

@@ -138,7 +138,16 @@ class BusLink:
         self._memory.now_ns = self._rack.now_ns
         for view, element, value in batch.entries:
             self._take(view, element, value, batch)
+        self._tell_shaped(batch)
         self._tell()
+
+    def _tell_shaped(self, batch: Batch) -> None:
+        """Send back what an input has made something else of, as a counter of 24 bits does: all shall hold that."""
+        sent = {(view, element): value for view, element, value in batch.entries}
+        for cause in self._memory.take_causes():
+            entry = cause.view, cause.element, cause.value
+            if sent.get(entry[:2], cause.value) != cause.value:
+                self._note(max(cause.time_ns, batch.time_ns + 1), cause.writer, WriteKind(cause.kind), (entry,))
 
     def merge(self, picture: Picture) -> None:
         """Take over what another process holds, as far as it is newer. Between two scans."""
@@ -225,7 +234,7 @@ class BusLink:
             self._memory.release(force.view, force.element, writer)
 
     def _tell(self) -> None:
-        """Let observers know what has come, without sending it back; what an input makes of a value goes out."""
+        """Let observers know what has come, without sending it back."""
         self._memory.take_causes()
         self._rack.observers.tell_writes()
 

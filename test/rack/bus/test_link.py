@@ -239,6 +239,15 @@ def test_what_happens_in_every_process_by_itself_is_sent_by_the_home_alone(confi
     assert home.rack.value("A%") == one.rack.value("A%") == 40
 
 
+def test_all_hold_what_an_input_makes_of_a_value(config):
+    home, one, two = processes = idle(config)
+    view = home.rack.memory.view("B%")
+    home.rack.inputs.shape([(view, 0)], lambda value: int(value) & 7)
+    one.rack.write("B%", 15)
+    settle(processes)
+    assert [process.rack.value("B%") for process in (home, one, two)] == [7, 7, 7]
+
+
 def test_the_part_of_a_rack_compiles_and_runs_its_own_tasks_alone(config):
     part, whole = Rack(config, local=(1,)), Rack(config)
     assert [task.name for task in part.tasks] == ["ONE"]
