@@ -34,6 +34,7 @@ from automax_ros.rack.bus.link import Batch, BusLink
 from automax_ros.rack.bus.part_name import part_name
 from automax_ros.rack.config import ModuleLoss
 from automax_ros.rack.plants.driven import driven_plants
+from automax_ros.running.health import FROM_STRANGERS
 from automax_ros.wire.bus import BUS, batch_of, image_message, picture_of, standing_of, with_standing, write_message
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
 from automax_ros.wire.bus_peers import BEAT_NS, Heard, Peer, Peers
@@ -246,7 +247,9 @@ class RackBus:
         BusWay(self._node, topic, type_name, qos, receive, self._refuse, most)
 
     def _refuse(self, topic: str, what: str) -> None:
-        self._site.health.note("refused bus message", (topic, what[:40]), lambda: f"{topic}: {what} was refused")
+        self._site.health.note(
+            "refused bus message", (topic, what[:40]), lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS
+        )
 
     def _take_write(self, message: BusWrite, sender: bytes) -> None:
         if message.process == self.peers.process:
@@ -300,7 +303,7 @@ class RackBus:
             Heard.OTHER_FILE: f"{name} has another rack file or other sources: it is not of this run",
             Heard.SEAT_TAKEN: f"a second process has {name}",
         }
-        self._site.health.note("other rack", (found, presence.process), lambda: texts[found])
+        self._site.health.note("other rack", (found, presence.process), lambda: texts[found], most=FROM_STRANGERS)
 
     def _when_begun(self, take: Callable[[], None]) -> None:
         if self._begun:

@@ -17,6 +17,7 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.bus import PRESENCE, presence_qos
 from automax_ros.nodes.bus_way import BusWay
 from automax_ros.nodes.module_node import ModuleNode, Site
+from automax_ros.running.health import FROM_STRANGERS
 from automax_ros.wire.bus_messages import Presence, Stage
 from automax_ros.wire.cdr import encode
 
@@ -50,7 +51,7 @@ class Herald:
         if word.process != self._process:
             name = self._site.rack.config.name
             text = f"another rack is called {name}: what the two send cannot be told apart"
-            self._site.health.note("other rack", word.run_id, lambda: text)
+            self._site.health.note("other rack", word.run_id, lambda: text, most=FROM_STRANGERS)
 
     def _refuse(self, topic: str, what: str) -> None:
         self._site.health.note("refused message", topic, lambda: f"{topic}: {what} was refused")

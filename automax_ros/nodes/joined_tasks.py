@@ -13,6 +13,7 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.bus_way import BusWay
 from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.topics import ros_qos
+from automax_ros.running.health import FROM_STRANGERS
 from automax_ros.wire.messages import NAMES
 from automax_ros.wire.qos import QosProfile
 from automax_ros.wire.task_table import TaskInfo, TaskTable
@@ -59,4 +60,4 @@ class JoinedTasks:
         self._changed()
 
     def _refuse(self, topic: str, what: str) -> None:
-        self._site.health.note("refused table", what[:40], lambda: f"{topic}: {what} was refused")
+        self._site.health.note("refused table", what[:40], lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS)

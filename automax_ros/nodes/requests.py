@@ -52,6 +52,7 @@ class ServiceWay:
                 response = self._service.callback(request, self._kind.Response())
             except Exception as error:
                 response = self._refuse(self._kind, error)
+            self._rcl.reset_error()  # rclpy's own callbacks leave one, and rcutils complains at the next on the console
         finally:
             self._request.destroy(raw)
         self._service.send_response(response, header)

@@ -221,3 +221,23 @@ def test_player_goes_on_too(ros_domain_id, client):
         assert len(player.health.news()) == 1
     finally:
         player.close()
+
+
+def test_wrong_type_hashes_leave_the_console_alone(live, client, capfd):
+    from type_description_interfaces.srv import GetTypeDescription
+
+    for wrong in ("", "RIHS", "no hash at all", "RIHS01_12") * 3:
+        request = GetTypeDescription.Request(type_name="a/msg/B", type_hash=wrong)
+        assert not answer(live, client, GetTypeDescription, "/types/rack/get_type_description", request).successful
+    assert capfd.readouterr().err == ""
+
+
+def test_forged_presences_are_told_a_few_times(live, client):
+    from automax_msgs.msg import Presence
+
+    words = client.node.create_publisher(Presence, "/types/bus/presence", 10)
+    until(live, client, lambda: words.get_subscription_count() > 0)
+    for number in range(60):
+        words.publish(Presence(rack="TYPES", process=1000 + number, run_id=77 + number))
+        until(live, client, lambda: live.health.counts["other rack"] > number)  # noqa: B023 used at once
+    assert len([text for text in live.health.news() if text.startswith("another rack")]) == 20
