@@ -128,7 +128,8 @@ class BusLink:
         cause = self._rack.operations.stopped
         if not self._adopting and cause != self.standing.cause:
             # Two at one instant, or before the start, have their order too.
-            self.standing = Standing(max(operation.at_ns, self.standing.at_ns + 1), self.seat, cause)
+            seat = self._rack.config.home_slot if self._is_common() else self.seat
+            self.standing = Standing(max(operation.at_ns, self.standing.at_ns + 1), seat, cause)
 
     # from other processes
 
@@ -169,7 +170,10 @@ class BusLink:
         return Picture(self.sequence, tuple(self._versions.all()), tuple(forces))
 
     def adopt(self, standing: Standing) -> None:
-        """Follow the rack into how it stands by another process's word, if that is newer. Between two scans."""
+        """Follow the rack into how it stands by another process's word, if that is newer. Between two scans.
+
+        A part that stands already is not stopped again, which would clear what was set meanwhile (decision).
+        """
         if standing.order <= self.standing.order:
             return
         operations = self._rack.operations
@@ -179,7 +183,9 @@ class BusLink:
             if standing.cause is None:
                 operations.stopped = None
             elif operations.powered:
-                operations.stop_all(standing.cause.reason, standing.cause.code, standing.cause.task)
+                if operations.stopped is None:
+                    operations.stop_all(standing.cause.reason, standing.cause.code, standing.cause.task)
+                operations.stopped = standing.cause
         finally:
             self._adopting = False
 

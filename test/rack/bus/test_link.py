@@ -175,6 +175,35 @@ def test_a_stop_all_of_one_stops_all_and_outputs_are_off_everywhere(config):
     assert one.rack.operations.stopped is None
 
 
+def test_what_is_set_while_the_rack_stands_outlives_operations_of_any_process(config):
+    """A part that stands is not stopped again because the same STOP ALL is told of once more."""
+    home, one, two = processes = cut(config)
+    one.rack.run(0.001)
+    one.rack.operations.stop_all("a fault of ONE", "14", "ONE")
+    for process in (two, home):
+        process.rack.scheduler.pass_until(3 * NS_PER_MS)
+        process.link.adopt(one.link.standing)
+    settle(processes)
+    home.rack.write("A%", 44)
+    settle(processes)
+    for process in processes:
+        process.rack.operations.clear_errors()
+    for other in processes:
+        for process in processes:
+            process.link.adopt(other.link.standing)
+    settle(processes)
+    assert [process.rack.value("A%") for process in processes] == [44, 44, 44]
+    assert len({process.link.standing for process in processes}) == 1
+
+
+def test_a_stop_of_the_stimuli_is_one_stop_in_all_processes(config):
+    processes = [Process(config, slots, common=lambda: True) for slots in SEATS]
+    for process in processes:
+        process.start()
+        process.rack.operations.stop_all("STOP ALL of the stimuli")
+    assert len({process.link.standing for process in processes}) == 1
+
+
 def test_a_stop_and_a_run_at_one_instant_are_told_in_their_order(config):
     home, one, _ = processes = cut(config)
     assert {process.rack.now_ns for process in processes} == {0}
