@@ -115,13 +115,18 @@ class ProcessorNode(ManagedModuleNode):
         return self.status(config.model, level, text, config.slot, values)
 
     def _status(self, task: Task, now_ns: int) -> DiagnosticStatus:
-        """Return a task's health: ERROR when faulted, WARN when stopped, erring or newly late, else OK (REP-107)."""
+        """Return a task's health: ERROR when faulted, WARN when stopped, erring or newly late, else OK (REP-107).
+
+        A BASIC task that has come to its END has done what it was to do: OK (decision).
+        """
         statistics = self._rack.statistics[task.name]
         newly_skipped = self.site.diagnostics.newly(task.name, statistics.skipped)
         cause = self._rack.operations.stopped
         level, text = DiagnosticStatus.OK, task.status.value
         if task.status is Status.FAULTED:
             level, text = DiagnosticStatus.ERROR, self._rack.stop_reason or text
+        elif task.is_done and cause is None:
+            text = "done"
         elif task.status is not Status.RUNNING:
             level = DiagnosticStatus.WARN
             text = f"{text}: {cause.title}" if cause is not None else text

@@ -154,6 +154,11 @@ class BasicTask(Task):
         return self._types[number]
 
     @property
+    def is_done(self) -> bool:
+        """Whether it has come to its END, and does not start again."""
+        return self.status is Status.ENDED and self.wish[0] == Suspension.END
+
+    @property
     def ready(self) -> bool:
         """Whether it goes on at an instant that is known: nothing holds it back."""
         return self.wish[0] == _READY

@@ -152,6 +152,11 @@ class Task:
         return record
 
     @property
+    def is_done(self) -> bool:
+        """Whether it has come to the end of its program, as only a BASIC task can: not by STOP."""
+        return False
+
+    @property
     def present_scan(self) -> int:
         """The number of the scan under way, or of the last one."""
         return self.scan_number + (self._under_way is not None)

@@ -15,6 +15,8 @@ from automax_ros.running.health import Health
 from automax_ros.running.pacer import Pacer
 from automax_ros.wire.stream import RackStream
 
+from .support import until
+
 YAML = """\
 rack: LINE1
 slots:
@@ -212,3 +214,29 @@ def test_the_worst_level_counts() -> None:
     levels = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
     made = [status_of("n", "h", level, "", {}) for level in levels]
     assert [worst(made[:number]) for number in range(4)] == [levels[0], *levels]
+
+
+def test_a_basic_task_that_has_done_its_work_is_well(ros_domain_id, client, tmp_path):
+    """One that has come to a STOP is not."""
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+    from automax_ros.nodes.launcher import LiveRack
+
+    for name, last in (("ONCE", "END"), ("HALT", "STOP\n30 END")):
+        (tmp_path / f"{name}.BAS").write_text(f"10 COMMON NIL%\n20 {last}\n")
+    tasks = "{ONCE: {priority: 8, file: ONCE.BAS}, HALT: {priority: 9, file: HALT.BAS}}"
+    live = LiveRack(build(tmp_path, YAML.replace("{SPEED: {priority: 4}}", tasks)))
+    told = {}
+
+    def note(message):
+        told.update({status.name: (status.level, status.message) for status in message.status})
+
+    client.node.create_subscription(DiagnosticArray, "/diagnostics", note, 10)
+    live.start([])
+    try:
+        until(live, client, lambda: told.get("line1/processor_1: HALT", ("",))[0] == DiagnosticStatus.WARN)
+    finally:
+        live.close()
+    assert told["line1/processor_1: ONCE"] == (DiagnosticStatus.OK, "done")
+    assert told["line1/processor_1: HALT"] == (DiagnosticStatus.WARN, "ended by STOP")
+    assert told["line1/processor_1: 57C435"] == (DiagnosticStatus.WARN, "HALT: ended by STOP")
