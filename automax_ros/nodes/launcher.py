@@ -12,14 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
 from automax_ros.core.types import Value
 from automax_ros.nodes.bus import Seating
+from automax_ros.nodes.environment import RosUnavailable
+from automax_ros.nodes.guard import MOST_TOLD
 from automax_ros.nodes.process import RosProcess
 from automax_ros.nodes.rack_node import RackNode
 from automax_ros.nodes.rack_nodes import RackNodes
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.rack import Rack
 from automax_ros.running.simulated_pacer import SimulatedTime
+
+RCLError: type[Exception] = rclpy_implementation.RCLError
 
 
 class LiveRack:
@@ -49,7 +55,7 @@ class LiveRack:
             simulated: the rack's own time, as ``RackNodes`` takes it.
 
         Raises:
-            RosUnavailable: ROS cannot be initialised.
+            RosUnavailable: ROS cannot be initialised, or refuses a node, a topic or a service.
         """
         self.rack = rack
         self.stopping = False
@@ -62,6 +68,11 @@ class LiveRack:
                     rack, context=context, arguments=arguments, manager=manager, seating=seating, simulated=simulated
                 )
                 self.nodes.add_to(self._executor)
+        except RCLError as error:
+            self._leave()
+            text = str(error).split(", at /", 1)[0][:MOST_TOLD]
+            hint = "do not give two of its topics or services one name (-r FROM:=TO)" if arguments.given else None
+            raise RosUnavailable(f"the rack's nodes cannot be made: {text}", hint) from error
         except Exception:
             self._leave()
             raise

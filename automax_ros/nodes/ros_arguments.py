@@ -36,6 +36,8 @@ _SPACE = re.compile(r"/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*){0,6}/?)
 _LONGEST_SPACE = 200
 _NAMES = ("__node", "__name")
 """Both words name a node, as in rcl."""
+_YES_OR_NO = ("use_sim_time", "start_type_description_service")
+"""Parameters that every node of rclpy's declares: one of another type is an error in the middle of making a node."""
 
 
 @dataclass(frozen=True)
@@ -163,6 +165,9 @@ class _Reader:
                 self._parameters.append(parameter_of(value))
             elif option == PARAMS_FILE:
                 self._parameters += parameters_of(Path(value))
+        for item in self._parameters:
+            if item.name in _YES_OR_NO and not isinstance(item.value, bool):
+                raise RosArgumentsError(f"{item.name} is true or false", place=item.place)
         return RosArguments(
             self._namespace, self._names, tuple(self._rules), tuple(self._parameters), given=bool(words)
         )

@@ -191,3 +191,14 @@ def test_closing_before_the_start_is_clean(ros_domain_id):
     live = LiveRack(Rack(config))
     live.close()
     live.close()
+
+
+def test_two_topics_of_one_name_are_refused_with_the_reason(ros_domain_id):
+    from automax_ros.nodes.environment import RosUnavailable
+    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.nodes.ros_arguments import split_arguments
+
+    arguments = split_arguments(["--ros-args", "-r", "scans:=states"])[1]
+    with pytest.raises(RosUnavailable, match="existing topic name rt/types/states with incompatible type") as caught:
+        LiveRack(Rack(load(TYPES).config), arguments)
+    assert "one name" in str(caught.value.hint)

@@ -105,6 +105,8 @@ def test_remaps_of_topics_go_on_to_rcl():
         ("-r __node:=", "'' is not the name of a node"),
         ("-r processor_1:__ns:=/x", "the nodes share one namespace"),
         ("-p LINE.KP", "not NAME:=VALUE or NODE:NAME:=VALUE"),
+        ("-p use_sim_time:=maybe", "use_sim_time is true or false"),
+        ("-p processor_1:start_type_description_service:=5", "start_type_description_service is true or false"),
         ("-p LINE.KP:=[1", "-p LINE.KP:=[1:1: "),
         ("--params-file /nonexistent.yaml", "/nonexistent.yaml: cannot be read: No such file"),
         ("-p " + "x" * (LONGEST_WORD + 1), "more than 1000 words"),
