@@ -72,8 +72,8 @@ class Timeout:
     """The time within which an event must be set again, once somebody waits for it.
 
     A host that is late makes the interrupts of a module late too, so no time runs out before all that is due has been
-    carried out. Where it was late by ``LATE_NS`` or more the time begins anew: scans of a UDC were skipped, and the one
-    whose end interrupts may still be under way in modeled execution (decision).
+    carried out. Where it was late by ``LATE_NS`` or more the time begins again: scans of a UDC were skipped, and the
+    one whose end interrupts may still be under way in modeled execution (decision).
     """
 
     def __init__(self, timeout_ns: int, key: EventKey, scheduler: Scheduler, expired: Callable[[], None]) -> None:

@@ -56,7 +56,7 @@ def test_a_host_that_is_late_lets_no_time_run_out():
     assert expired == [345], "after all that was late: the last interrupt came at 280"
 
 
-def test_after_a_long_delay_of_the_host_the_time_begins_anew():
+def test_after_a_long_delay_of_the_host_the_time_begins_again():
     """What interrupts may end only after the call that was late: a scan in modeled execution that is under way."""
     scheduler, expired = Scheduler(), []
     timeout = Timeout(5 * NS_PER_MS, KEY, scheduler, lambda: expired.append(scheduler.now_ns))
