@@ -30,7 +30,7 @@ from automax_ros.nodes.bus_way import BusWay
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.process_watch import ProcessWatch, this_host
 from automax_ros.nodes.topics import ros_qos
-from automax_ros.rack.bus.link import Batch, BusLink
+from automax_ros.rack.bus.link import Batch, BusLink, Picture
 from automax_ros.rack.bus.part_name import part_name
 from automax_ros.rack.config import ModuleLoss
 from automax_ros.rack.plants.driven import driven_plants
@@ -53,6 +53,8 @@ MOST_BYTES = 64 << 20
 MODULE_LOST = "31"
 """The hardware's code when a module does not answer on the backplane: bus error (decision: so is one that is lost)."""
 PRESENCE = "bus/presence"
+FOR_ALL = 0
+"""Asked by nobody: an image of what a process that was lost has written last, which some may not have."""
 
 
 class SeatTaken(Fault):
@@ -187,7 +189,9 @@ class RackBus:
             return
         self._answered = {process: at for process, at in self._answered.items() if now - at < ANSWER_NS}
         self._answered[asked_by] = now
-        picture = self.link.picture()
+        self._show(self.link.picture(), asked_by)
+
+    def _show(self, picture: Picture, asked_by: int) -> None:
         message = image_message(picture, self._rack.now_ns, self.run_id, self.peers.process, asked_by)
         self._images.publish(encode(message))
 
@@ -235,6 +239,8 @@ class RackBus:
         text = f"{name} is lost: its process has ended, or gives no sign of life"
         self._site.health.note("lost process", (name, peer.process), lambda: text)
         self._node.get_logger().error(text)
+        if self._begun:
+            self._show(self.link.last_of(peer.presence.seat), FOR_ALL)
         operations = self._rack.operations
         stops = self._rack.config.on_module_loss is ModuleLoss.STOP_ALL
         if stops and self._begun and operations.powered and operations.stopped is None:
@@ -264,11 +270,12 @@ class RackBus:
 
     def _take_image(self, message: BusImage, sender: bytes) -> None:
         peer = self._peer(message, sender)
-        if peer is None or message.asked_by != self.peers.process:
+        if peer is None or message.asked_by not in (FOR_ALL, self.peers.process):
             return
-        peer.caught_up(message.sequence)
         picture = picture_of(message, self._texts)
-        self._has_image = True
+        if message.asked_by != FOR_ALL:
+            peer.caught_up(message.sequence)
+            self._has_image = True
         self._when_begun(lambda: self.link.merge(picture))
 
     def _peer(self, message: BusWrite | BusImage, sender: bytes) -> Peer | None:

@@ -50,7 +50,9 @@ READER_DEPTH = 10_000
 FILES_WAIT_NS = 3 * NS_PER_S
 """How long a rack's files are waited for once its table has come."""
 _KNOCK_NS = NS_PER_S
+_SLOW_KNOCK_NS = 10 * _KNOCK_NS
 _MOST_KNOCKS = 5
+"""So many times it asks each second, then each ten seconds."""
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _FILES = TopicKind("std_msgs/msg/String", LATCHED)
 _PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
@@ -313,12 +315,12 @@ class LiveRecorder:
         for knock in self._knocks:
             knock.close()
         self._knocks.clear()
-        self._next_knock = now + _KNOCK_NS
+        self._next_knock = now + (_KNOCK_NS if self._knock_count < _MOST_KNOCKS else _SLOW_KNOCK_NS)
         wanted = [self._topics.snapshot] if self.recording.wants_image else []
         wanted += [self._topics.states] if self.recording.wants_states else []
         if not wanted:
             self._knock_count = 0
-        elif self._knock_count < _MOST_KNOCKS:
+        else:
             self._knock_count += 1
             kinds = self._topics.all
             self._knocks = [RawSubscription(self._node, name, kinds[name]) for name in wanted]

@@ -16,7 +16,7 @@ BEAT_NS = 20 * NS_PER_MS
 """How often a process says that it lives."""
 SILENCE_NS = 75 * NS_PER_MS
 """A process of another host that has said nothing for so long is lost (decision: it is noticed within 100 ms)."""
-HUNG_NS = 3000 * NS_PER_MS
+HUNG_NS = 10_000 * NS_PER_MS
 """One of this host that lives by the kernel's word may be held up for so long (decision): a busy host is not lost."""
 HELD_UP_NS = 45 * NS_PER_MS
 """Who was held up for so long itself judges nobody until it has heard what came meanwhile."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from automax_ros.core.kinds import WriteKind
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.rack.bus.versions import AS_INSTALLED, TAKEN, Held, Key, Version, Versions, merged
 from automax_ros.rack.observers import Operation
@@ -169,6 +170,16 @@ class BusLink:
         )
         return Picture(self.sequence, tuple(self._versions.all()), tuple(forces))
 
+    def last_of(self, seat: int) -> Picture:
+        """Return what a process has written within the last second, as this image holds it, for all others.
+
+        Where it has ended in the middle of sending some have its last batch and others do not.
+        """
+        whole, since_ns = self.picture(), self._rack.now_ns - NS_PER_S
+        values = tuple(held for held in whole.values if held.version[1] == seat and held.version[0] >= since_ns)
+        forces = tuple(force for force in whole.forces if force.version[1] == seat and force.version[0] >= since_ns)
+        return Picture(whole.sequence, values, forces)
+
     def adopt(self, standing: Standing) -> None:
         """Follow the rack into how it stands by another process's word, if that is newer. Between two scans.
 
@@ -267,7 +278,7 @@ class BusLink:
         sent = []
         for view, element, value in entries:
             if kind in _FORCES:
-                self._forces[view, element] = version, kind is WriteKind.FORCE, value
+                self._note_force(HeldForce(view, element, value, kind is WriteKind.FORCE, version))
             fit = self._versions.settle(view, element, value, version)
             sent.append((view, element, value))
             if fit is not TAKEN:
@@ -276,6 +287,17 @@ class BusLink:
             self._send(Batch(self.seat, self.sequence, time_ns, writer, kind, tuple(sent)))
         if repairs:
             self._repair(repairs)
+
+    def _note_force(self, force: HeldForce) -> None:
+        """Note a force of this process, or put back what is newer."""
+        key = force.view, force.element
+        known = self._forces.get(key)
+        if known is None or known[0] <= force.version:
+            self._forces[key] = force.version, force.held, force.value
+        elif known[1]:
+            self._memory.force(force.view, known[2], force.element, PRESET_WRITER)
+        else:
+            self._memory.release(force.view, force.element, PRESET_WRITER)
 
     def _repair(self, repairs: Iterable[Part | Held]) -> None:
         """Put back what is newer than what was written here."""

@@ -301,3 +301,30 @@ def test_a_damaged_batch_changes_nothing(config):
 def one_write(process):
     process.rack.write("B%", 1)
     return process.sent[-1]
+
+
+def test_the_last_writes_of_a_process_that_ended_in_the_middle_of_sending_reach_all(config):
+    home, one, two = idle(config)
+    one.rack.write("A%", 11)
+    one.rack.write("OUT3@", value=True)
+    one.rack.force("GO@", value=True)
+    home.hear(one)
+    assert image(home) != image(two)
+    for lost_by in (home, two):
+        picture = lost_by.link.last_of(one.link.seat)
+        for other in (home, two):
+            other.link.merge(picture)
+    assert image(home) == image(two)
+    assert two.rack.value("A%") == 11
+    assert two.rack.value("OUT%") == 8
+    assert [force.name for force in two.rack.forces()] == ["GO@"]
+
+
+def test_an_older_force_gives_way_to_a_newer_one(config):
+    home, one, _ = idle(config)
+    home.rack.scheduler.pass_until(5 * NS_PER_MS)
+    home.rack.force("B%", 50)
+    one.hear(home)
+    one.rack.force("B%", 10)
+    home.hear(one)
+    assert one.rack.value("B%") == home.rack.value("B%") == 50
