@@ -43,6 +43,14 @@ def free_domain() -> Iterator[int]:
     pytest.fail("all ROS domains are taken by other tests")
 
 
+@pytest.fixture(autouse=True)
+def this_host_alone() -> Iterator[None]:
+    """A program that a test runs in its own process may have chosen another range: no other test shall have it."""
+    yield
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ.pop("ROS_LOCALHOST_ONLY", None)
+
+
 @pytest.fixture
 def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """A ROS domain of the test's own, set as ROS_DOMAIN_ID; child processes inherit it."""
