@@ -3,6 +3,7 @@
 import fcntl
 import itertools
 import os
+import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +18,10 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 for inherited in ("ROS_STATIC_PEERS", "ROS_NAMESPACE", "RMW_IMPLEMENTATION", "FASTRTPS_DEFAULT_PROFILES_FILE"):
     os.environ.pop(inherited, None)
 put_prefix_first()
+
+# A shell that starts the tests in the background lets them ignore Ctrl-C; programs that they start would, too.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Fast DDS derives UDP ports from the domain; above 101 they run into Linux's ephemeral ports.
 DOMAINS = 101

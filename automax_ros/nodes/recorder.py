@@ -52,7 +52,7 @@ FILES_WAIT_NS = 3 * NS_PER_S
 _KNOCK_NS = NS_PER_S
 _SLOW_KNOCK_NS = 10 * _KNOCK_NS
 _MOST_KNOCKS = 5
-"""So many times it asks each second, then each ten seconds."""
+"""How often it asks each second; then it asks each ten seconds."""
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _FILES = TopicKind("std_msgs/msg/String", LATCHED)
 _PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
