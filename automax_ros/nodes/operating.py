@@ -19,9 +19,9 @@ from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 
 _LOOK_S = 0.05
 _SETTLED_NS = 2 * NS_PER_S
-"""A rack whose table has been seen for so long without its operator has none (decision)."""
+"""A rack whose nodes have been seen for so long without its operator has none (decision)."""
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
-_OPERATOR = "operator"
+_HOME, _OPERATOR = "common_memory", "operator"
 
 
 class NotOperable(Fault):
@@ -80,15 +80,16 @@ class RackClient:
         seen: int | None = None
         while True:
             now = time.monotonic_ns()
-            racks, operators = self._racks(), self._operators()
-            if seen is None and racks:
+            racks, operators = self._racks(), self._nodes(_OPERATOR)
+            # The names of a program's nodes come in a message of their own, on a busy host long after its topics.
+            if seen is None and racks and self._nodes(_HOME):
                 seen = now
             if racks > 1 or operators > 1:
                 hint = "stop one of them, or give one another ROS_DOMAIN_ID"
                 raise NotOperable(f"{max(racks, operators)} racks are called {self._space}", hint)
             if operators:
                 return
-            if seen is not None and (now - seen > _SETTLED_NS or now > deadline):
+            if (seen is not None and now - seen > _SETTLED_NS) or (racks and now > deadline):
                 hint = "say `operator: true` in its YAML file and start it again"
                 raise NotOperable(f"rack {self._space} has no operator's services", hint)
             if now > deadline:
@@ -127,9 +128,9 @@ class RackClient:
     def _racks(self) -> int:
         return len(racks_of(self._node, self._space))
 
-    def _operators(self) -> int:
-        nodes = self._node.get_node_names_and_namespaces()
-        return sum(name == _OPERATOR and space == self._space for name, space in nodes)
+    def _nodes(self, name: str) -> int:
+        """Return how many nodes of this name the rack has."""
+        return self._node.get_node_names_and_namespaces().count((name, self._space))
 
     def _absent(self, wait_ns: int) -> NotOperable:
         tables = [name for name, types in self._node.get_topic_names_and_types() if _TABLE_TYPE in types]

@@ -14,7 +14,7 @@ class Graph:
         from automax_ros.nodes.operating import RackClient
 
         monkeypatch.setattr(RackClient, "_racks", lambda _: racks)
-        monkeypatch.setattr(RackClient, "_operators", lambda _: operators)
+        monkeypatch.setattr(RackClient, "_nodes", lambda _, name: {"operator": operators}.get(name, 1))
 
 
 @pytest.mark.parametrize(

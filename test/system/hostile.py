@@ -50,13 +50,13 @@ def large(node, _):
 
 
 def fast(node, _):
-    """10,000 messages per second for two seconds."""
+    """10,000 messages per second for two seconds, 200 at a time: a busy host sends them later, but no slower."""
     from std_msgs.msg import Int16
 
     topic, message, sent = publisher(node, "Int16", "REF"), Int16(data=5), 0
     began = time.monotonic()
     while (passed := time.monotonic() - began) < 2.0:
-        while sent < passed * 10_000:
+        for _ in range(200 if sent <= passed * 10_000 else 0):
             topic.publish(message)
             sent += 1
         time.sleep(0.001)

@@ -15,6 +15,8 @@ from .support import TYPES, Automax, Client
 READY = "Ctrl-C ends the run"
 HOSTILE = Path(__file__).with_name("hostile.py")
 IDLE_S = 2.0
+ATTEMPTS = 3
+"""Other programs of the host may hold scans up, but hardly each time as an attack goes on."""
 TASK = "processor_2: COPY"
 """The fastest: a scan each 2.5 ms. One message of 10 MB, read as rclpy does, cost 227 of them."""
 
@@ -90,12 +92,16 @@ def test_scans_go_on(rack, client, kind, told, most_mb):
 
     log = client.listen(Log, "/rosout")
     watch = Watch(client)
-    idle = watch.share_skipped(lambda: client.spin(IDLE_S))
     before = resident_mb(rack.pid)
-    attacked = watch.share_skipped(lambda: attack(kind))
-    # The attacker and DDS take their part of two cores; read on the thread that scans, or with the interpreter held,
-    # each kind but `fast` skips nearly all scans while it lasts.
-    assert attacked <= 2 * idle + 0.3, f"{attacked:.0%} of the scans skipped, idle {idle:.0%}"
+    # The attacker and DDS take their part of two cores, other tests too; read on the thread that scans, or with the
+    # interpreter held, each kind but `fast` skips nearly all scans each time.
+    for _ in range(ATTEMPTS):
+        idle = watch.share_skipped(lambda: client.spin(IDLE_S))
+        attacked = watch.share_skipped(lambda: attack(kind))
+        if attacked <= 2 * idle + 0.3:
+            break
+    else:
+        pytest.fail(f"{attacked:.0%} of the scans skipped, idle {idle:.0%}")
     assert resident_mb(rack.pid) - before < most_mb
     rack.wait_for_line(told)
     assert len(log) < 100
