@@ -39,7 +39,9 @@ def run(folder: Path, rack: Path, seconds: int, *options: str) -> dict:
     report = folder / "report.json"
     command = [sys.executable, "-m", "automax_ros.cli.main", "run", str(rack), "--distributed", f"--duration={seconds}"]
     command += [f"--report={report}", f"--state={folder / 'state'}", *options]
-    subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    ended = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
+    if not report.exists():
+        raise SystemExit(ended.stderr or f"the rack ended with exit code {ended.returncode}")
     return json.loads(report.read_text())
 
 

@@ -135,7 +135,7 @@ def check_near_misses(number: int) -> None:
     for seed in range(number):
         tokens = near_miss(Random(seed))
         if not is_beside_the_rules(tokens):
-            allowed = Recognizer(tokens).accepts("statement")
+            allowed = Recognizer(tokens).accepts("statements")
             refused += not allowed
             assert (errors(f"10 {' '.join(tokens)}") == []) is allowed, " ".join(tokens)
     assert refused > number / 3
