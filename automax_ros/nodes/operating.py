@@ -130,7 +130,8 @@ class RackClient:
 
     def _nodes(self, name: str) -> int:
         """Return how many nodes of this name the rack has."""
-        return self._node.get_node_names_and_namespaces().count((name, self._space))
+        count: int = self._node.get_node_names_and_namespaces().count((name, self._space))
+        return count
 
     def _absent(self, wait_ns: int) -> NotOperable:
         tables = [name for name, types in self._node.get_topic_names_and_types() if _TABLE_TYPE in types]
