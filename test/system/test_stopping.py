@@ -87,7 +87,8 @@ def test_simulated_run_stops_on_a_signal(tmp_path):
     bag = tmp_path / "bag"
     with Automax("run", TYPES, "--simulated", "--duration", "1e6", "--record", bag) as process:
         process.wait_until_catching(signal.SIGTERM)
-        wait_until(lambda: bag.exists() and (bag / "scans_0.mcap").stat().st_size > 0)
+        file = bag / "scans_0.mcap"
+        wait_until(lambda: file.exists() and file.stat().st_size > 0)
         ended = process.end(signal.SIGTERM)
     assert (ended.code, ended.err) == (0, "")
     assert next(BagReader(bag).messages()).topic == "/types/variables"
