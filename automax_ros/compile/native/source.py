@@ -1,0 +1,31 @@
+"""What the translation of a task to C gives: its text and what the host must know of it, or why there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class NotNative(Exception):
+    """A task cannot be native, or not here; it runs in Python, bit for bit the same.
+
+    ``reason`` says what keeps it from that and, where something can be done, what to do; ``line`` is the BASIC line
+    that cannot be translated, 0 where it is none.
+    """
+
+    def __init__(self, reason: str, line: int = 0) -> None:
+        """Take the reason, and the line of the task."""
+        super().__init__(f"line {line}: {reason}" if line else reason)
+        self.reason, self.line = reason, line
+
+
+@dataclass(frozen=True)
+class NativeSource:
+    """A task as C.
+
+    Attributes:
+        name: the task's name.
+        text: the C text, complete in itself: it begins with ``abi.h`` and includes headers of the C library alone.
+    """
+
+    name: str
+    text: str
