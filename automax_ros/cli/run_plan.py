@@ -13,7 +13,6 @@ from automax_ros.cli.output_files import write_report
 from automax_ros.cli.seat_talk import ToldScreen, tell_report
 from automax_ros.cli.status import Person, Screen
 from automax_ros.cli.terminal import print_diagnostics
-from automax_ros.cli.tunings import Tuning
 from automax_ros.core.types import Value
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.config import RackConfig
@@ -24,6 +23,7 @@ from automax_ros.rack.seating import Seat
 from automax_ros.rack.settings import CommonElement
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.stage import Happened
+from automax_ros.rack.tunings import Tuning
 from automax_ros.running.simulated_pacer import SimulatedTime
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
@@ -53,8 +54,14 @@ class Prepared:
 class Installation:
     """All tasks of a rack, compiled; ``warnings`` are what their checks found short of errors."""
 
-    def __init__(self, config: RackConfig, here: Collection[str] | None = None) -> None:
-        """Check all tasks and compile them, or those of ``here`` alone.
+    def __init__(
+        self,
+        config: RackConfig,
+        here: Collection[str] | None = None,
+        *,
+        sources: Mapping[str, SourceText] | None = None,
+    ) -> None:
+        """Check all tasks and compile them, or those of ``here`` alone; ``sources`` stand for the tasks' files.
 
         Raises:
             RackError: a task has errors; nothing is started then (the hardware's E0).
@@ -65,7 +72,7 @@ class Installation:
         self._programs: Mapping[str, Program] = {}
         self.sources: dict[str, SourceText] = {}
         self.warnings: list[Finding] = []
-        checked = check_tasks(config)
+        checked = check_tasks(config, sources)
         failed = [(source, result.diagnostics) for _, source, result in checked if has_errors(result.diagnostics)]
         if failed:
             names = ", ".join(source.name for source, _ in failed)
@@ -80,6 +87,16 @@ class Installation:
                 self._compiled[task.name] = self._compile(task.name, result.program)
         distributed = len(self._compiled) < len(checked)
         self._cut = seats_of(config, self._programs.values()) if distributed else ()
+
+    def again(self, config: RackConfig) -> Installation:
+        """Return the installation of another rack, which has the same tasks, modules and commons: nothing is compiled.
+
+        It must come from one that no rack has reloaded tasks of.
+        """
+        other = copy(self)
+        other._config = config
+        other.sources, other._compiled = dict(self.sources), dict(self._compiled)
+        return other
 
     @property
     def programs(self) -> Mapping[str, Program]:

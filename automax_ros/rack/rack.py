@@ -55,7 +55,8 @@ class Rack:
     """A rack that runs. ``stopwatch`` (ns, the pacer's clock) measures execution times; without one they count as 0.
 
     ``execution`` executes the scans of all modules in place of what the configuration says (``rack/stepping``).
-    ``local`` are the slots whose modules are in this process (``rack/part``), all if None.
+    ``local`` are the slots whose modules are in this process (``rack/part``), all if None. ``installation`` are the
+    tasks where they are compiled already.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class Rack:
         stopwatch: Callable[[], int] | None = None,
         execution: Execution | None = None,
         local: Collection[int] | None = None,
+        installation: Installation | None = None,
     ) -> None:
         """Compile the tasks against the rack's common memory and build the modules.
 
@@ -77,7 +79,7 @@ class Rack:
         self._forcing = Forcing(config, self.memory, lambda: self.tasks)
         self.writers: tuple[WriterSpec, ...] = writers_of(config)
         self.scheduler = Scheduler()
-        installation = Installation(config, self.part.tasks)
+        installation = installation or Installation(config, self.part.tasks)
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
         self.events = Events()

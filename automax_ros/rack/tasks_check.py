@@ -43,23 +43,28 @@ def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
     }
 
 
-def check_tasks(config: RackConfig) -> list[CheckedTask]:
+def check_tasks(config: RackConfig, sources: Mapping[str, SourceText] | None = None) -> list[CheckedTask]:
     """Check all tasks of a rack, modules in the order of slots, tasks in the order of the file.
 
-    A source that could be read when the rack file was loaded but cannot be any more is an error of its task (AMX6306).
+    ``sources`` by the tasks' names stand for their files, which are not touched then. A source that could be read when
+    the rack file was loaded but cannot be any more is an error of its task (AMX6306).
     """
     commons = commons_of(config)
-    checked = [_checked(module, task, commons, config) for module, task in config.placed_tasks]
+    checked = [_checked(module, task, commons, config, sources) for module, task in config.placed_tasks]
     programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
     found = findings_by_task(config, programs)
     return [item._replace(result=with_findings(item.result, found.get(item.task.name, ()))) for item in checked]
 
 
 def _checked(
-    module: ModuleConfig, task: TaskConfig, commons: Mapping[str, CommonSpec], config: RackConfig
+    module: ModuleConfig,
+    task: TaskConfig,
+    commons: Mapping[str, CommonSpec],
+    config: RackConfig,
+    sources: Mapping[str, SourceText] | None,
 ) -> CheckedTask:
     try:
-        source = read_task_source(task.file)
+        source = read_task_source(task.file) if sources is None else sources[task.name]
     except FileFault as fault:
         place = SourceText(str(config.path), config.text)
         gone = Diagnostic("AMX6306", f"the source {task.file.name} of task {task.name} {fault}", Span(task.line, 1, 2))
