@@ -13,9 +13,15 @@
  */
 #ifndef AUTOMAX_ABI_H
 #define AUTOMAX_ABI_H
+#include <float.h>
 #include <stdint.h>
 
 #define AUTOMAX_ABI 1
+
+/* Arithmetic of more than 64 bits in between, as old processors have it, would give other bits than Python does. */
+#if FLT_EVAL_METHOD != 0
+#error "doubles are not computed in 64 bits here"
+#endif
 
 typedef union {
     int64_t i;
