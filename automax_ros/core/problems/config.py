@@ -143,6 +143,10 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6834", "picture cannot be drawn"),
     Problem("AMX6840", "nothing to play"),
     Problem("AMX6850", "plant not in the recording"),
+    Problem("AMX6851", "no Dask"),
+    Problem("AMX6852", "no Dask scheduler"),
+    Problem("AMX6853", "Dask cluster lost"),
+    Problem("AMX6854", "another version on a worker"),
     Problem("AMX6860", "recording without a drive to report"),
     # the command line: files and the tables of `automax trace` and `automax compare`
     Problem("AMX6900", "file that no task can be named after", Severity.WARNING),

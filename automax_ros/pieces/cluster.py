@@ -1,0 +1,177 @@
+"""Pieces done by the workers of a Dask cluster.
+
+A scheduler executes whatever it is handed by whoever reaches it: keep it in a closed network, or let it speak TLS
+(addresses ``tls://``; certificates come from Dask's own configuration).
+"""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import queue
+import time
+import uuid
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from automax_ros.pieces.attempt import Answer, Refusal, attempt
+from automax_ros.pieces.faults import ClusterFault
+from automax_ros.pieces.installation import Installation, installation
+from automax_ros.pieces.piece import Done, Piece, PieceFault, death_of, fault_of
+
+CONNECT_S = 10
+"""How long a scheduler may take to answer, s (decision)."""
+WITHOUT_WORKERS_S = 300
+"""How long a cluster may be without any worker, s (decision): some begin workers only when there is work."""
+_POLL_S = 0.1
+_LOOK_S = 2.0
+_INSTALL = "install it with `pip install 'automax_ros[cluster]'`"
+_SAME = "install the same version on all machines, and start the workers again"
+_LOGGERS = ("distributed.client", "distributed.core", "distributed.comm", "distributed.batched", "distributed.utils")
+
+
+def on_cluster(
+    pieces: Sequence[Piece], scheduler: str, take: Callable[[int, Done], None], should_stop: Callable[[], bool]
+) -> None:
+    """Do pieces by a cluster; the arguments and the end are those of ``run_pieces``.
+
+    Dask itself begins a piece again whose worker is lost, and may do a piece twice; ``take`` gets the first answer.
+
+    Raises:
+        ClusterFault: Dask is not installed; the scheduler cannot be reached, or is lost; a worker has another version.
+    """
+    with _connected(scheduler) as cluster:
+        cluster.require_same()
+        over: queue.SimpleQueue[int] = queue.SimpleQueue()
+        futures = {number: cluster.submit(piece, number, over.put) for number, piece in enumerate(pieces)}
+        try:
+            while futures and not should_stop():
+                try:
+                    number = over.get(timeout=_POLL_S)
+                except queue.Empty:
+                    cluster.require_alive()
+                    continue
+                result, fault = cluster.outcome(pieces[number], futures[number])
+                del futures[number]  # which lets the cluster forget it
+                take(number, Done(pieces[number], result, fault))
+        finally:
+            cluster.give_up(list(futures.values()))
+
+
+@contextmanager
+def _connected(scheduler: str) -> Iterator[_Cluster]:
+    """Connect to a scheduler while the block lasts; what Dask logs meanwhile we say in our own words."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        what = f"a cluster needs Dask, which is not installed here ({error})"
+        raise ClusterFault("AMX6851", scheduler, what, _INSTALL) from error
+    loggers = {name: logging.getLogger(name) for name in _LOGGERS}
+    levels = {name: logger.level for name, logger in loggers.items()}
+    for logger in loggers.values():
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        try:
+            client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TypeError, ImportError) as error:
+            what = f"no Dask scheduler answers: {error}"
+            hint = "give the address that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
+            raise ClusterFault("AMX6852", scheduler, what, hint) from error
+        try:
+            yield _Cluster(client, scheduler)
+        finally:
+            with suppress(Exception):
+                client.close(timeout=2)
+    finally:
+        for name, logger in loggers.items():
+            logger.setLevel(levels[name])
+
+
+class _Cluster:
+    """A cluster as one client sees it; ``client`` is a distributed.Client."""
+
+    def __init__(self, client: Any, scheduler: str) -> None:
+        self._client, self._scheduler = client, scheduler
+        self._run = uuid.uuid4().hex
+        self._own = installation()
+        self._next_look = 0.0
+        self._seen = time.monotonic()
+
+    def require_same(self) -> None:
+        """Make sure that each worker that is there has the installation that we have.
+
+        Raises:
+            ClusterFault: one has another, or none.
+        """
+        for worker, found in self._client.run(installation, on_error="return").items():
+            if found != self._own:
+                raise self._unlike(worker, found)
+
+    def submit(self, piece: Piece, number: int, over: Callable[[int], None]) -> Any:
+        """Hand a piece to the cluster; return its future. ``over`` is told its number, in another thread."""
+        key = f"automax-{self._run}-{number}"
+        future = self._client.submit(attempt, pickle.dumps(piece), key, self._own, key=key, pure=False)
+        future.add_done_callback(lambda _: over(number))
+        return future
+
+    def outcome(self, piece: Piece, future: Any) -> tuple[object, PieceFault | None]:
+        """Return what came of a piece that is over: its result, or its fault.
+
+        Raises:
+            ClusterFault: the cluster is lost, or the worker has another installation.
+        """
+        try:
+            found = future.result()
+        except Exception as error:
+            self.require_alive()
+            return None, _fault(piece, error)
+        if isinstance(found, Answer):
+            return found.result, found.fault
+        assert isinstance(found, Refusal)
+        if found.installed != self._own:
+            raise self._unlike(found.worker, found.installed)
+        return None, death_of(piece.name, f"its workers have died ({', '.join(found.deaths)})")
+
+    def require_alive(self) -> None:
+        """Make sure that there is a scheduler, and before long a worker.
+
+        Raises:
+            ClusterFault: there is none.
+        """
+        now = time.monotonic()
+        if now < self._next_look and self._client.status == "running":
+            return
+        self._next_look = now + _LOOK_S
+        try:
+            workers = self._client.status == "running" and self._client.scheduler_info()["workers"]
+        except Exception:
+            workers = False
+        if workers is False:
+            hint = "see that it runs, and give the command again: nothing is kept of what was under way"
+            raise ClusterFault("AMX6853", self._scheduler, "the Dask scheduler is lost", hint)
+        if workers:
+            self._seen = now
+        elif now - self._seen > WITHOUT_WORKERS_S:
+            what = f"the Dask scheduler has had no worker for {WITHOUT_WORKERS_S} s"
+            raise ClusterFault("AMX6853", self._scheduler, what, f"start some: `dask worker {self._scheduler}`")
+
+    def give_up(self, futures: list[Any]) -> None:
+        """Let the cluster forget pieces that are not done."""
+        if futures and self._client.status == "running":
+            with suppress(Exception):
+                self._client.cancel(futures, force=True)
+
+    def _unlike(self, worker: str, found: object) -> ClusterFault:
+        if isinstance(found, Installation):
+            what = f"worker {worker} has automax_ros {found}, here is {self._own}"
+        else:
+            what = f"worker {worker} cannot import automax_ros as it is here: {found}"
+        return ClusterFault("AMX6854", self._scheduler, what, _SAME)
+
+
+def _fault(piece: Piece, error: Exception) -> PieceFault:
+    """Return the fault of a piece that Dask has not brought to an answer of ours."""
+    if type(error).__name__ == "KilledWorker":
+        return death_of(piece.name, "its workers have died")
+    return fault_of(piece.name, error)
