@@ -41,7 +41,6 @@ class _Course(Stateful):
     target: float
     rate: float = 0.0
     tau_s: float = 0.0
-    _kept = ("value", "target", "rate", "tau_s")
 
     @property
     def moving(self) -> bool:
@@ -74,6 +73,9 @@ class _Course(Stateful):
         self.value = self.after(time_s)
         if abs(self.value - self.target) <= 1e-7 * abs(self.target):
             self.value = self.target
+
+
+_Course._kept = ("value", "target", "rate", "tau_s")
 
 
 Change = tuple[str, float, float, float]

@@ -108,7 +108,6 @@ class EnergyMeter(Stateful):
     arc_j: float = 0.0
     emf_j: float = 0.0
     stored_j: float = 0.0
-    _kept = ("source_j", "resistance_j", "drop_j", "arc_j", "emf_j", "stored_j")
 
     @property
     def loss_j(self) -> float:
@@ -187,3 +186,6 @@ class EnergyMeter(Stateful):
         self.resistance_j += heat
         self.drop_j += drop
         self.emf_j += emf_v * charge
+
+
+EnergyMeter._kept = ("source_j", "resistance_j", "drop_j", "arc_j", "emf_j", "stored_j")

@@ -59,7 +59,6 @@ class FixedLoad(Stateful):
     emf_v: float = 0.0
     turns: bool = False
     step_ns: int = LONGEST_NS
-    _kept = ("emf_v",)
 
     def __post_init__(self) -> None:
         _check_armature(self.resistance_ohm, self.inductance_h)
@@ -71,6 +70,9 @@ class FixedLoad(Stateful):
 
     def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
         """Do nothing: the EMF is held."""
+
+
+FixedLoad._kept = ("emf_v",)
 
 
 SETTLED = 1e-9
@@ -95,7 +97,6 @@ class FieldWinding(Stateful):
     knee: float | None = None
     current: float = 1.0
     voltage: float = 1.0
-    _kept = ("current", "voltage")
 
     def __post_init__(self) -> None:
         require("time constant of the field in s", self.tau_s, 0.0)
@@ -120,6 +121,9 @@ class FieldWinding(Stateful):
         if not self.tau_s or abs(self.current - self.voltage) < SETTLED:
             return self.voltage
         return self.voltage + (self.current - self.voltage) * exp(-ahead_s / self.tau_s)
+
+
+FieldWinding._kept = ("current", "voltage")
 
 
 FASTEST_SWING = 1000.0

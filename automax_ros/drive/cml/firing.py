@@ -22,7 +22,9 @@ def _words(order: tuple[int, ...], add: int) -> tuple[int, ...]:
 
 
 _GATES = {
-    (bridge, order is REVERSED): _words(order, 10 * (bridge - 1)) for bridge in (1, 2) for order in (STANDARD, REVERSED)
+    (bridge, reverse): _words(REVERSED if reverse else STANDARD, 10 * (bridge - 1))
+    for bridge in (1, 2)
+    for reverse in (False, True)
 }
 _new = tuple.__new__
 

@@ -120,7 +120,7 @@ class Latched(Stateful):
             return []
         return self._read("cc_thresh", inputs.cc_thresh, 0.0)
 
-    def _read(self, name: str, value: float, line_hz: float) -> list[int]:
+    def _read(self, name: str, value: int | float, line_hz: float) -> list[int]:
         """Read a dynamic value; return the problem to log as it goes bad."""
         bit = 1 << _DYNAMIC.index(name)
         if is_good(name.upper(), value, line_hz):
