@@ -104,12 +104,12 @@ def _forget(plant: DrivePlant, verb: str) -> None:
 
 def _short_scr(plant: DrivePlant, values: Numbers) -> None:
     plant.circuit.short_scr(int(values[0]))
-    _note(plant, f"short_scr {values[0]}")
+    _note(plant, f"short_scr {int(values[0])}")
 
 
 def _open_gate(plant: DrivePlant, values: Numbers) -> None:
     plant.circuit.open_gate(int(values[0]))
-    _note(plant, f"open_gate {values[0]}")
+    _note(plant, f"open_gate {int(values[0])}")
 
 
 def _blow_fuse(plant: DrivePlant, values: Numbers) -> None:
