@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Protocol, cast
 
@@ -73,8 +73,8 @@ class Compilation(Protocol):
 class CompiledTask:
     """A task ready to run: a control-block task scans, a BASIC task has bursts, and its ``scans`` are none.
 
-    ``latched`` are the commons that a scan latches, ``written`` what blocks can change; ``held`` are the task's own
-    variables that keep their values whatever the functions write.
+    ``latched`` are the commons that a scan latches, with their views, ``written`` what blocks can change; ``held`` are
+    the task's own variables that keep their values whatever the functions write.
     """
 
     program: Program
@@ -86,6 +86,20 @@ class CompiledTask:
     _compilation: Compilation = field(repr=False, compare=False)
     _again: Callable[[frozenset[str]], CompiledTask] = field(repr=False, compare=False)
     held: frozenset[str] = frozenset()
+    latched_views: tuple[int, ...] = ()
+
+    def with_scans(self, scans: Scans, scans_forced: Scans) -> CompiledTask:
+        """Return the same task with other forms of ``scans`` and ``scans_forced``, which give the same bits.
+
+        While variables are held the task scans in the compiler's own form (decision): nothing is built amid a run.
+        """
+
+        def again(held: frozenset[str]) -> CompiledTask:
+            return replace(self._again(held), _again=again) if held else swapped
+
+        swapped = replace(self, scans=scans, _again=again)
+        vars(swapped)["scans_forced"] = scans_forced
+        return swapped
 
     def holding(self, names: frozenset[str]) -> CompiledTask:
         """Return the same task with other variables held, by their full names: simple ones of its own, no tunables."""
@@ -180,6 +194,7 @@ class _Compilation:
             _compilation=self,
             _again=again,
             held=self._held,
+            latched_views=tuple(self._views[name] for name in self._latched),
         )
 
     def functions(self, *names: str) -> dict[str, object]:

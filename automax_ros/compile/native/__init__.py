@@ -7,11 +7,19 @@ from typing import TYPE_CHECKING
 from automax_ros.core.face import face
 
 if TYPE_CHECKING:
+    from automax_ros.compile.native.cache import NativeCache
+    from automax_ros.compile.native.executed import BesideLatch, Executed
     from automax_ros.compile.native.source import NativeSource, NotNative
+    from automax_ros.compile.native.task import NativeTask, native_form
 
 __all__ = [
+    "BesideLatch",
+    "Executed",
+    "NativeCache",
     "NativeSource",
+    "NativeTask",
     "NotNative",
+    "native_form",
 ]
 
-__getattr__ = face(__name__, "source")
+__getattr__ = face(__name__, "source", "executed", "cache", "task")

@@ -66,8 +66,8 @@ static PyObject *one_scan(Scans *self)
         return Py_NewRef(Py_True);
     if (ended == AUTOMAX_TOO_LONG)
         raise_too_long(self);
-    else if (!PyErr_Occurred())
-        PyErr_Format(PyExc_SystemError, "a native scan ended with %d", ended);
+    else if (!PyErr_Occurred()) /* where Python raises an exception of its own */
+        PyErr_SetString(PyExc_ArithmeticError, "a scan computed what has no value");
     return NULL;
 }
 

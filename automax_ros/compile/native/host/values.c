@@ -84,11 +84,14 @@ static int exact_slot(PyObject *object, int kind, automax_slot *slot)
     return overflow != 0;
 }
 
-/* The same for values of memory; returns 0, or -1 with an exception. */
+/* The same for values of memory, where a number of another type counts as what it is; returns -1 with an exception. */
 static int memory_slot(PyObject *object, int kind, automax_slot *slot)
 {
     if (!exact_slot(object, kind, slot))
         return 0;
-    PyErr_Format(PyExc_TypeError, "memory gave %R where a task declares another type", object);
-    return -1;
+    if (kind == AUTOMAX_REAL)
+        slot->d = PyFloat_AsDouble(object);
+    else
+        slot->i = PyLong_AsLongLong(object);
+    return PyErr_Occurred() ? -1 : 0;
 }

@@ -1,0 +1,188 @@
+"""The user's cache of native code: shared libraries by the hash of all that they are made of.
+
+Code that somebody else can write is never loaded: the folder, what lies above it and each file belong to the user (or,
+above the folder, to root) and nobody else can write them; symbolic links are not followed. A file ends with the SHA-256
+of what stands before that, so that a damaged one is built again and never loaded.
+
+Files are written under a name of their own and renamed when they are whole: two processes that build the same at once
+both end with a whole file, and one that is killed leaves only a name that is cleared away later.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import secrets
+import stat
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.compile.native.source import NotNative
+
+FOLDER = "automax_ros"
+MOST_BYTES = 256 << 20
+"""Size that a cache may have; what was not used for longest goes first (decision)."""
+STALE_S = 3600
+"""Age after which an unfinished file is taken for that of a process which was killed, s (decision)."""
+_ENDING, _UNFINISHED = ".so", ".unfinished"
+_DIGEST = 32
+"""Bytes of SHA-256."""
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def user_folder() -> Path:
+    """Return ``$XDG_CACHE_HOME/automax_ros``, or ``~/.cache/automax_ros``; a relative XDG_CACHE_HOME does not count.
+
+    Raises:
+        NotNative: the user has no home either.
+    """
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if base.is_absolute():
+        return base / FOLDER
+    home = Path(os.environ.get("HOME", ""))
+    if not home.is_absolute():
+        raise NotNative("there is nowhere to keep native code: set HOME, or XDG_CACHE_HOME, to a folder's whole path")
+    return home / ".cache" / FOLDER
+
+
+@dataclass(frozen=True)
+class NativeCache:
+    """A cache in a folder, the user's if none is named. ``most_bytes`` is the size that it may have."""
+
+    folder: Path | None = None
+    most_bytes: int = MOST_BYTES
+
+    def found(self, key: str) -> Path | None:
+        """Return the library of a key, checked and safe to load, None where there is none or only a damaged one.
+
+        Raises:
+            NotNative: somebody else can write what would be loaded.
+        """
+        place = self._place()
+        with _opened(place) as folder:
+            try:
+                file = os.open(key + _ENDING, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK, dir_fd=folder)
+            except FileNotFoundError:
+                return None
+            except OSError as error:
+                raise NotNative(_unusable(place / (key + _ENDING), error.strerror or str(error))) from error
+            try:
+                _require_own(os.fstat(file), place / (key + _ENDING), stat.S_ISREG)
+                if not _is_whole(file):
+                    return None
+                with contextlib.suppress(OSError):
+                    os.utime(file)
+            finally:
+                os.close(file)
+        return place / (key + _ENDING)
+
+    def store(self, key: str, library: bytes) -> Path:
+        """Keep a library; return where it lies.
+
+        Raises:
+            NotNative: it cannot be written there, or somebody else could write it.
+        """
+        place = self._place()
+        with _opened(place) as folder:
+            try:
+                self._write(folder, key, library + hashlib.sha256(library).digest())
+                self._make_room(folder, key + _ENDING)
+            except OSError as error:
+                raise NotNative(_unusable(place, error.strerror or str(error))) from error
+        return place / (key + _ENDING)
+
+    def _place(self) -> Path:
+        folder = user_folder() if self.folder is None else self.folder
+        try:
+            for part in (*reversed(folder.parents), folder):  # mkdir(parents=True) would let the group write them
+                if not part.exists():
+                    with contextlib.suppress(FileExistsError):
+                        part.mkdir(mode=0o700)
+            return folder.parent.resolve(strict=True) / folder.name
+        except OSError as error:
+            raise NotNative(_unusable(folder, error.strerror or str(error))) from error
+
+    def _write(self, folder: int, key: str, content: bytes) -> None:
+        name = f"{key}.{secrets.token_hex(8)}{_UNFINISHED}"
+        file = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600, dir_fd=folder)
+        try:
+            with os.fdopen(file, "wb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.rename(name, key + _ENDING, src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(name, dir_fd=folder)
+            raise
+
+    def _make_room(self, folder: int, kept: str) -> None:
+        """Remove what killed processes have left, then the oldest libraries until the others fit."""
+        total = 0
+        for _, size, name in sorted(_libraries(folder), reverse=True):
+            total += size
+            if total > self.most_bytes and name != kept:
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(name, dir_fd=folder)
+
+
+def _libraries(folder: int) -> Iterator[tuple[float, int, str]]:
+    """Yield time, size and name of each library; remove what is unfinished and old."""
+    for name in os.listdir(folder):
+        with contextlib.suppress(FileNotFoundError):
+            known = os.stat(name, dir_fd=folder, follow_symlinks=False)
+            if name.endswith(_ENDING):
+                yield known.st_mtime, known.st_size, name
+            elif name.endswith(_UNFINISHED) and known.st_mtime < time.time() - STALE_S:
+                os.unlink(name, dir_fd=folder)
+
+
+@contextlib.contextmanager
+def _opened(place: Path) -> Iterator[int]:
+    """Open the folder, which is ours alone, as is what lies above it."""
+    for above in place.parents:
+        _require_safe_above(above)
+    try:
+        folder = os.open(place, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    except OSError as error:
+        raise NotNative(_unusable(place, error.strerror or str(error))) from error
+    try:
+        _require_own(os.fstat(folder), place, stat.S_ISDIR)
+        yield folder
+    finally:
+        os.close(folder)
+
+
+def _require_own(known: os.stat_result, path: Path, is_kind: object) -> None:
+    assert callable(is_kind)
+    if not is_kind(known.st_mode):
+        raise NotNative(_unusable(path, "it is not what the cache has put there"))
+    if known.st_uid != os.geteuid():
+        raise NotNative(_unusable(path, "it belongs to another user"))
+    if known.st_mode & _OTHERS:
+        raise NotNative(f"{path} can be written by other users: chmod go-w {path}")
+
+
+def _require_safe_above(path: Path) -> None:
+    """Refuse a folder in which somebody else could put another in place of the cache.
+
+    In one with the sticky bit, such as /tmp, nobody can move what belongs to others.
+    """
+    known = path.stat()
+    if known.st_uid not in (0, os.geteuid()):
+        raise NotNative(_unusable(path, "it belongs to another user"))
+    if known.st_mode & _OTHERS and not known.st_mode & stat.S_ISVTX:
+        raise NotNative(f"{path} can be written by other users: chmod go-w {path}, or set XDG_CACHE_HOME elsewhere")
+
+
+def _is_whole(file: int) -> bool:
+    with os.fdopen(os.dup(file), "rb") as stream:
+        content = stream.read()
+    return hashlib.sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]
+
+
+def _unusable(path: Path, why: str) -> str:
+    return f"native code cannot be kept in {path}: {why}; set XDG_CACHE_HOME to a folder of your own"

@@ -1,0 +1,99 @@
+"""The native form of a compiled task: built or found in the cache, loaded, and called as the Python forms are."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Generator, Sequence
+from functools import lru_cache, partial
+from importlib import import_module
+from importlib.machinery import ExtensionFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from typing import Any
+
+from automax_ros.compile.compiler import CompiledTask, Scans
+from automax_ros.compile.native.build import library, python_options
+from automax_ros.compile.native.cache import NativeCache
+from automax_ros.compile.native.columns import Columns
+from automax_ros.compile.native.executed import BesideLatch, Column, Executed
+from automax_ros.compile.native.slots import StateSlots, kind_of
+from automax_ros.compile.native.source import NativeSource, NotNative
+from automax_ros.compile.scan_io import ScanIo, ScanTooLong, StateValues
+
+_HOST = "automax_host"
+_HOST_TEXTS = ("abi.h", "host/values.c", "host/touch.c", "host/state.c", "host/scans.c", "host/library.c")
+"""The files that make the host, in their order."""
+
+
+class NativeTask:
+    """A task whose scans are machine code. ``scans`` and ``scans_forced`` are called as those of ``CompiledTask``."""
+
+    def __init__(self, compiled: CompiledTask, source: NativeSource, path: Path, host: Any) -> None:
+        """Load a task's library with the module that calls it.
+
+        Raises:
+            OSError: it cannot be loaded.
+        """
+        symbols = compiled.program.symbols
+        slots = StateSlots(compiled.layout, source.limits)
+        kinds = tuple(kind_of(symbols[name].type) for name in compiled.latched)
+        places = [compiled.latched.index(name) for name in compiled.written]
+        written = tuple((place, compiled.latched_views[place]) for place in places)
+        code = host.Code(str(path), slots.fields, kinds, written, ScanTooLong)
+        self.compiled, self.source = compiled, source
+        self.scans: Scans = partial(code.scans, compiled.scans)
+        self.scans_forced: Scans = partial(code.scans_forced, _forced_in_python(compiled))
+        self._columns = Columns(path, slots, kinds, places)
+
+    def columns(
+        self, state: StateValues, latched: Sequence[Column], count: int, beside_latch: BesideLatch | None = None
+    ) -> Executed:
+        """Execute ``count`` scans on columns of latched values: int64, float64 for REALs; the state changes in place.
+
+        Raises:
+            ValueError: the columns or the rows of ``beside_latch`` do not fit the task or the count.
+        """
+        return self._columns.execute(state, latched, count, beside_latch)
+
+
+def native_form(
+    compiled: CompiledTask, cache: NativeCache, translator: Callable[[CompiledTask], NativeSource] | None = None
+) -> NativeTask:
+    """Return the native form of a task, from the cache or built now. Any thread may ask for it.
+
+    Raises:
+        NotNative: the task cannot be native, or not here, and why.
+    """
+    try:
+        source = (translator or import_module("automax_ros.compile.native.translate").translate)(compiled)
+        return NativeTask(compiled, source, library(source.text, cache), _host(str(library(*_host_source(cache)))))
+    except (OSError, ImportError) as error:
+        raise NotNative(f"native code cannot be loaded: {error}; is the cache's folder mounted noexec?") from error
+
+
+def _forced_in_python(compiled: CompiledTask) -> Scans:
+    """Return the Python form that heeds forces, compiled when it is needed."""
+
+    def scans(state: StateValues, io: ScanIo) -> Generator[bool, None, None]:
+        return compiled.scans_forced(state, io)
+
+    return scans
+
+
+def _host_source(cache: NativeCache) -> tuple[str, NativeCache, tuple[str, ...]]:
+    folder = Path(__file__).parent
+    return "\n".join((folder / name).read_text(encoding="utf-8") for name in _HOST_TEXTS), cache, python_options()
+
+
+@lru_cache(maxsize=4)
+def _host(path: str) -> Any:
+    """Return the module that calls native tasks; it does not stand among the modules that can be imported."""
+    loader = ExtensionFileLoader(_HOST, path)
+    spec = spec_from_loader(_HOST, loader)
+    assert spec is not None
+    known = sys.modules.get(_HOST)
+    module = module_from_spec(spec)
+    loader.exec_module(module)
+    if known is None:
+        sys.modules.pop(_HOST, None)
+    return module
