@@ -11,7 +11,7 @@ from typing import Any
 
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import DiskSync, RecordingWatch, live_options
-from automax_ros.cli.run_plan import RunPlan, conclude, report_at_end, warn
+from automax_ros.cli.run_plan import RunPlan, conclude, report_at_end, tell_forms, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
@@ -58,9 +58,10 @@ class LiveSession:
         self.plan, self._domain = plan, domain
         self.has_begun = False
         with stop.cut_short():
-            self.rack = rack = Rack(plan.config, stopwatch=time.monotonic_ns, local=plan.slots)
+            self.rack = rack = Rack(plan.config, stopwatch=time.monotonic_ns, local=plan.slots, native=plan.native)
             if not plan.is_watched:
                 warn(rack)
+            tell_forms(rack, plan)
             self._stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
         self._state = StateKeeping(rack, plan.state_folder)
         self._operated = OperationLog(lambda: self._stimulation.is_acting)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.cli.child_process import end_with_watcher
+from automax_ros.cli.native import add_native_arguments, native_forms
 from automax_ros.cli.output_files import held_for_writing
 from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
 from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
@@ -75,6 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="let happen what this YAML file says, by rack time: give it to every process of the rack",
     )
     parser.add_argument("--report", type=Path, metavar="FILE.json", help="write how the run ended for this process")
+    add_native_arguments(parser)
     add_outside_argument(parser)
     add_ros_arguments(parser)
     # For `automax run --distributed`: lines as cli/seat_talk.py has them, and an end with standard input's.
@@ -118,6 +120,8 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
         arguments.allow_outside,
         ros,
         SeatPlan(seat, seats, arguments.run_id, arguments.watched, arguments.lead),
+        native=native_forms(arguments, arguments.duration, wall_clock=True),
+        verbose=arguments.verbose,
     )
     try:
         from automax_ros.cli.run_live import run_live

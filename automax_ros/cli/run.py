@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.native import add_native_arguments, native_forms
 from automax_ros.cli.numbers import option_number
 from automax_ros.cli.output_files import held_for_writing, require_different_files, require_folder, require_writable
 from automax_ros.cli.rack_arguments import config_of, namespace_of, print_refused, usable_config
@@ -98,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", type=Path, metavar="FILE.json", help="write how the run ended: tasks, commons, forces, operations"
     )
+    add_native_arguments(parser)
     add_outside_argument(parser)
     add_ros_arguments(parser)
 
@@ -197,6 +199,8 @@ def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
         ros,
         simulated=simulated,
         tunings=tuple(tunings),
+        native=native_forms(arguments, arguments.duration, wall_clock=not arguments.simulated),
+        verbose=arguments.verbose,
     )
 
 

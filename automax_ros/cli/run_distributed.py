@@ -63,6 +63,7 @@ def _posts(plan: RunPlan, seats: Sequence[Seat], arguments: argparse.Namespace) 
     common = [str(plan.config.path), "--watched", "--run-id", str(int.from_bytes(os.urandom(8), "big") >> 1 or 1)]
     common += ["--allow-outside"] if plan.allow_outside else []
     common += ["--stimuli", str(plan.stimuli)] if plan.stimuli is not None else []
+    common += ["--native", arguments.native, *(["--verbose"] if arguments.verbose else [])]
     common += ["--duration", _seconds(plan.duration_ns)] if plan.duration_ns is not None else []
     if plan.record is not None:
         command = [*automax, "record", str(plan.config.path), "--output", str(plan.record), "--wait", _RECORDER_WAIT_S]

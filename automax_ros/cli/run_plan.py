@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.bags.recorder import RecordingOptions
+from automax_ros.cli.native import tell_native
 from automax_ros.cli.output_files import write_report
 from automax_ros.cli.seat_talk import ToldScreen, tell_report
 from automax_ros.cli.status import Person, Screen
 from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.types import Value
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.config import RackConfig
@@ -52,6 +54,7 @@ class RunPlan:
     in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
     command line says to ROS. ``seat`` is the part of the rack that is run, None for all of it.
     ``simulated`` is simulated time where the rack has ROS nodes all the same. ``tunings`` is what ``--set`` tunes.
+    ``native`` says which tasks scan as machine code, ``verbose`` that a person wants to know what became of them.
     """
 
     config: RackConfig
@@ -68,6 +71,8 @@ class RunPlan:
     seat: SeatPlan | None = None
     simulated: SimulatedTime | None = None
     tunings: tuple[Tuning, ...] = ()
+    native: NativeForms = IN_PYTHON
+    verbose: bool = False
 
     @property
     def is_watched(self) -> bool:
@@ -97,6 +102,12 @@ def warn(rack: Rack) -> None:
     """Print the warnings that the tasks' checks gave."""
     for source, diagnostics in rack.warnings:
         print_diagnostics(diagnostics, source, sys.stderr)
+
+
+def tell_forms(rack: Rack, plan: RunPlan) -> None:
+    """Say which tasks are native, and why others are not, if that is wanted."""
+    if plan.verbose:
+        tell_native(rack.operations.installation.native.values())
 
 
 def report_at_end(rack: Rack, stimulation: Stimulation, others: Sequence[Happened] = ()) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.recording_watch import RecordingWatch
-from automax_ros.cli.run_plan import RunPlan, conclude, report_at_end, warn
+from automax_ros.cli.run_plan import RunPlan, conclude, report_at_end, tell_forms, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
 from automax_ros.cli.status import StatusDisplay
@@ -23,8 +23,9 @@ _NO_END = "simulated time without an end: Ctrl-C ends the run (or give --duratio
 
 def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
     """Run until the duration has passed, nothing can happen any more, or a stop is requested; return the exit code."""
-    rack = Rack(plan.config)
+    rack = Rack(plan.config, native=plan.native)
     warn(rack)
+    tell_forms(rack, plan)
     stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, plan.record, plan.recording) if plan.record is not None else None

@@ -20,6 +20,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TextIO
 
+from automax_ros.cli.native import add_native_arguments, native_forms, tell_native
 from automax_ros.cli.output_files import opened_for_writing, require_different_files
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.stimuli_file import StimuliRefused, entries_of
@@ -43,6 +44,8 @@ from automax_ros.running.lone_task import LoneTask, LoneVariable
 from automax_ros.running.task import ScanRecord, Status
 
 _USAGE = "usage: automax trace FILE --input IN.csv, or: automax trace FILE --stimuli FILE"
+_CHARACTERS_A_ROW = 8
+"""For how many characters of a table a scan is expected where it says nothing of its size (decision)."""
 _ROWS_A_LOOK = 256
 """Rows between two looks at the clock for the progress bar."""
 
@@ -61,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_target_arguments(parser)
     add_watch_argument(parser, "every simple variable")
+    add_native_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -76,7 +80,9 @@ def run(arguments: argparse.Namespace) -> int:
         print_diagnostics(result.diagnostics, source, sys.stderr)
         return 1
     require_clock(arguments.file, result.program)
-    lone = LoneTask(result.program)
+    lone = LoneTask(result.program, native_forms(arguments, _expected_ns(arguments, result.program.period_ns)))
+    if arguments.verbose:
+        tell_native([lone.native])
     watched = _watched(lone, watch_list(arguments.watch))
     read = {"FILE": arguments.file, "--input": arguments.input, "--stimuli": arguments.stimuli}
     require_different_files(
@@ -97,6 +103,17 @@ def run(arguments: argparse.Namespace) -> int:
         bar = files.enter_context(ProgressBar("trace", scans.size, wanted=arguments.output is not None))
         _Trace(lone, watched, output, errors).run(scans, bar)
     return _conclusion(lone, all_told=errors is not None)
+
+
+def _expected_ns(arguments: argparse.Namespace, period_ns: int) -> int:
+    """Return about how long the task will scan: for the duration, or a row of the table for each few characters."""
+    if arguments.duration is not None:
+        duration: int = arguments.duration
+        return duration
+    table: Path | None = arguments.input
+    if table is None or not table.is_file():
+        return 0
+    return table.stat().st_size // _CHARACTERS_A_ROW * period_ns
 
 
 class _Trace:

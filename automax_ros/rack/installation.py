@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.compile.cost import CostModel, Model
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeOutcome
 from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.task_kind import TaskKind
@@ -52,7 +53,10 @@ class Prepared:
 
 
 class Installation:
-    """All tasks of a rack, compiled; ``warnings`` are what their checks found short of errors."""
+    """All tasks of a rack, compiled.
+
+    ``warnings`` are what their checks found short of errors, ``native`` what became of each task that is compiled here.
+    """
 
     def __init__(
         self,
@@ -60,13 +64,17 @@ class Installation:
         here: Collection[str] | None = None,
         *,
         sources: Mapping[str, SourceText] | None = None,
+        native: NativeForms = IN_PYTHON,
     ) -> None:
         """Check all tasks and compile them, or those of ``here`` alone; ``sources`` stand for the tasks' files.
+
+        Scans in modeled time are executed in steps, which native scans have not: none is made for them then.
 
         Raises:
             RackError: a task has errors; nothing is started then (the hardware's E0).
         """
         self._config = config
+        self._native = native if config.execution is Timing.IDEAL else IN_PYTHON
         self._views = {variable.name: view for view, variable in enumerate(config.variables)}
         self._compiled: dict[str, CompiledTask] = {}
         self._programs: Mapping[str, Program] = {}
@@ -85,6 +93,8 @@ class Installation:
                 self.warnings.append((source, result.diagnostics))
             if here is None or task.name in here:
                 self._compiled[task.name] = self._compile(task.name, result.program)
+        self.native: Mapping[str, NativeOutcome] = self._native.made(self._compiled)
+        self._compiled = {name: outcome.compiled for name, outcome in self.native.items()}
         distributed = len(self._compiled) < len(checked)
         self._cut = seats_of(config, self._programs.values()) if distributed else ()
 
@@ -112,7 +122,7 @@ class Installation:
         among = self._programs
         try:
             program = self._checked(task, source, among)
-            compiled = self._compile(task, program)
+            compiled = self._native.form(self._compile(task, program)).compiled
         except RackError as fault:
             return Prepared(task, source, None, among, among, fault)
         return Prepared(task, source, compiled, {**among, task: program}, among)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
@@ -56,7 +57,7 @@ class Rack:
 
     ``execution`` executes the scans of all modules in place of what the configuration says (``rack/stepping``).
     ``local`` are the slots whose modules are in this process (``rack/part``), all if None. ``installation`` are the
-    tasks where they are compiled already.
+    tasks where they are compiled already; ``native`` says which of them scan as machine code (``compile/native``).
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class Rack:
         execution: Execution | None = None,
         local: Collection[int] | None = None,
         installation: Installation | None = None,
+        native: NativeForms = IN_PYTHON,
     ) -> None:
         """Compile the tasks against the rack's common memory and build the modules.
 
@@ -79,7 +81,7 @@ class Rack:
         self._forcing = Forcing(config, self.memory, lambda: self.tasks)
         self.writers: tuple[WriterSpec, ...] = writers_of(config)
         self.scheduler = Scheduler()
-        installation = installation or Installation(config, self.part.tasks)
+        installation = installation or Installation(config, self.part.tasks, native=native)
         self.observers = Observers(self.memory)
         self.backplane = backplane_of(config)
         self.events = Events()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from automax_ros.compile.compiler import CompiledTask, compile_program
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.names import Element, element
 from automax_ros.core.types import Value
 from automax_ros.language.program import Program, Symbol
@@ -35,12 +36,13 @@ class LoneVariable:
 class LoneTask:
     """A task in a rack of its own, where everybody may read and set all its variables between scans."""
 
-    def __init__(self, program: Program) -> None:
-        """Compile and install the task; its memory is all 0."""
+    def __init__(self, program: Program, native: NativeForms = IN_PYTHON) -> None:
+        """Compile and install the task; its memory is all 0. ``native`` says whether it scans as machine code."""
         self.program = program
         self._views = {spec.name: view for view, spec in enumerate(views_of(program))}
         self.memory = CommonMemory(views_of(program))
-        self.task = Task(compiled_alone(program), self.memory, writer=_TASK)
+        self.native = native.form(compiled_alone(program))
+        self.task = Task(self.native.compiled, self.memory, writer=_TASK)
 
     def simple_variables(self) -> list[LoneVariable]:
         """Return every simple variable in the order of declaration."""

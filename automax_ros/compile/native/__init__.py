@@ -9,6 +9,7 @@ from automax_ros.core.face import face
 if TYPE_CHECKING:
     from automax_ros.compile.native.cache import NativeCache
     from automax_ros.compile.native.executed import BesideLatch, Executed
+    from automax_ros.compile.native.forms import NativeForms, NativeMode, NativeOutcome
     from automax_ros.compile.native.source import NativeSource, NotNative
     from automax_ros.compile.native.task import NativeTask, native_form
 
@@ -16,10 +17,13 @@ __all__ = [
     "BesideLatch",
     "Executed",
     "NativeCache",
+    "NativeForms",
+    "NativeMode",
+    "NativeOutcome",
     "NativeSource",
     "NativeTask",
     "NotNative",
     "native_form",
 ]
 
-__getattr__ = face(__name__, "source", "executed", "cache", "task")
+__getattr__ = face(__name__, "source", "executed", "cache", "task", "forms")

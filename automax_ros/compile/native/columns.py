@@ -57,7 +57,7 @@ class Columns:
         self._kinds, self._written = tuple(latched_kinds), tuple(written)
 
     def execute(
-        self, state: StateValues, latched: Sequence[Column], count: int, beside_latch: BesideLatch | None
+        self, state: StateValues, latched: Sequence[Column], count: int, actual: BesideLatch | None
     ) -> Executed:
         """Execute ``count`` scans on these columns; the state is changed in place (see ``Executed``).
 
@@ -65,24 +65,24 @@ class Columns:
             ValueError: the columns do not fit the task or the count.
         """
         columns = self._checked(latched, count)
-        _require_rows(beside_latch, count)
+        _require_rows(actual, count)
         try:
             before = self._slots.taken(state)
         except Misfit:
             return self._run(np.empty(0, np.int64), columns, 0, None).executed()
         slots = before.copy()
-        run = self._run(slots, columns, count, beside_latch)
+        run = self._run(slots, columns, count, actual)
         if run.done < count:
             # The state is that of no scan: the scans that were whole are executed again, from the state before.
             slots = before.copy()
-            run = self._run(slots, columns, run.done, beside_latch)
+            run = self._run(slots, columns, run.done, actual)
         self._slots.put(slots, before, state)
         return run.executed()
 
-    def _run(self, slots: Slots, columns: Sequence[Column], count: int, beside_latch: BesideLatch | None) -> _Run:
+    def _run(self, slots: Slots, columns: Sequence[Column], count: int, actual: BesideLatch | None) -> _Run:
         room = _ROOM * count + 64
         while True:
-            run = _Run(columns, [self._kinds[place] for place in self._written], count, beside_latch, room)
+            run = _Run(columns, [self._kinds[place] for place in self._written], count, actual, room)
             if not count:
                 return run
             kept = slots.copy()
@@ -103,13 +103,13 @@ class Columns:
         return columns
 
 
-def _require_rows(beside_latch: BesideLatch | None, count: int) -> None:
+def _require_rows(actual: BesideLatch | None, count: int) -> None:
     """Refuse rows that the C text would read past their end."""
-    if beside_latch is None:
+    if actual is None:
         return
     for offsets, *arrays in (
-        (beside_latch.read_offsets, beside_latch.read_views, beside_latch.read_elements, beside_latch.read_values),
-        (beside_latch.write_offsets, beside_latch.write_views, beside_latch.write_elements, beside_latch.write_values),
+        (actual.read_offsets, actual.read_views, actual.read_elements, actual.read_values),
+        (actual.write_offsets, actual.write_views, actual.write_elements, actual.write_values),
     ):
         if offsets is None:
             continue
@@ -122,7 +122,7 @@ class _Run:
     """One call: its arguments, alive as long as it is, and what came of it."""
 
     def __init__(
-        self, columns: Sequence[Column], kinds: Sequence[int], count: int, beside_latch: BesideLatch | None, room: int
+        self, columns: Sequence[Column], kinds: Sequence[int], count: int, actual: BesideLatch | None, room: int
     ) -> None:
         self._kept: list[Column] = [*columns]
         self._outputs: list[Column] = [_as_column(np.empty(count, np.int64), kind) for kind in kinds]
@@ -135,16 +135,14 @@ class _Run:
         call.error_scans, call.error_lines, call.error_codes = (item.ctypes.data for item in self._errors)
         call.written_scans, call.written_views, call.written_elements = (item.ctypes.data for item in self._places)
         call.written_values = self._values.ctypes.data
-        if beside_latch is not None:
-            call.reads = self._rows(
-                beside_latch.read_offsets, beside_latch.read_views, beside_latch.read_elements, beside_latch.read_values
-            )
-            if beside_latch.write_offsets is not None:
+        if actual is not None:
+            call.reads = self._rows(actual.read_offsets, actual.read_views, actual.read_elements, actual.read_values)
+            if actual.write_offsets is not None:
                 call.writes = self._rows(
-                    beside_latch.write_offsets,
-                    beside_latch.write_views,
-                    beside_latch.write_elements,
-                    beside_latch.write_values,
+                    actual.write_offsets,
+                    actual.write_views,
+                    actual.write_elements,
+                    actual.write_values,
                 )
         self.call = call
 

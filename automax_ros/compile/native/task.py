@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, Scans
-from automax_ros.compile.native.build import library, python_options
+from automax_ros.compile.native.build import LIMIT_S, library, python_options
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.columns import Columns
 from automax_ros.compile.native.executed import BesideLatch, Column, Executed
@@ -46,18 +46,21 @@ class NativeTask:
         self._columns = Columns(path, slots, kinds, places)
 
     def columns(
-        self, state: StateValues, latched: Sequence[Column], count: int, beside_latch: BesideLatch | None = None
+        self, state: StateValues, latched: Sequence[Column], count: int, actual: BesideLatch | None = None
     ) -> Executed:
         """Execute ``count`` scans on columns of latched values: int64, float64 for REALs; the state changes in place.
 
         Raises:
-            ValueError: the columns or the rows of ``beside_latch`` do not fit the task or the count.
+            ValueError: the columns or the rows of ``actual`` do not fit the task or the count.
         """
-        return self._columns.execute(state, latched, count, beside_latch)
+        return self._columns.execute(state, latched, count, actual)
 
 
 def native_form(
-    compiled: CompiledTask, cache: NativeCache, translator: Callable[[CompiledTask], NativeSource] | None = None
+    compiled: CompiledTask,
+    cache: NativeCache,
+    translator: Callable[[CompiledTask], NativeSource] | None = None,
+    limit_s: float = LIMIT_S,
 ) -> NativeTask:
     """Return the native form of a task, from the cache or built now. Any thread may ask for it.
 
@@ -66,7 +69,8 @@ def native_form(
     """
     try:
         source = (translator or import_module("automax_ros.compile.native.translate").translate)(compiled)
-        return NativeTask(compiled, source, library(source.text, cache), _host(str(library(*_host_source(cache)))))
+        path = library(source.text, cache, limit_s=limit_s)
+        return NativeTask(compiled, source, path, host_module(cache, limit_s))
     except (OSError, ImportError) as error:
         raise NotNative(f"native code cannot be loaded: {error}; is the cache's folder mounted noexec?") from error
 
@@ -80,9 +84,16 @@ def _forced_in_python(compiled: CompiledTask) -> Scans:
     return scans
 
 
-def _host_source(cache: NativeCache) -> tuple[str, NativeCache, tuple[str, ...]]:
+def host_module(cache: NativeCache, limit_s: float = LIMIT_S) -> Any:
+    """Return the module that calls native tasks, from the cache or built now.
+
+    Raises:
+        NotNative: it cannot be built here.
+        OSError, ImportError: it cannot be loaded.
+    """
     folder = Path(__file__).parent
-    return "\n".join((folder / name).read_text(encoding="utf-8") for name in _HOST_TEXTS), cache, python_options()
+    text = "\n".join((folder / name).read_text(encoding="utf-8") for name in _HOST_TEXTS)
+    return _host(str(library(text, cache, python_options(), limit_s)))
 
 
 @lru_cache(maxsize=4)

@@ -1,0 +1,98 @@
+"""Which tasks of a run are made native: whether it is wanted, whether it pays, and what became of each task."""
+
+from __future__ import annotations
+
+import enum
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from automax_ros.compile.compiler import CompiledTask
+from automax_ros.compile.native.build import LIMIT_S
+from automax_ros.compile.native.cache import NativeCache
+from automax_ros.compile.native.source import NotNative
+
+if TYPE_CHECKING:
+    from automax_ros.compile.native.task import NativeTask
+
+LINE_NS = 75
+"""What a line of a task takes in a scan in Python, ns, about: a block does."""
+WORTHWHILE_NS = 2_000_000_000
+"""Time that scans must take in Python for native ones to be built or looked for, ns (decision).
+
+To translate and build a task takes from half a second to a few; loading alone, some hundredths.
+"""
+
+
+class NativeMode(enum.Enum):
+    """Whether tasks are made native: where it pays, wherever it can be, or never."""
+
+    AUTO = "auto"
+    ON = "on"
+    OFF = "off"
+
+
+@dataclass(frozen=True)
+class NativeOutcome:
+    """A task as it runs: ``native`` is its native form, None with ``why`` where it scans in Python."""
+
+    compiled: CompiledTask
+    native: NativeTask | None = None
+    why: str = ""
+
+    @property
+    def text(self) -> str:
+        """What a person is told of it."""
+        return f"{self.compiled.program.name}: {'native' if self.native else f'in Python: {self.why}'}"
+
+
+@dataclass(frozen=True)
+class NativeForms:
+    """What a run wants of native scans.
+
+    Attributes:
+        mode: whether tasks are made native.
+        expected_ns: task time that will pass, None without an end: with ``AUTO`` it says whether building pays.
+        cache: where they are kept.
+        limit_s: time in which each must be built, s.
+    """
+
+    mode: NativeMode = NativeMode.OFF
+    expected_ns: int | None = None
+    cache: NativeCache = NativeCache()
+    limit_s: float = LIMIT_S
+
+    def made(self, tasks: Mapping[str, CompiledTask]) -> dict[str, NativeOutcome]:
+        """Return tasks as they are to run, by the same names; several are built at a time. Nothing is raised."""
+        if self.mode is NativeMode.OFF or not tasks:
+            return {name: NativeOutcome(task, why="native scans are off") for name, task in tasks.items()}
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(min(len(tasks), os.cpu_count() or 1)) as pool:
+            return dict(zip(tasks, pool.map(self.form, tasks.values()), strict=True))
+
+    def form(self, compiled: CompiledTask) -> NativeOutcome:
+        """Return a task as it is to run: as it is given where it is not native."""
+        if self.mode is NativeMode.OFF:
+            return NativeOutcome(compiled, why="native scans are off")
+        if self.mode is NativeMode.AUTO and not self._pays(compiled):
+            return NativeOutcome(compiled, why="a run this short gains nothing by it (--native on)")
+        from automax_ros.compile.native.task import native_form
+
+        try:
+            native = native_form(compiled, self.cache, limit_s=self.limit_s)
+        except NotNative as reason:
+            return NativeOutcome(compiled, why=str(reason))
+        return NativeOutcome(compiled.with_scans(native.scans, native.scans_forced), native)
+
+    def _pays(self, compiled: CompiledTask) -> bool:
+        if self.expected_ns is None:
+            return True
+        period = compiled.program.period_ns
+        scans = self.expected_ns // period if period else 0
+        return scans * len(compiled.program.scan) * LINE_NS >= WORTHWHILE_NS
+
+
+IN_PYTHON = NativeForms()
+"""No task is native."""
