@@ -28,7 +28,7 @@ MESSAGES = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"
 # Ground floor first: a room may import itself and those before it.
 ROOMS = [
     "core", "pieces", "blocks", "logix", "language", "compile", "drive", "running", "tuning", "rack", "wire", "bags",
-    "replay", "nodes", "cli",
+    "replay", "sweep", "nodes", "cli",
 ]  # fmt: skip
 ROOMS_WITH_ROS = {"nodes", "cli"}
 ROS_PACKAGES = {
@@ -37,7 +37,7 @@ ROS_PACKAGES = {
     "std_msgs", "std_srvs",
 }  # fmt: skip
 ROSDEP_KEYS = {"lz4": "python3-lz4", "numpy": "python3-numpy", "yaml": "python3-yaml", "zstandard": "python3-zstandard"}
-WITHOUT_KEY = {"automax_ros", "distributed", "matplotlib", "mcap"}
+WITHOUT_KEY = {"automax_ros", "distributed", "matplotlib", "mcap", "scipy"}
 """Imported, but ours, wanted for pictures or clusters only, or without a key of rosdep."""
 
 

@@ -26,6 +26,7 @@ SUBCOMMANDS: dict[str, str] = {
     "compile": "print the function that a task becomes",
     "tune-info": "coefficients and limits of dynamic blocks in a task",
     "response": "step response and Bode diagram of a dynamic block",
+    "sweep": "run a rack many times with other values, and measure",
     "load": "CPU load of each module by the manual's execution times",
     "drive-check": "judge drives by the manual's formulas, propose gains",
     "new": "make a rack file from a folder of tasks",

@@ -1,0 +1,55 @@
+"""A rack as text, from which any process on any machine makes the same racks; tasks are compiled once a process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.faults import Fault
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.installation import Installation
+from automax_ros.rack.loader import load_stored
+from automax_ros.rack.plants.numbers import PlantNumber, with_numbers
+from automax_ros.rack.rack import Rack
+
+
+@dataclass(frozen=True)
+class Blueprint:
+    """A rack file's text, what the file is called, and the sources of the tasks by name: no file is read again."""
+
+    text: str
+    path: str
+    sources: tuple[tuple[str, SourceText], ...]
+
+    @classmethod
+    def of(cls, rack: Rack) -> Blueprint:
+        """Return that of a rack as it is installed."""
+        return cls(rack.config.text, str(rack.config.path), tuple(rack.sources.items()))
+
+    def rack(self, plants: Mapping[PlantNumber, str]) -> Rack:
+        """Return a new rack with some other numbers of its plants.
+
+        Raises:
+            Fault: with these numbers the rack file has errors.
+        """
+        config = _config(with_numbers(self.text, plants), self.path)
+        return Rack(config, installation=_installation(self).again(config))
+
+
+@lru_cache(maxsize=1)
+def _config(text: str, path: str) -> RackConfig:
+    """Return what a text means; runs one after the other often have one text."""
+    result = load_stored(SourceText(path, text), Path(path))
+    if result.config is None:
+        first = next(iter(result.diagnostics))
+        raise Fault(first.message, first.hint, code=first.code)
+    return result.config
+
+
+@lru_cache(maxsize=1)
+def _installation(blueprint: Blueprint) -> Installation:
+    config = _config(blueprint.text, blueprint.path)
+    return Installation(config, sources=dict(blueprint.sources))

@@ -1,0 +1,153 @@
+"""One run of a sweep: a fresh rack in simulated time, from its values to its measures."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from automax_ros.bags.errors import BagError
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import printable
+from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.rack.files import FileFault, read_bytes
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.stimuli.player import Stimulation
+from automax_ros.rack.stimuli.reader import MOST_BYTES, read_for_rack
+from automax_ros.sweep.blueprint import Blueprint
+from automax_ros.sweep.measures import FUNCTIONS, Measure, Subject
+from automax_ros.sweep.points import Point
+from automax_ros.sweep.quantities import Beginning, Quantity
+from automax_ros.sweep.watching import Watch
+
+_SLICE_NS = 100 * NS_PER_MS
+"""Rack time between two looks at the write log, which is kept meanwhile."""
+
+
+@dataclass(frozen=True)
+class Stimuli:
+    """A stimuli file, read by each process: ``digest`` is that of its bytes, so that all read the same."""
+
+    path: Path
+    digest: str
+    allow_outside: bool = False
+
+    @classmethod
+    def of(cls, path: Path, *, allow_outside: bool) -> Stimuli:
+        """Return a file as it is now.
+
+        Raises:
+            Fault: it cannot be read.
+        """
+        return cls(path.absolute(), _digest(path), allow_outside)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all runs of a sweep share."""
+
+    blueprint: Blueprint
+    quantities: tuple[Quantity, ...]
+    measures: tuple[Measure, ...]
+    duration_ns: int
+    stimuli: Stimuli | None = None
+
+    def beginning(self, point: Point) -> Beginning:
+        """Return what the run of a point begins with."""
+        beginning = Beginning()
+        for quantity, value in zip(self.quantities, point, strict=True):
+            quantity.give(value, beginning)
+        return beginning
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a run: a number or None for each measure; ``fault`` says why it is not as it should be, or ""."""
+
+    measures: tuple[float | None, ...]
+    fault: str = ""
+
+
+def run_points(plan: Plan, points: Sequence[Point]) -> list[Outcome]:
+    """Run points one after the other: the work of a piece.
+
+    Raises:
+        Fault: the stimuli file is not the one of the plan.
+    """
+    if plan.stimuli is not None and _digest(plan.stimuli.path) != plan.stimuli.digest:
+        raise Fault(f"the stimuli file {plan.stimuli.path} is another one on {platform.node()}")
+    return [run_point(plan, point) for point in points]
+
+
+def run_point(plan: Plan, point: Point, attend: Callable[[Rack], Callable[[], None]] | None = None) -> Outcome:
+    """Run one point; whatever goes wrong becomes the outcome's fault, so that it ends no other run (decision).
+
+    A run that a fault stops has no measures but ``errors`` and ``stopped`` (decision): STOP ALL clears what they would
+    be of. ``attend`` is given the rack before it starts and returns what is called at its end.
+    """
+    try:
+        return _run(plan, plan.beginning(point), attend)
+    except BagError:
+        raise
+    except Fault as fault:
+        why = fault.message
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}"
+    return Outcome((None,) * len(plan.measures), printable(why))
+
+
+def _run(plan: Plan, beginning: Beginning, attend: Callable[[Rack], Callable[[], None]] | None) -> Outcome:
+    rack = plan.blueprint.rack(beginning.plants)
+    stimulation = _stimulation(rack, plan.stimuli)
+    for item in beginning.tunings:
+        rack.tune(rack.task(item.task), item.name, item.value)
+    end = attend(rack) if attend is not None else None
+    try:
+        rack.start(beginning.settings)
+        watch = Watch(rack, plan.measures, plan.duration_ns)
+        stimulation.begin()
+        _pass(rack, plan, stimulation)
+    finally:
+        if end is not None:
+            end()
+    stopped = rack.operations.stopped
+    fault = stopped.reason if stopped is not None and stopped.is_fault else ""
+    values = watch.results(plan.duration_ns) if not fault else {}
+    values.update((item, _of_rack(rack, item)) for item in plan.measures if not item.is_of_common)
+    refused = next((line for line in stimulation.news()), "")
+    return Outcome(tuple(values.get(item) for item in plan.measures), fault or refused)
+
+
+def _pass(rack: Rack, plan: Plan, stimulation: Stimulation) -> None:
+    """Let the time pass: as `automax run` does, to the end where stimuli may put the rack into RUN again."""
+    while rack.now_ns < plan.duration_ns:
+        if rack.stop_reason is not None and (plan.stimuli is None or stimulation.is_over):
+            cause = rack.operations.stopped
+            if cause is None or cause.is_fault:
+                return
+        rack.scheduler.run_until(min(rack.now_ns + _SLICE_NS, plan.duration_ns))
+        rack.observers.tell_writes()
+
+
+def _stimulation(rack: Rack, stimuli: Stimuli | None) -> Stimulation:
+    if stimuli is None:
+        return Stimulation((), rack.scheduler)
+    file = read_for_rack(stimuli.path, rack, allow_outside=stimuli.allow_outside)
+    if file.stimuli is None:
+        raise Fault(f"stimuli: {file.diagnostics[0].message}", file.diagnostics[0].hint)
+    return Stimulation(file.stimuli, rack.scheduler)
+
+
+def _of_rack(rack: Rack, measure: Measure) -> float:
+    if FUNCTIONS[measure.function].subject is Subject.TASK:
+        return rack.task(measure.subject).errors.count
+    return int(rack.stop_reason is not None)
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(read_bytes(path, MOST_BYTES)).hexdigest()
+    except FileFault as fault:
+        raise Fault(f"the stimuli file {path} {fault}") from fault

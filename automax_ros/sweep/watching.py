@@ -1,0 +1,113 @@
+"""Watches the commons that measures are of, while a run goes: each change as the write log tells it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from automax_ros.core.types import Value
+from automax_ros.rack.observers import Operation
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.settings import common_named
+from automax_ros.running.scan_record import ScanRecord
+from automax_ros.running.task import Task
+from automax_ros.running.views import Write
+from automax_ros.sweep.functions import Accumulator
+from automax_ros.sweep.measures import Measure
+
+
+@dataclass
+class _Window:
+    """A measure while it is computed; ``last`` is the latest value within its window, before that the one before it."""
+
+    accumulator: Accumulator
+    start_ns: int
+    end_ns: int
+    last: float
+    has_begun: bool = False
+
+    def hold(self, value: float, begin_ns: int, end_ns: int) -> None:
+        """Take a piece of the signal, as far as it lies within the window."""
+        begin, end = max(begin_ns, self.start_ns), min(end_ns, self.end_ns)
+        if begin_ns < self.start_ns:
+            self.last = value
+        if begin < end:
+            if not self.has_begun:
+                self.has_begun = True
+                self.accumulator.begin(self.last)
+            self.last = value
+            self.accumulator.hold(value, begin - self.start_ns, end - self.start_ns)
+
+    def result(self) -> float | None:
+        """Return the measure."""
+        return self.accumulator.result(self.last, self.end_ns - self.start_ns)
+
+
+@dataclass
+class _Signal:
+    """A common or an element with the windows on it; ``value`` holds since ``since_ns``."""
+
+    value: float
+    since_ns: int
+    windows: list[_Window] = field(default_factory=list)
+
+    def change(self, time_ns: int, value: Value) -> None:
+        """Take a value that holds from a time on."""
+        assert not isinstance(value, str)
+        if value != self.value:
+            self.flush(time_ns)
+            self.value = value
+
+    def flush(self, time_ns: int) -> None:
+        """Take the present value up to a time."""
+        if time_ns > self.since_ns:
+            for window in self.windows:
+                window.hold(self.value, self.since_ns, time_ns)
+            self.since_ns = time_ns
+
+
+class Watch:
+    """Computes measures of a rack that runs, as an observer of it that needs no records of scans."""
+
+    def __init__(self, rack: Rack, measures: Sequence[Measure], end_ns: int) -> None:
+        """Watch a rack that was just started, until ``end_ns``: presets are what its commons held before."""
+        self._signals: dict[tuple[int, int], _Signal] = {}
+        self._windows: dict[Measure, _Window] = {}
+        for measure in measures:
+            if measure.is_of_common:
+                self._add(rack, measure, end_ns)
+        rack.observers.add(self)
+
+    def results(self, end_ns: int) -> dict[Measure, float | None]:
+        """Return what came of the measures of commons."""
+        for signal in self._signals.values():
+            signal.flush(end_ns)
+        return {measure: window.result() for measure, window in self._windows.items()}
+
+    def written(self, writes: list[Write]) -> None:
+        """Take what was written, by scans too where none keeps records."""
+        signals = self._signals
+        for _, time_ns, _, _, view, element, value in writes:
+            signal = signals.get((view, element))
+            if signal is not None:
+                signal.change(time_ns, value)
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
+        """Take what a scan has written."""
+        self.written(writes)
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """Heed no tunables."""
+
+    def operated(self, operation: Operation) -> None:
+        """Heed no operations."""
+
+    def _add(self, rack: Rack, measure: Measure, end_ns: int) -> None:
+        meant = common_named(rack.config, measure.subject)
+        key = rack.memory.view(meant.name), meant.index
+        present = rack.memory.read_now(*key)
+        assert not isinstance(present, str)
+        end = end_ns if measure.end_ns is None else measure.end_ns
+        window = _Window(measure.accumulator(), measure.start_ns, end, present)
+        self._signals.setdefault(key, _Signal(present, rack.now_ns)).windows.append(window)
+        self._windows[measure] = window
