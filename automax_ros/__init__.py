@@ -1,7 +1,7 @@
 """A Reliance Electric AutoMax rack emulated as ROS 2 nodes.
 
 The rooms of the package, ground floor first; each imports only from those before it:
-core, pieces, blocks, logix, language, compile, drive, running, tuning, rack, wire, bags, replay, nodes, cli.
+core, pieces, blocks, logix, language, compile, drive, running, tuning, rack, wire, bags, replay, sweep, nodes, cli.
 Only `nodes` and `cli` know ROS 2; without them this is a plain Python library. A room's names are imported from the
 room: `from automax_ros.rack import Rack, load`.
 """
