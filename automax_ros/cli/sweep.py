@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.native import add_native_arguments, native_forms, tell_native
 from automax_ros.cli.numbers import whole_number
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.rack_arguments import config_of, print_refused
@@ -89,6 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=whole_number, metavar="N", help="processes (default: one for each core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="let a Dask cluster do the runs (docs/sweep.md)")
     parser.add_argument("--json", action="store_true", help="print all runs for programs to read")
+    add_native_arguments(parser)
     add_outside_argument(parser)
 
 
@@ -139,10 +141,13 @@ def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
         measures = (*measures, best)
     stimuli = arguments.stimuli and Stimuli.of(arguments.stimuli, allow_outside=arguments.allow_outside)
     quantities = tuple(item.quantity for item in varied)
-    plan = Plan(Blueprint.of(rack), quantities, measures, arguments.duration, stimuli)
-    _read("--vary", lambda: plan.blueprint.rack(plan.beginning(points[0]).plants))
     if len(points) < _FEW and arguments.jobs is None and where.scheduler is None:
         where = Where(1)
+    native = native_forms(arguments, arguments.duration * len(points) // where.processes)
+    plan = Plan(Blueprint.of(rack, native), quantities, measures, arguments.duration, stimuli)
+    first = _read("--vary", lambda: plan.blueprint.rack(plan.beginning(points[0]).plants))
+    if arguments.verbose:
+        tell_native(first.operations.installation.native.values())
     wanted = Wanted(arguments, rack.installed, measures.index(best), greatest=greatest)
     return _Sweep(plan, points, where, wanted)
 

@@ -22,7 +22,7 @@ _COLOUR, _BEST, _FONT = "#1f4e9c", "#c1272d", 8
 
 @dataclass(frozen=True)
 class _Axis:
-    """A column of the table as numbers: of what is no number, which of its values it is."""
+    """A column of the table as numbers: of other things, which of its values it is."""
 
     label: str
     numbers: list[float]

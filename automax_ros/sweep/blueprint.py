@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.faults import Fault
 from automax_ros.rack.config import RackConfig
@@ -18,16 +19,20 @@ from automax_ros.rack.rack import Rack
 
 @dataclass(frozen=True)
 class Blueprint:
-    """A rack file's text, what the file is called, and the sources of the tasks by name: no file is read again."""
+    """A rack file's text, what the file is called, and the sources of the tasks by name: no file is read again.
+
+    ``native`` says which tasks scan as machine code, which changes no result.
+    """
 
     text: str
     path: str
     sources: tuple[tuple[str, SourceText], ...]
+    native: NativeForms = IN_PYTHON
 
     @classmethod
-    def of(cls, rack: Rack) -> Blueprint:
+    def of(cls, rack: Rack, native: NativeForms = IN_PYTHON) -> Blueprint:
         """Return that of a rack as it is installed."""
-        return cls(rack.config.text, str(rack.config.path), tuple(rack.sources.items()))
+        return cls(rack.config.text, str(rack.config.path), tuple(rack.sources.items()), native)
 
     def rack(self, plants: Mapping[PlantNumber, str]) -> Rack:
         """Return a new rack with some other numbers of its plants.
@@ -52,4 +57,4 @@ def _config(text: str, path: str) -> RackConfig:
 @lru_cache(maxsize=1)
 def _installation(blueprint: Blueprint) -> Installation:
     config = _config(blueprint.text, blueprint.path)
-    return Installation(config, sources=dict(blueprint.sources))
+    return Installation(config, sources=dict(blueprint.sources), native=blueprint.native)

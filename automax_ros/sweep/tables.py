@@ -37,7 +37,7 @@ def write_csv(plan: Plan, rows: Sequence[Row], repeat: Callable[[Row], str], str
 
 
 def write_npz(plan: Plan, rows: Sequence[Row], path: Path) -> None:
-    """Write a NumPy file: an array a column under its heading; measures are float64, NaN where there is none.
+    """Write a NumPy file: an array for each column under its heading; measures are float64, NaN where there is none.
 
     ``names`` are the headings of what varies, ``measures`` those of the measures.
 

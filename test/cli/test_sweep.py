@@ -103,6 +103,15 @@ def test_each_row_is_repeated_by_its_command(sweep, automax, tmp_path):
         assert again["repeat"] == row["repeat"]
 
 
+def test_native_scans_change_no_number(sweep):
+    options = ("--vary", "LOOP.KP=0.3,1.9", "--vary", "REF%=300,-900", "--json", "--verbose")
+    python, native = sweep(*options, "--native", "off"), sweep(*options, "--native", "on")
+    assert python.code == native.code == 0
+    assert native.out == python.out
+    assert python.err == "LOOP: in Python: native scans are off\n"
+    assert native.err.startswith("LOOP: ")
+
+
 def test_a_recorded_run_has_the_same_measures_and_replays(sweep, automax):
     one = ("--vary", "LOOP.KP=1.3", "--vary", "TABLE%(2)=7", "--json")
     plain = sweep(*one)
