@@ -1,4 +1,4 @@
-"""Simulated seconds per wall second of the example rack, without and with recording, and in modeled execution.
+"""Simulated seconds per wall second of the example rack, without and with recording, modeled, and in sweeps.
 
 Prints, fails on none.
 """
@@ -7,35 +7,71 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from automax_ros.bags.recorder import Recorder
+from automax_ros.core.ticks import seconds_ns
+from automax_ros.pieces.piece import Where
 from automax_ros.rack.config import RackConfig, Timing
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.sweep.blueprint import Blueprint
+from automax_ros.sweep.measures import read_measures
+from automax_ros.sweep.points import grid, read_varied
+from automax_ros.sweep.run import Plan, run_points
+from automax_ros.sweep.sweeping import run_sweep
 from automax_ros.wire.stream import RackStream
 
 CONFIG = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
 SECONDS = 60
 REPEATS = 3
+SWEEP_RUNS, SWEEP_SECONDS, MORE = 30, 2, 40
 
 
-def run(config: RackConfig, folder: Path | None) -> float:
+def run(config: RackConfig, folder: Path | None, seconds: float = SECONDS) -> float:
     """Run the rack and return the wall time in seconds, from the start of the rack to the closed bag."""
     rack = Rack(config)
     began = time.perf_counter()
     if folder is None:
         rack.start()
-        rack.run(SECONDS)
+        rack.run(seconds)
     else:
         stream = RackStream(rack, rack.fingerprint)
         recorder = Recorder(rack, stream, folder)
         stream.begin()
         rack.start()
-        rack.run(SECONDS)
+        rack.run(seconds)
         stream.end()
         recorder.close()
+    return time.perf_counter() - began
+
+
+def sweeps(config: RackConfig) -> None:
+    """Print how many short runs of the rack a sweep makes in a second, next to racks that are built and run alone."""
+    rack = Rack(config)
+    varied = read_varied(rack, f"SPEED.KP_SPEED=5:80:{SWEEP_RUNS}")
+    duration_ns = seconds_ns(SWEEP_SECONDS)
+    measures = read_measures("rms(SPEED_ERR%) settle(SPEED_FDBK%, 2 %) max(CUR_REF%)", config, duration_ns)
+    plan = Plan(Blueprint.of(rack), (varied.quantity,), measures, duration_ns)
+    points = grid([varied])
+    run_points(plan, points[:1])
+    here = min(taken(lambda: run_points(plan, points)) for _ in range(REPEATS)) / len(points)
+    alone = min(taken(lambda: run(config, None, SWEEP_SECONDS)) for _ in range(3 * REPEATS))
+    print(
+        f"sweep: {1 / here:.0f} runs of {SWEEP_SECONDS} s a second, {alone / here:.1f} times as many as racks ", end=""
+    )
+    print(f"that are each compiled ({1 / alone:.0f}); {SWEEP_SECONDS / here:.0f} x real time")
+    many = points * MORE
+    pair = min(taken(lambda: run_sweep(plan, many, Where(2))) for _ in range(REPEATS)) / len(many)
+    print(f"sweep with two jobs, their start counted: {here / pair:.2f} times one job")
+
+
+def taken(work: Callable[[], object]) -> float:
+    """Return the wall time of work, s."""
+    began = time.perf_counter()
+    work()
     return time.perf_counter() - began
 
 
@@ -59,6 +95,7 @@ def main() -> None:
     print(f"modeled execution  {SECONDS / modeled:7.0f} x real time, {scan_us:6.1f} us per scan; ", end="")
     print(f"{modeled / plain:.2f} times as long as ideal; wanted: at most 3")
     print(f"bag: {size / 1e6:.2f} MB, {size / SECONDS / rate:.0f} bytes per scan")
+    sweeps(config)
 
 
 if __name__ == "__main__":
