@@ -12,6 +12,7 @@ from automax_ros.core.types import Latched, Value
 from automax_ros.running.backplane import BUS_ERROR, Backplane
 from automax_ros.running.error_log import ErrorLog
 from automax_ros.running.events import Events
+from automax_ros.running.image import Image
 from automax_ros.running.printing import format_print
 from automax_ros.running.scan_record import ScanRecord
 from automax_ros.running.views import LatchPlan
@@ -76,7 +77,9 @@ class TaskIo:
 
     def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
         """Bind a task and the memory that its scans work on."""
-        self.latch: Callable[[], Latched] = partial(memory.latch, task.plan)
+        self.latch: Callable[[], Latched] = (
+            memory.latching(task.plan) if isinstance(memory, Image) else partial(memory.latch, task.plan)
+        )
         self.read_now = memory.read_now
         self._memory, self._writer, self._task = memory, task.writer, task
         self._backplane, self._hear = task.backplane, hear

@@ -133,7 +133,8 @@ def _run(command: Sequence[str], environment: dict[str, str], text: str, limit_s
             raise NotNative(f"{command[0]} has not ended within {limit_s:g} s") from error
         raise
     if process.returncode:
-        told = (complaints.strip().splitlines() or [f"exit code {process.returncode}"])[0]
+        lines = complaints.strip().splitlines() or [f"exit code {process.returncode}"]
+        told = next((line for line in lines if "error" in line), lines[0])
         raise NotNative(f"{command[0]} fails: {told[:_MESSAGE]}")
     return said
 

@@ -15,7 +15,6 @@ import hashlib
 import os
 import secrets
 import stat
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,22 +120,22 @@ class NativeCache:
 
     def _make_room(self, folder: int, kept: str) -> None:
         """Remove what killed processes have left, then the oldest libraries until the others fit."""
-        total = 0
-        for _, size, name in sorted(_libraries(folder), reverse=True):
+        total, now = 0, os.stat(kept, dir_fd=folder).st_mtime
+        for _, size, name in sorted(_libraries(folder, now), reverse=True):
             total += size
             if total > self.most_bytes and name != kept:
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(name, dir_fd=folder)
 
 
-def _libraries(folder: int) -> Iterator[tuple[float, int, str]]:
-    """Yield time, size and name of each library; remove what is unfinished and old."""
+def _libraries(folder: int, now: float) -> Iterator[tuple[float, int, str]]:
+    """Yield time, size and name of each library; remove what is unfinished and old; ``now`` as files have it, s."""
     for name in os.listdir(folder):
         with contextlib.suppress(FileNotFoundError):
             known = os.stat(name, dir_fd=folder, follow_symlinks=False)
             if name.endswith(_ENDING):
                 yield known.st_mtime, known.st_size, name
-            elif name.endswith(_UNFINISHED) and known.st_mtime < time.time() - STALE_S:
+            elif name.endswith(_UNFINISHED) and known.st_mtime < now - STALE_S:
                 os.unlink(name, dir_fd=folder)
 
 
