@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ast
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from automax_ros.blocks.declaration import HELPERS
 from automax_ros.compile import build
@@ -13,6 +14,15 @@ from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.functions import BUILTINS, OPERATIONS
 from automax_ros.compile.layout import Role, StateField
 from automax_ros.language.program import Symbol
+
+
+@dataclass(frozen=True)
+class Form:
+    """One of a task's functions as a tree, its statements with their BASIC lines; what it calls, and its commons."""
+
+    function: ast.FunctionDef
+    known: Mapping[str, object]
+    views: Mapping[str, int]
 
 
 @contextmanager

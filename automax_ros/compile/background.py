@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from typing import cast
 
 from automax_ros.compile import build
-from automax_ros.compile.assembly import called, local_field, made, stores
+from automax_ros.compile.assembly import Form, called, local_field, made, stores
 from automax_ros.compile.cost import CostModel
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.flow import PC
@@ -59,6 +59,10 @@ class BackgroundCompilation:
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
         """Return the functions as trees."""
         return [self._function(name)[0] for name in names]
+
+    def form(self, name: str) -> Form:
+        """Return one of the functions for translation into another language."""
+        return Form(self.definitions(name)[0], dict(self._globals), self._views)
 
     def line_form(self) -> LineForm:
         """Compile the form that yields before each BASIC line."""

@@ -31,7 +31,7 @@ from functools import cached_property, partial
 from typing import Protocol, cast
 
 from automax_ros.compile import build
-from automax_ros.compile.assembly import called, local_field, made, stores
+from automax_ros.compile.assembly import Form, called, local_field, made, stores
 from automax_ros.compile.background import BackgroundCompilation
 from automax_ros.compile.calls import BlockInstance, instance_of
 from automax_ros.compile.cost import CostModel
@@ -62,6 +62,10 @@ class Compilation(Protocol):
 
     def definitions(self, *names: str) -> list[ast.FunctionDef]:
         """Return some of the functions as trees."""
+        ...
+
+    def form(self, name: str) -> Form:
+        """Return one of the functions for translation into another language."""
         ...
 
     def line_form(self) -> LineForm:
@@ -135,6 +139,10 @@ class CompiledTask:
         """One scan, or a BASIC task's burst, line by line, for stepping."""
         return self._compilation.line_form()
 
+    def form(self, name: str) -> Form:
+        """Return one of the functions for translation into another language."""
+        return self._compilation.form(name)
+
     @cached_property
     def source(self) -> str:
         """The functions as text."""
@@ -205,6 +213,11 @@ class _Compilation:
         """Lower some of the three functions; the state's fields are known when ``scans`` was among them."""
         parts = [self._function(name) for name in names]
         return [self._wrapped(*part) for part in parts]
+
+    def form(self, name: str) -> Form:
+        """Return one of the functions for translation into another language."""
+        function = self.definitions(name)[0]
+        return Form(function, dict(self._globals), self._views)
 
     def line_form(self) -> LineForm:
         """Compile the form that yields before each line; it heeds forces."""

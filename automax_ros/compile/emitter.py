@@ -52,7 +52,9 @@ class Emitter:
     _overflows: bool = False
 
     def emit(self, *statements: ast.stmt) -> None:
-        """Append statements to the current suite."""
+        """Append statements to the current suite, as those of the present BASIC line."""
+        for statement in statements:
+            statement.lineno = self.line
         self.body.extend(statements)
 
     @contextmanager

@@ -32,8 +32,16 @@ typedef union {
 enum { AUTOMAX_BOOLEAN = 0, AUTOMAX_INTEGER = 1, AUTOMAX_REAL = 2 };
 
 /* How a scan ends: at END, by STOP, with too many statements (too_long_line is set), or because a function of the host
- * said so (it returned something other than 0), or because the room of a call by columns is used up. */
-enum { AUTOMAX_DONE = 0, AUTOMAX_STOPPED = 1, AUTOMAX_TOO_LONG = 2, AUTOMAX_BROKEN_OFF = 3, AUTOMAX_FULL = 4 };
+ * said so (it returned something other than 0), or because the room of a call by columns is used up, or where Python
+ * raises an exception of its own: a REAL that is not a number made an integer, a division by zero. */
+enum {
+    AUTOMAX_DONE = 0,
+    AUTOMAX_STOPPED = 1,
+    AUTOMAX_TOO_LONG = 2,
+    AUTOMAX_BROKEN_OFF = 3,
+    AUTOMAX_FULL = 4,
+    AUTOMAX_FAULT = 5
+};
 
 /* What a scan may touch besides; each function returns 0, or something else when the scan is to be broken off. */
 typedef struct automax_host automax_host;

@@ -1,0 +1,181 @@
+"""One function under translation: its names, its lines, its calls."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import contextmanager
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from automax_ros.compile.native import expressions, refinement
+from automax_ros.compile.native.context import Environment
+from automax_ros.compile.native.ranges import Kind, Range, span
+from automax_ros.compile.native.source import NotNative
+from automax_ros.compile.native.typed import WIDE, Typed, bare, c_type, literal
+from automax_ros.compile.native.unit import Unit
+
+
+@dataclass(frozen=True)
+class Array:
+    """A buffer of the state: its place in C, and the number of its elements. Their range is that of its name."""
+
+    place: str
+    size: int
+
+
+Member = Callable[["Frame", ast.Call, Environment], list[Typed]]
+"""Translates a call of ``io``."""
+
+Caller = Callable[["Frame", object, ast.Call, Environment], list[Typed]]
+"""Translates a call of a Python function."""
+
+
+@dataclass
+class Frame:
+    """A function in the making.
+
+    ``fields`` are the places in C of scalar fields of the state, ``arrays`` its buffers, ``tuples`` named constants;
+    ``scope`` are the globals of a Python function, ``members`` what calls of ``io`` become.
+    """
+
+    unit: Unit
+    scope: Mapping[str, object]
+    caller: Caller
+    members: Mapping[str, Member] = field(default_factory=dict)
+    fields: dict[str, str] = field(default_factory=dict)
+    field_kinds: dict[str, Kind] = field(default_factory=dict)
+    arrays: dict[str, Array] = field(default_factory=dict)
+    tuples: dict[str, list[object]] = field(default_factory=dict)
+    locals: dict[str, str] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
+    returned: list[list[Range]] = field(default_factory=list)
+    is_scan: bool = False
+    asks_end: bool = False
+    can_end: bool = False
+    depth: int = 1
+    loops: dict[int, Environment] = field(default_factory=dict)
+    _kinds: dict[str, dict[Kind, str]] = field(default_factory=dict)
+    _wide: set[str] = field(default_factory=set)
+    _temporaries: int = 0
+
+    def emit(self, text: str) -> None:
+        """Append a line."""
+        self.lines.append("    " * self.depth + text)
+
+    @contextmanager
+    def indented(self) -> Iterator[None]:
+        """Indent the lines inside."""
+        self.depth += 1
+        yield
+        self.depth -= 1
+
+    def begin_again(self) -> None:
+        """Forget the lines: the function is translated once more, with what is now known of its names."""
+        self.lines.clear()
+        self.returned.clear()
+        self._temporaries = 0
+
+    # Names
+
+    def store(self, name: str, item: Typed, known: Environment) -> None:
+        """Emit the store of a value into a variable."""
+        kind = item.range.kind
+        c_type(item.range)
+        assert kind is not None
+        self.emit(f"{self._place(name, item.range)} = {bare(item.text)};")
+        known[name] = item.range
+
+    def _place(self, name: str, known: Range) -> str:
+        assert known.kind is not None
+        if name in self.fields:
+            if known.kind is not self.field_kinds[name] or known.is_wide:
+                raise NotNative(f"{name} would hold a value of another kind than its own")
+            return self.fields[name]
+        kinds = self._kinds.setdefault(name, {})
+        place = kinds.setdefault(known.kind, name if not kinds else f"{name}_as_{known.kind.name.lower()}")
+        if known.is_wide:
+            self._wide.add(place)
+        self.locals[place] = WIDE if place in self._wide else known.kind.value
+        return place
+
+    def parameter(self, name: str, known: Range) -> None:
+        """Take a parameter of the function."""
+        self._place(name, known)
+
+    def temporary(self, known: Range) -> str:
+        """Return the name of a new local that holds a result."""
+        self._temporaries += 1
+        name = f"result{self._temporaries}_{'' if known.kind is None else known.kind.name[0].lower()}"
+        self.locals[name] = c_type(known)
+        return name
+
+    def read(self, name: str, known: Environment) -> Typed:
+        """Return a variable, or a constant of the module."""
+        present = known.get(name)
+        if present is None:
+            if name in self.scope:
+                return literal(self.scope[name])
+            raise NotNative(f"{name} may have no value")
+        c_type(present)
+        only = present.only
+        if only is not None and present.kind is Kind.BOOL:
+            return Typed("true" if only else "false", present)
+        place = self._place(name, present)
+        return Typed(f"(int64_t){place}" if place in self._wide and not present.is_wide else place, present)
+
+    def attribute(self, node: ast.Attribute) -> object:
+        """Return a constant of a module, such as ``math.pi``."""
+        base = self.scope.get(node.value.id) if isinstance(node.value, ast.Name) else None
+        if base is None:
+            raise NotNative(f"a member {node.attr}")
+        return getattr(base, node.attr)
+
+    def element(self, name: str, index: ast.expr, known: Environment) -> Typed:
+        """Return an element of an array or of a named tuple of constants."""
+        if name in self.tuples:
+            return self.constants(self.tuples[name], index, known)
+        array = self.arrays.get(name)
+        if array is None:
+            raise NotNative(f"an element of {name}")
+        return Typed(f"{array.place}[{bare(self.place_in(array.size, index, known))}]", known[name])
+
+    def place_in(self, size: int, index: ast.expr, known: Environment) -> str:
+        """Return an index that surely lies inside."""
+        place = self.value(index, known)
+        if not place.range.is_whole or place.range.low < 0 or place.range.high >= size:
+            raise NotNative("an index that cannot be shown to lie inside")
+        return place.text
+
+    def constants(self, values: Sequence[object], index: ast.expr, known: Environment) -> Typed:
+        """Return an element of a tuple of constants."""
+        items = [literal(value) for value in values]
+        place = self.place_in(len(items), index, known)
+        return self.unit.table(items, bare(place), span(item.range for item in items))
+
+    # Expressions
+
+    def value(self, node: ast.expr, known: Environment) -> Typed:
+        """Return an expression in C."""
+        return expressions.value(self, node, known)
+
+    def refined(self, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
+        """Return what is known where a test came out as ``truth``; None where it cannot."""
+        return refinement.refined(self, test, known, truth=truth)
+
+    def call(self, node: ast.Call, known: Environment) -> list[Typed]:
+        """Return the results of a call."""
+        function = node.func
+        if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+            if function.value.id == "io":
+                return self.members[function.attr](self, node, known)
+            base = self.scope.get(function.value.id)
+            return self.caller(self, getattr(base, function.attr), node, known)
+        if isinstance(function, ast.Name) and function.id in self.scope:
+            return self.caller(self, self.scope[function.id], node, known)
+        raise NotNative("a call of what is not known")
+
+    def ended(self) -> str:
+        """Return the argument by which a function says that the scan ends here; the statement then asks for it."""
+        self.asks_end = self.can_end = True
+        return "ended"

@@ -1,0 +1,135 @@
+"""What is known of a value at a place of a task: its kind, and the least and the most it can be.
+
+A REAL's range leaves out what is not a number: whatever makes an integer of a REAL asks for that when it runs.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from automax_ros.core.numbers import INT32_MAX, REAL_LIMIT
+from automax_ros.core.types import DataType
+
+
+class Kind(enum.Enum):
+    """What Python holds a value as; the value is the type in C."""
+
+    BOOL = "bool"
+    INT = "int64_t"
+    REAL = "double"
+
+
+INT64_MAX = 2**63 - 1
+EXACT_IN_DOUBLE = 2**53
+"""Every whole number up to this is a double; beyond, C and Python compare an integer with a double differently."""
+INFINITE = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """A kind, and bounds that the value keeps; of one that differs from path to path ``kind`` is None."""
+
+    kind: Kind | None
+    low: float
+    high: float
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether Python computes with it as with an integer."""
+        return self.kind is Kind.INT or self.kind is Kind.BOOL
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether an integer of it needs more than 64 bits."""
+        return self.kind is Kind.INT and (self.low < -INT64_MAX or self.high > INT64_MAX)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether each of its values is a double."""
+        return self.kind is Kind.REAL or (self.low >= -EXACT_IN_DOUBLE and self.high <= EXACT_IN_DOUBLE)
+
+    @property
+    def only(self) -> float | None:
+        """The one integer or boolean that it can be, None where there are several."""
+        return self.low if self.is_whole and self.low == self.high else None
+
+    def holds(self, other: Range) -> bool:
+        """Return whether another range lies within this one."""
+        return self.kind is other.kind and self.low <= other.low and other.high <= self.high
+
+    def joined(self, other: Range) -> Range:
+        """Return what a value is that comes from one of two paths."""
+        if self == other:
+            return self
+        kind = self.kind if self.kind is other.kind else None
+        return Range(kind, min(self.low, other.low), max(self.high, other.high))
+
+    def widened(self, new: Range) -> Range:
+        """Return a range that holds both, with bounds that move in few steps only, so that loops come to an end."""
+        both = self.joined(new)
+        if both == self or both.kind is None or both.kind is Kind.BOOL:
+            return both
+        steps = _REAL_STEPS if both.kind is Kind.REAL else _INTEGER_STEPS
+        low = self.low if both.low >= self.low else _beyond(steps, both.low)
+        high = self.high if both.high <= self.high else _beyond(steps, both.high)
+        return Range(both.kind, low, high)
+
+
+ANY_REAL = Range(Kind.REAL, -INFINITE, INFINITE)
+ANY_BOOL = Range(Kind.BOOL, 0, 1)
+UNBOUNDED = Range(Kind.INT, -INFINITE, INFINITE)
+
+_INTEGER_STEPS: tuple[float, ...] = (
+    0, 1, 15, 255, 32767, 32768, 65535, 2**17, 2**24, INT32_MAX, 2**31, 2**33, 2**40, 2**48, 2**53, 2**62, 2**100,
+    INFINITE,
+)  # fmt: skip
+_REAL_STEPS: tuple[float, ...] = (
+    0.0, 1.0, 8191.0, 16383.0, 32767.0, 32768.0, 65536.0, 2.0**31, 2.0**40, 2.0**53, REAL_LIMIT, 1e30, 1e100, INFINITE,
+)  # fmt: skip
+
+
+def _beyond(steps: tuple[float, ...], bound: float) -> float:
+    """Return the first step that lies as far from 0 as a bound."""
+    found = next(step for step in steps if step >= abs(bound))
+    return found if bound >= 0 else -found
+
+
+def exactly(value: float) -> Range:
+    """Return the range of a literal."""
+    kind = Kind.BOOL if isinstance(value, bool) else Kind.INT if isinstance(value, int) else Kind.REAL
+    return ANY_REAL if math.isnan(value) else Range(kind, value, value)
+
+
+def of_type(kind: DataType) -> Range:
+    """Return the range of a variable of a type; not of a string."""
+    if kind is DataType.BOOLEAN:
+        return ANY_BOOL
+    if kind is DataType.REAL:
+        return ANY_REAL
+    low, high = kind.range
+    return Range(Kind.INT, int(low), int(high))
+
+
+def corners(left: Range, right: Range, operation: Callable[[float, float], float], *, real: bool) -> Range:
+    """Return the range of an operation that grows or falls with each of its operands."""
+    pairs = [(a, b) for a in (left.low, left.high) for b in (right.low, right.high)]
+    kind = Kind.REAL if real else Kind.INT
+    try:
+        results = [operation(float(a), float(b)) if real else operation(a, b) for a, b in pairs]
+    except (OverflowError, ZeroDivisionError):
+        return Range(kind, -INFINITE, INFINITE)
+    if any(math.isnan(result) for result in results):
+        return Range(kind, -INFINITE, INFINITE)
+    return Range(kind, min(results), max(results))
+
+
+def span(ranges: Iterable[Range]) -> Range:
+    """Return what holds several ranges."""
+    found: Range | None = None
+    for item in ranges:
+        found = item if found is None else found.joined(item)
+    assert found is not None
+    return found

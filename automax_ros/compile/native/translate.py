@@ -1,0 +1,151 @@
+"""Translation of a task's scans to C, from the Python that the compiler makes of them.
+
+The integers of Python have any size; C's have 64 bits, or 128. So the ranges of all values are followed through the
+scan, from what each variable can hold, and through as many scans as it takes until nothing new comes up: where an
+integer cannot be shown to fit, the task is not native. Doubles need no proof, but for where integers are made of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+
+from automax_ros.compile.compiler import CompiledTask
+from automax_ros.compile.layout import Layout, Role, StateField
+from automax_ros.compile.native.calls import called
+from automax_ros.compile.native.context import Environment
+from automax_ros.compile.native.frame import Array, Frame
+from automax_ros.compile.native.members import members
+from automax_ros.compile.native.ranges import INFINITE, Range, exactly, of_type
+from automax_ros.compile.native.scan_body import ScanBody, scan_of, state_names
+from automax_ros.compile.native.source import NativeSource, NotNative
+from automax_ros.compile.native.typed import whole_text
+from automax_ros.compile.native.unit import Unit
+from automax_ros.core.types import DataType, type_of_name
+
+MOST_ROUNDS = 60
+"""Translations of a scan, each for a wider range of states, before a task counts as one whose integers have no bounds;
+a state takes a few."""
+_VARIABLES = (Role.LOCAL, Role.TUNABLE)
+
+
+def translate(compiled: CompiledTask) -> NativeSource:
+    """Return the C of a task's scans.
+
+    Raises:
+        NotNative: the task is a BASIC task or a drive's, or has a statement that C cannot carry out to the same bits.
+    """
+    if compiled.program.is_basic:
+        raise NotNative("a BASIC task")
+    if compiled.program.cml is not None:
+        raise NotNative("the current minor loop of a drive", compiled.program.cml.line)
+    texts = [field.name for field in compiled.layout.fields if field.type is DataType.STRING]
+    if texts:
+        raise NotNative(f"the string {texts[0]}")
+    return _Translation(compiled).source()
+
+
+class _Translation:
+    def __init__(self, compiled: CompiledTask) -> None:
+        self._compiled, self._layout = compiled, compiled.layout
+        form = compiled.form("scans_forced")
+        tuples, self._statements = scan_of(form.function)
+        types = {view: type_of_name(name) for name, view in form.views.items()}
+        self._names = state_names(form.function)
+        fields = dict(zip(self._names, self._layout.fields, strict=True))
+        scalars = {name: field for name, field in fields.items() if not field.is_array}
+        self._frame = Frame(
+            Unit(),
+            form.known,
+            called,
+            members=members(types),
+            fields={name: f"s->{name}" for name in scalars},
+            field_kinds={name: kind for name in scalars if (kind := of_type(scalars[name].type).kind) is not None},
+            arrays={name: Array(f"s->{name}", field.size) for name, field in fields.items() if field.is_array},
+            tuples=tuples,
+            is_scan=True,
+        )
+        self._latched = [of_type(type_of_name(name)) for name in compiled.latched]
+
+    def source(self) -> NativeSource:
+        """Return the text and what it takes for granted."""
+        known = self._settled()
+        limits = tuple((known[name].low, known[name].high) for name in self._names)
+        return NativeSource(self._compiled.program.name, self._text(), limits)
+
+    def _settled(self) -> Environment:
+        """Translate until no scan leaves a state that was not thought of before it; return what a state can hold."""
+        body = ScanBody(self._frame, self._latched, self._compiled.written)
+        known = {name: _at_first(field) for name, field in zip(self._names, self._layout.fields, strict=True)}
+        for _ in range(MOST_ROUNDS):
+            self._frame.begin_again()
+            after = body.execute(self._statements, dict(known)) or known
+            grown = [name for name in self._names if not known[name].holds(after[name])]
+            if not grown:
+                return known
+            for name, field in zip(self._names, self._layout.fields, strict=True):
+                if name in grown and field.role in _VARIABLES:
+                    raise NotNative(f"{field.name} may be left with a value beyond its type")
+            known = {name: known[name].widened(after[name]) for name in self._names}
+        raise NotNative("a state that has no bounds")
+
+    def _text(self) -> str:
+        frame = self._frame
+        declared = [f"    {kind} {place};" for place, kind in frame.locals.items()]
+        return "\n".join(
+            [
+                _part("abi.h"),
+                _part("operations.h"),
+                _part("host_calls.h"),
+                f"/* The state of {self._compiled.program.name}, as its layout has it. */",
+                *_structure(self._names, self._layout),
+                "",
+                f"#define AUTOMAX_LATCHED {len(self._latched)}",
+                f"#define AUTOMAX_WRITTEN {len(self._compiled.written)}",
+                _limits("latched_low", [item.low for item in self._latched]),
+                _limits("latched_high", [item.high for item in self._latched]),
+                "",
+                *frame.unit.parts,
+                "",
+                "/* One scan, from SCAN_LOOP to END: k is its place in the columns. */",
+                "static int scan(state *restrict s, const automax_slot *const *latched, automax_slot *const *out,",
+                "                int64_t k, const int64_t *forced, automax_host *host) {",
+                "    int ended_by = AUTOMAX_DONE;",
+                "    int *const ended = &ended_by;",
+                *declared,
+                *frame.lines,
+                "}",
+                "",
+                _part("columns.h"),
+            ]
+        )
+
+
+def _at_first(field: StateField) -> Range:
+    """Return what a field is known to hold before the first scan: of a variable all that its type does."""
+    if field.role in _VARIABLES:
+        return of_type(field.type)
+    assert not isinstance(field.initial, str)
+    return exactly(field.initial)
+
+
+@cache
+def _part(name: str) -> str:
+    """Return a text that is the same for all tasks."""
+    return files("automax_ros.compile.native").joinpath(name).read_text(encoding="utf-8")
+
+
+def _structure(names: Sequence[str], layout: Layout) -> list[str]:
+    lines = ["typedef struct {"]
+    for name, field in zip(names, layout.fields, strict=True):
+        kind = "double" if field.type is DataType.REAL else "int64_t"
+        lines.append(f"    {kind} {name}{f'[{field.size}]' if field.is_array else ''}; /* {field.name} */")
+    if not names:
+        lines.append("    int64_t nothing;")
+    return [*lines, "} state;"]
+
+
+def _limits(name: str, bounds: Sequence[float]) -> str:
+    texts = [whole_text(int(bound)) if abs(bound) != INFINITE else "0" for bound in bounds]
+    return f"static const int64_t {name}[] = {{{', '.join([*texts, '0'])}}};"
