@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from automax_ros.compile.native.forms import NativeForms, NativeMode, NativeOutcome
     from automax_ros.compile.native.source import NativeSource, NotNative
     from automax_ros.compile.native.task import NativeTask, native_form
+    from automax_ros.compile.native.translate import translate
 
 __all__ = [
     "BesideLatch",
@@ -24,6 +25,7 @@ __all__ = [
     "NativeTask",
     "NotNative",
     "native_form",
+    "translate",
 ]
 
-__getattr__ = face(__name__, "source", "executed", "cache", "task", "forms")
+__getattr__ = face(__name__, "source", "executed", "cache", "task", "forms", "translate")

@@ -11,6 +11,7 @@ import inspect
 import math
 import textwrap
 from collections.abc import Callable
+from functools import cache
 from types import FunctionType
 
 from automax_ros.compile import functions
@@ -22,19 +23,18 @@ from automax_ros.compile.native.ranges import (
     ANY_REAL,
     INFINITE,
     INT64_MAX,
-    UNBOUNDED,
     Kind,
     Range,
-    exactly,
     span,
 )
 from automax_ros.compile.native.source import NotNative
 from automax_ros.compile.native.statements import Body
-from automax_ros.compile.native.typed import Typed, as_real, bare, c_type
+from automax_ros.compile.native.typed import Typed, as_real, bare, c_type, literal
 from automax_ros.core.numbers import INT32_MAX, INT32_MIN, REAL_MAX, stored_real
 
+_MOST = 2.0**126
+"""Largest magnitude of a REAL whose integer is computed; one beyond it ends the scan. No REAL variable comes near."""
 Carry = Callable[[Frame, list[Typed]], list[Typed]]
-
 
 
 def called(frame: Frame, function: object, node: ast.Call, known: Environment) -> list[Typed]:
@@ -60,8 +60,9 @@ def _translated(frame: Frame, function: FunctionType, arguments: list[Typed]) ->
     if parsed.args.vararg is not None:
         raise NotNative("coefficients that change while the task runs")
     parameters = [argument.arg for argument in parsed.args.args]
-    arguments = arguments + [_default(value) for value in (function.__defaults__ or ())[len(arguments) - len(parameters) :]]
-    arguments = [_of_annotation(item, given.annotation) for given, item in zip(parsed.args.args, arguments, strict=True)]
+    missing = len(parameters) - len(arguments)
+    arguments = [*arguments, *map(literal, (function.__defaults__ or ())[-missing:] if missing else ())]
+    arguments = [_of_annotation(item, given) for given, item in zip(parsed.args.args, arguments, strict=True)]
     exact = _frame_of(frame, function, parsed, [item.range for item in arguments])
     general = _frame_of(frame, function, parsed, [_general(item.range) for item in arguments])
     results = _results(exact)
@@ -72,20 +73,20 @@ def _translated(frame: Frame, function: FunctionType, arguments: list[Typed]) ->
     return _delivered(frame, name, [bare(item.text) for item in arguments], results, can_end=general.can_end)
 
 
-def _default(value: object) -> Typed:
-    assert isinstance(value, (int, float))
-    return Typed(repr(value), exactly(value))
-
-
+@cache
 def _parsed(function: FunctionType) -> ast.FunctionDef:
     parsed = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
     if not isinstance(parsed, ast.FunctionDef):
         raise NotNative(f"a call of {function.__name__}")
+    for node in ast.walk(parsed):
+        if isinstance(node, ast.stmt):
+            node.lineno = 0  # the lines of a task are meant where something cannot be translated
     return parsed
 
 
-def _of_annotation(item: Typed, annotation: ast.expr | None) -> Typed:
+def _of_annotation(item: Typed, parameter: ast.arg) -> Typed:
     """Return an argument as the parameter's annotation has it: an integer for a float is the same number."""
+    annotation = parameter.annotation
     wanted = annotation.id if isinstance(annotation, ast.Name) else ""
     if wanted == "float":
         return as_real(item)
@@ -112,7 +113,11 @@ def _frame_of(frame: Frame, function: FunctionType, parsed: ast.FunctionDef, ran
     known = dict(zip((argument.arg for argument in parsed.args.args), ranges, strict=True))
     for name, item in known.items():
         made.parameter(name, item)
-    if Body(made).execute(parsed.body, known) is not None:
+    try:
+        left = Body(made).execute(parsed.body, known)
+    except NotNative as error:
+        raise NotNative(f"{error.reason}, in {function.__name__}") from None
+    if left is not None:
         raise NotNative(f"{function.__name__} ends without a result")
     return made
 
@@ -165,8 +170,9 @@ def _rounding(carry_out: Callable[[float], int], function: str) -> Carry:
         item = arguments[0]
         if item.range.is_whole:
             return [item.whole]
-        if INFINITE in (-item.range.low, item.range.high):
-            return [Typed("", UNBOUNDED)]
+        if item.range.low < -_MOST or item.range.high > _MOST:
+            known = Range(Kind.INT, -int(_MOST), int(_MOST))
+            return [Typed(f"{function}_wide({bare(item.text)}, {frame.ended()})", known)]
         result = Range(Kind.INT, carry_out(item.range.low), carry_out(item.range.high))
         wide = "_wide" * result.is_wide
         return [Typed(f"{function}{wide}({bare(item.text)}, {frame.ended()})", result)]
@@ -201,8 +207,10 @@ def _truth(_: Frame, arguments: list[Typed]) -> list[Typed]:
 
 def _stored_real(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     item = as_real(arguments[0])
-    stored = [stored_real(bound)[0] if abs(bound) != INFINITE else math.copysign(REAL_MAX, bound) for bound in
-              (item.range.low, item.range.high)]
+    stored = [
+        stored_real(bound)[0] if abs(bound) != INFINITE else math.copysign(REAL_MAX, bound)
+        for bound in (item.range.low, item.range.high)
+    ]
     # not a number becomes 0
     result = Range(Kind.REAL, min(0.0, stored[0]), max(0.0, stored[1]))
     return _delivered(frame, "stored_real", [bare(item.text)], [result, ANY_BOOL], can_end=False)

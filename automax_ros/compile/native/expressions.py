@@ -9,7 +9,16 @@ from typing import Any
 
 from automax_ros.compile.folding import value_of
 from automax_ros.compile.native.context import Context, Environment
-from automax_ros.compile.native.ranges import ANY_BOOL, ANY_REAL, INFINITE, Kind, Range, corners, exactly
+from automax_ros.compile.native.ranges import (
+    ANY_BOOL,
+    ANY_REAL,
+    EXACT_IN_DOUBLE,
+    INFINITE,
+    Kind,
+    Range,
+    corners,
+    exactly,
+)
 from automax_ros.compile.native.source import NotNative
 from automax_ros.compile.native.typed import WIDE, Typed, as_real, bare, c_type, literal, widened
 
@@ -92,6 +101,8 @@ def _wide_or_signed(left: Typed, result: Range, *others: Typed) -> str:
 def _binary(frame: Context, node: ast.BinOp, known: Environment) -> Typed:
     left, right = value(frame, node.left, known), value(frame, node.right, known)
     kind = type(node.op)
+    if kind is ast.Pow and left.range.only is not None and right.range.only is not None:
+        return literal(int(left.range.only) ** int(right.range.only))
     real = Kind.REAL in (left.range.kind, right.range.kind)
     if (left.mixed or right.mixed) and not (kind is ast.Add and real):
         raise NotNative("arithmetic with what is an integer or a REAL")
@@ -144,7 +155,9 @@ def _quotient(frame: Context, left: Typed, right: Typed) -> Typed:
     top, bottom = as_real(left), as_real(right)
     if bottom.range.low <= 0.0 <= bottom.range.high:
         return Typed(f"divided({top.text}, {bottom.text}, {frame.ended()})", ANY_REAL)
-    return Typed(f"({_operand(left)} / {_operand(right)})", corners(top.range, bottom.range, operator.truediv, real=True))
+    return Typed(
+        f"({_operand(left)} / {_operand(right)})", corners(top.range, bottom.range, operator.truediv, real=True)
+    )
 
 
 def _not_zero(right: Typed) -> None:
@@ -197,9 +210,17 @@ def _compare(frame: Context, node: ast.Compare, known: Environment) -> Typed:
 
 
 def _relation(left: Typed, sign: str, right: Typed) -> str:
-    if Kind.REAL in (left.range.kind, right.range.kind) and not (left.range.is_exact and right.range.is_exact):
+    pairs = ((left.range, right.range), (right.range, left.range))
+    if Kind.REAL in (left.range.kind, right.range.kind) and not any(_compares(*pair) for pair in pairs):
         raise NotNative("a REAL compared with an integer beyond 53 bits")
     return f"({left.text} {sign} {right.text})"
+
+
+def _compares(whole: Range, real: Range) -> bool:
+    """Return whether an integer compares with a REAL as the double next to it does."""
+    if whole.is_exact:
+        return real.is_exact
+    return real.kind is Kind.REAL and real.low > -EXACT_IN_DOUBLE and real.high < EXACT_IN_DOUBLE
 
 
 def _bool_op(frame: Context, node: ast.BoolOp, known: Environment) -> Typed:
@@ -213,9 +234,9 @@ def _bool_op(frame: Context, node: ast.BoolOp, known: Environment) -> Typed:
     if all(item.range.kind is Kind.BOOL for item in operands):
         return Typed(f"({(' && ' if both else ' || ').join(item.text for item in operands)})", ANY_BOOL)
     text, result = _branch(operands[-1]), operands[-1].range
-    for item in reversed(operands[:-1]):
-        text = f"({item.text} ? {text} : {item.text})" if both else f"({item.text} ? {item.text} : {text})"
-        result = result.joined(item.range)
+    for before in reversed(operands[:-1]):
+        text = f"({before.text} ? {text} : {before.text})" if both else f"({before.text} ? {before.text} : {text})"
+        result = result.joined(before.range)
     return Typed(text, result)
 
 

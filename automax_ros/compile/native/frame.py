@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping, Sequence
+import builtins
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from automax_ros.compile.native import expressions, refinement
@@ -36,6 +36,7 @@ class Frame:
     """A function in the making.
 
     ``fields`` are the places in C of scalar fields of the state, ``arrays`` its buffers, ``tuples`` named constants;
+    ``declared`` is what names can hold at the end of a BASIC line, ``touched`` are those set since the last one began;
     ``scope`` are the globals of a Python function, ``members`` what calls of ``io`` become.
     """
 
@@ -47,9 +48,13 @@ class Frame:
     field_kinds: dict[str, Kind] = field(default_factory=dict)
     arrays: dict[str, Array] = field(default_factory=dict)
     tuples: dict[str, list[object]] = field(default_factory=dict)
+    declared: dict[str, Range] = field(default_factory=dict)
+    touched: set[str] = field(default_factory=set)
     locals: dict[str, str] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     returned: list[list[Range]] = field(default_factory=list)
+    wide_fields: dict[str, str] = field(default_factory=dict)
+    has_grown: bool = False
     is_scan: bool = False
     asks_end: bool = False
     can_end: bool = False
@@ -70,10 +75,20 @@ class Frame:
         yield
         self.depth -= 1
 
+    def unite_else(self, begin: int) -> None:
+        """Write an ELSE that holds nothing but an IF, from a line to the end, as ``else if``."""
+        margin = "    " * (self.depth + 1)
+        inner = self.lines[begin + 1 : -1]
+        alone = inner and inner[0].startswith(f"{margin}if (")
+        if alone and not any(line.startswith(margin) and line[len(margin)] not in " }" for line in inner[1:]):
+            self.lines[begin:] = [f"{'    ' * self.depth}}} else {inner[0].strip()}", *(line[4:] for line in inner[1:])]
+
     def begin_again(self) -> None:
         """Forget the lines: the function is translated once more, with what is now known of its names."""
         self.lines.clear()
         self.returned.clear()
+        self.has_grown = False
+        self.touched.clear()
         self._temporaries = 0
 
     # Names
@@ -85,19 +100,29 @@ class Frame:
         assert kind is not None
         self.emit(f"{self._place(name, item.range)} = {bare(item.text)};")
         known[name] = item.range
+        self.touched.add(name)
 
     def _place(self, name: str, known: Range) -> str:
         assert known.kind is not None
         if name in self.fields:
-            if known.kind is not self.field_kinds[name] or known.is_wide:
-                raise NotNative(f"{name} would hold a value of another kind than its own")
-            return self.fields[name]
+            return self._place_of_field(name, known)
         kinds = self._kinds.setdefault(name, {})
         place = kinds.setdefault(known.kind, name if not kinds else f"{name}_as_{known.kind.name.lower()}")
         if known.is_wide:
             self._wide.add(place)
         self.locals[place] = WIDE if place in self._wide else known.kind.value
         return place
+
+    def _place_of_field(self, name: str, known: Range) -> str:
+        """Return where a field lies: in a local until the scan is left, where it is beyond 64 bits meanwhile."""
+        if known.kind is not self.field_kinds[name]:
+            raise NotNative(f"{name} would hold a value of another kind than its own")
+        if known.is_wide and name not in self.wide_fields:
+            self.wide_fields[name] = f"{name}_wide"
+            self.locals[f"{name}_wide"] = WIDE
+            self._wide.add(f"{name}_wide")
+            self.has_grown = True
+        return self.wide_fields.get(name, self.fields[name])
 
     def parameter(self, name: str, known: Range) -> None:
         """Take a parameter of the function."""
@@ -173,6 +198,8 @@ class Frame:
             return self.caller(self, getattr(base, function.attr), node, known)
         if isinstance(function, ast.Name) and function.id in self.scope:
             return self.caller(self, self.scope[function.id], node, known)
+        if isinstance(function, ast.Name) and hasattr(builtins, function.id):
+            return self.caller(self, getattr(builtins, function.id), node, known)
         raise NotNative("a call of what is not known")
 
     def ended(self) -> str:

@@ -49,7 +49,8 @@ def members(types: Mapping[int, DataType]) -> dict[str, Member]:
 
 def _common(types: Mapping[int, DataType], node: ast.Call) -> tuple[int, DataType]:
     view = node.args[0]
-    assert isinstance(view, ast.Constant) and isinstance(view.value, int)
+    assert isinstance(view, ast.Constant)
+    assert isinstance(view.value, int)
     kind = types[view.value]
     if kind not in TYPE_NUMBERS:
         raise NotNative("a string")

@@ -33,9 +33,9 @@ static inline double divided(double left, double right, int *ended) {
     return left / right;
 }
 
-/* The integer below, or toward 0; the ranges prove that it fits, but for what is not a number. */
+/* The integer below, or toward 0; what is not a number, or does not fit, ends the scan. */
 static inline int64_t floored(double value, int *ended) {
-    if (value != value) {
+    if (!(value > -9.2e18 && value < 9.2e18)) {
         if (*ended == 0) *ended = AUTOMAX_FAULT;
         return 0;
     }
@@ -44,7 +44,7 @@ static inline int64_t floored(double value, int *ended) {
 }
 
 static inline int64_t truncated(double value, int *ended) {
-    if (value != value) {
+    if (!(value > -9.2e18 && value < 9.2e18)) {
         if (*ended == 0) *ended = AUTOMAX_FAULT;
         return 0;
     }
@@ -53,14 +53,14 @@ static inline int64_t truncated(double value, int *ended) {
 
 static inline __int128 floored_wide(double value, int *ended) {
     if (value >= -4e18 && value <= 4e18) return floored(value, ended);
-    if (value != value && *ended == 0) *ended = AUTOMAX_FAULT;
-    return value != value ? 0 : (__int128)floor(value);
+    if (!(fabs(value) < 0x1p126) && *ended == 0) *ended = AUTOMAX_FAULT;
+    return *ended ? 0 : (__int128)floor(value);
 }
 
 static inline __int128 truncated_wide(double value, int *ended) {
     if (value >= -4e18 && value <= 4e18) return truncated(value, ended);
-    if (value != value && *ended == 0) *ended = AUTOMAX_FAULT;
-    return value != value ? 0 : (__int128)value;
+    if (!(fabs(value) < 0x1p126) && *ended == 0) *ended = AUTOMAX_FAULT;
+    return *ended ? 0 : (__int128)value;
 }
 
 /* core.numbers.stored_real: what a REAL variable holds, and whether it was clamped. */

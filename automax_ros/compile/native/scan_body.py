@@ -97,7 +97,11 @@ def _names_of_end(statement: ast.If) -> set[str]:
     first = statement.body[0]
     if isinstance(statement.test, ast.Name):
         return {statement.test.id}
-    if isinstance(first, ast.Expr) and isinstance(first.value, ast.Call) and isinstance(first.value.func, ast.Attribute):
+    if (
+        isinstance(first, ast.Expr)
+        and isinstance(first.value, ast.Call)
+        and isinstance(first.value.func, ast.Attribute)
+    ):
         base = first.value.func.value
         return {base.id} if isinstance(base, ast.Name) else set()
     return set()

@@ -25,11 +25,10 @@ class NativeSource:
     Attributes:
         name: the task's name.
         text: the C text, complete in itself: it begins with ``abi.h`` and includes headers of the C library alone.
-        limits: for each field of the layout the least and the greatest value that the translation takes for granted, of
-            REALs too; a state beyond them, such as a snapshot may bring, or what is not a number, scans in Python.
-            () where none but 64 bits are.
+        limits: for each field of the layout the least and the greatest integer that the translation takes for granted;
+            a state beyond them, such as a snapshot may bring, scans in Python. () where none but 64 bits are.
     """
 
     name: str
     text: str
-    limits: tuple[tuple[float, float], ...] = ()
+    limits: tuple[tuple[int, int], ...] = ()

@@ -14,7 +14,7 @@ from automax_ros.compile.native.context import Environment, joined
 from automax_ros.compile.native.frame import Frame
 from automax_ros.compile.native.ranges import Range
 from automax_ros.compile.native.source import NotNative
-from automax_ros.compile.native.typed import Typed, bare, c_type
+from automax_ros.compile.native.typed import Typed, bare, c_type, whole_text
 
 
 class Body:
@@ -27,7 +27,8 @@ class Body:
 
     def execute(self, statements: list[ast.stmt], known: Environment | None) -> Environment | None:
         """Emit statements; return what is known after them, None where nothing comes there."""
-        for statement in statements:
+        lines = [*(getattr(statement, "lineno", 0) for statement in statements), 0]
+        for place, statement in enumerate(statements):
             if known is None:
                 return None
             try:
@@ -35,7 +36,31 @@ class Body:
             except NotNative as error:
                 if error.line:
                     raise
-                raise NotNative(error.reason, getattr(statement, "lineno", 0)) from None
+                raise NotNative(error.reason, lines[place]) from None
+            if known is not None and lines[place] and lines[place] != lines[place + 1]:
+                known = self._held_to_types(known)
+        return known
+
+    def _held_to_types(self, known: Environment) -> Environment:
+        """Emit, at the end of a BASIC line, that the scan ends where a variable is beyond what it can be.
+
+        No block leaves a variable so; but for some, such as RAMP, ranges alone do not show it.
+        """
+        frame = self.frame
+        for name in sorted(frame.touched):
+            declared = frame.declared.get(name)
+            if declared is None or name not in known or declared.holds(known[name]):
+                continue
+            present = known[name]
+            if present.kind is not declared.kind:
+                raise NotNative(f"{name} would hold a value of another kind than its own")
+            place = frame.read(name, known).text
+            tests = [f"{place} < {whole_text(int(declared.low))}"] * (present.low < declared.low)
+            tests += [f"{place} > {whole_text(int(declared.high))}"] * (present.high > declared.high)
+            frame.emit(f"if ({' || '.join(tests)}) return AUTOMAX_FAULT;")
+            low, high = max(present.low, declared.low), min(present.high, declared.high)
+            known = {**known, name: Range(declared.kind, low, high)}
+        frame.touched.clear()
         return known
 
     def _one(self, statement: ast.stmt, known: Environment) -> Environment | None:
@@ -125,6 +150,7 @@ class Body:
         if len(frame.lines) == begin + 1:
             frame.lines.pop()
         frame.emit("}")
+        frame.unite_else(begin)
         return joined(then, otherwise)
 
     def _test(self, node: ast.expr, known: Environment) -> str:
@@ -183,7 +209,7 @@ class Body:
     def _pass(self, _: ast.Pass, known: Environment) -> Environment:
         return known
 
-    def _expression(self, statement: ast.Expr, known: Environment) -> Environment:
+    def _expression(self, statement: ast.Expr, known: Environment) -> Environment | None:
         if isinstance(statement.value, ast.Constant):
             return known
         if not isinstance(statement.value, ast.Call):
@@ -202,6 +228,10 @@ class Body:
         self.frame.emit("return AUTOMAX_TOO_LONG;")
 
     def _return(self, statement: ast.Return, known: Environment) -> None:
+        value = statement.value
+        if isinstance(value, ast.IfExp) and isinstance(value.body, ast.Tuple):
+            self._if(ast.If(value.test, [ast.Return(value.body)], [ast.Return(value.orelse)]), known)
+            return
         nodes = statement.value.elts if isinstance(statement.value, ast.Tuple) else [statement.value]
         results = [self.frame.value(node, known) for node in nodes if node is not None]
         self._deliver(results)

@@ -7,6 +7,7 @@ integer cannot be shown to fit, the task is not native. Doubles need no proof, b
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
@@ -17,16 +18,21 @@ from automax_ros.compile.native.calls import called
 from automax_ros.compile.native.context import Environment
 from automax_ros.compile.native.frame import Array, Frame
 from automax_ros.compile.native.members import members
-from automax_ros.compile.native.ranges import INFINITE, Range, exactly, of_type
+from automax_ros.compile.native.ranges import INFINITE, Kind, Range, exactly, of_type
 from automax_ros.compile.native.scan_body import ScanBody, scan_of, state_names
 from automax_ros.compile.native.source import NativeSource, NotNative
 from automax_ros.compile.native.typed import whole_text
 from automax_ros.compile.native.unit import Unit
+from automax_ros.compile.pynames import variable_name
 from automax_ros.core.types import DataType, type_of_name
+from automax_ros.language.syntax.tree import Scope
 
+_RETURN = re.compile("return ([^;]*);")
 MOST_ROUNDS = 60
 """Translations of a scan, each for a wider range of states, before a task counts as one whose integers have no bounds;
 a state takes a few."""
+_PINNED_FROM, _PINNED = 2**33, 2**40
+"""A block's integer whose range goes on growing past the first is taken to stay within the second, and checked."""
 _VARIABLES = (Role.LOCAL, Role.TUNABLE)
 
 
@@ -64,6 +70,11 @@ class _Translation:
             field_kinds={name: kind for name in scalars if (kind := of_type(scalars[name].type).kind) is not None},
             arrays={name: Array(f"s->{name}", field.size) for name, field in fields.items() if field.is_array},
             tuples=tuples,
+            declared={
+                variable_name(name): of_type(symbol.type)
+                for name, symbol in compiled.program.symbols.items()
+                if symbol.scope is Scope.LOCAL or symbol.latched
+            },
             is_scan=True,
         )
         self._latched = [of_type(type_of_name(name)) for name in compiled.latched]
@@ -71,7 +82,7 @@ class _Translation:
     def source(self) -> NativeSource:
         """Return the text and what it takes for granted."""
         known = self._settled()
-        limits = tuple((known[name].low, known[name].high) for name in self._names)
+        limits = tuple(_limits_of(known[name]) for name in self._names)
         return NativeSource(self._compiled.program.name, self._text(), limits)
 
     def _settled(self) -> Environment:
@@ -82,13 +93,28 @@ class _Translation:
             self._frame.begin_again()
             after = body.execute(self._statements, dict(known)) or known
             grown = [name for name in self._names if not known[name].holds(after[name])]
-            if not grown:
+            if not grown and not self._frame.has_grown:
                 return known
             for name, field in zip(self._names, self._layout.fields, strict=True):
-                if name in grown and field.role in _VARIABLES:
-                    raise NotNative(f"{field.name} may be left with a value beyond its type")
-            known = {name: known[name].widened(after[name]) for name in self._names}
+                if name in grown:
+                    known[name] = self._grown(name, field, known[name].widened(after[name]))
         raise NotNative("a state that has no bounds")
+
+    def _leaving(self) -> list[str]:
+        """Return the lines; where fields lie in locals while the scan is under way, each way out puts them back."""
+        wide = self._frame.wide_fields
+        if not wide:
+            return self._frame.lines
+        back = " ".join(f"s->{name} = (int64_t){place};" for name, place in wide.items())
+        return [_RETURN.sub(rf"{{ {back} return \1; }}", line) for line in self._frame.lines]
+
+    def _grown(self, name: str, field: StateField, known: Range) -> Range:
+        """Return what a field may hold, as far as it was found until now; a block's integers have an end somewhere."""
+        if field.role in _VARIABLES or known.kind is None:
+            raise NotNative(f"{field.name} may be left with a value beyond its type")
+        if known.kind is Kind.INT and max(-known.low, known.high) > _PINNED_FROM:
+            known = self._frame.declared[name] = Range(Kind.INT, -_PINNED, _PINNED)
+        return known
 
     def _text(self) -> str:
         frame = self._frame
@@ -114,7 +140,8 @@ class _Translation:
                 "    int ended_by = AUTOMAX_DONE;",
                 "    int *const ended = &ended_by;",
                 *declared,
-                *frame.lines,
+                *(f"    {place} = s->{name};" for name, place in frame.wide_fields.items()),
+                *self._leaving(),
                 "}",
                 "",
                 _part("columns.h"),
@@ -123,11 +150,18 @@ class _Translation:
 
 
 def _at_first(field: StateField) -> Range:
-    """Return what a field is known to hold before the first scan: of a variable all that its type does."""
-    if field.role in _VARIABLES:
+    """Return what a field is known to hold before the first scan: of a variable, and of a REAL, all that the type does.
+
+    A state that comes from elsewhere may have any REAL.
+    """
+    if field.role in _VARIABLES or field.type is DataType.REAL:
         return of_type(field.type)
     assert not isinstance(field.initial, str)
     return exactly(field.initial)
+
+
+def _limits_of(known: Range) -> tuple[int, int]:
+    return (0, 0) if known.kind is Kind.REAL else (int(known.low), int(known.high))
 
 
 @cache
