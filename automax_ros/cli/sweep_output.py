@@ -159,6 +159,7 @@ def print_best(output: Output) -> None:
         headings = ["run", *(item.label for item in plan.quantities), *(item.label for item in plan.measures)]
         rows = [headings, *(_cells(plan, row) for row in best[:MOST_SHOWN])]
         print("\n".join(table(rows, right=range(len(headings)))))
+    if best and output.count > 1:
         way = "greatest" if wanted.greatest else "least"
         label = plan.measures[wanted.best].label
         print(f"\n{count_of(len(output.rows), 'run')}; the best has the {way} {label}. Again, alone:")

@@ -95,7 +95,7 @@ class Measure:
         """The measure as it would be written."""
         if not self.subject:
             return self.function
-        parts = [self.subject, *(f"{item:.10g}" for item in self.numbers)]
+        parts = [self.subject, *map(_number_text, self.numbers)]
         if self.percent:
             parts[1] += " %"
         parts += [f"from={seconds_text(self.start_ns)}"] if self.start_ns else []
@@ -134,8 +134,10 @@ def read_measures(text: str, config: RackConfig, duration_ns: int) -> tuple[Meas
             inner, place = text[place:end], end + 1
         found.append(_measure(match[1].lower(), inner, config, duration_ns))
     measures = tuple(dict.fromkeys(found))
-    if not 0 < len(measures) <= MOST_MEASURES:
-        raise Fault(f"{len(measures)} measures: a sweep has 1 to {MOST_MEASURES}")
+    if not measures:
+        raise Fault("nothing is measured", f"name measures, such as rms(SPEED_ERR%); there are {', '.join(FUNCTIONS)}")
+    if len(measures) > MOST_MEASURES:
+        raise Fault(f"{len(measures)} measures: a sweep has at most {MOST_MEASURES}")
     return measures
 
 
@@ -219,3 +221,9 @@ def _subject(function: Function, name: str, text: str, config: RackConfig) -> st
 
 def _fits(variable: CommonVariable, subject: Subject) -> bool:
     return variable.type is DataType.BOOLEAN if subject is Subject.BOOLEAN else variable.type.is_numeric
+
+
+def _number_text(value: float) -> str:
+    """Return the shortest text that is read as the same number."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)

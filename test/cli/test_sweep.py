@@ -16,6 +16,7 @@ from automax_ros.rack.rack import Rack
 
 from .support import Automax, Result
 
+DRIVE = Path(__file__).parent.parent.parent / "config" / "dc_drive"
 MEASURES = "rms(ERR%) settle(FDBK%, 2 %) final(FDBK%)"
 
 
@@ -121,6 +122,16 @@ def test_a_recorded_run_has_the_same_measures_and_replays(sweep, automax):
     assert automax("replay", "bag").code == 0
     result = sweep("--vary", "LOOP.KP=1,2", "--record", "other")
     assert (result.code, result.err.splitlines()[0]) == (2, "automax sweep: error: --record: there are 2 runs")
+
+
+def test_a_recorded_run_with_another_plant_replays(automax):
+    one = ("--vary", "MOTOR.inertia=1.5", "--vary", "MOTOR.load.torque_nm=120", "--vary", "SPEED_SP%=900")
+    measures = ("--measure", "final(RPM) max(CUR_REF%)", "--duration", "1.5", "--json")
+    recorded = automax("sweep", DRIVE, *one, *measures, "--record", "bag")
+    assert recorded.code == 0
+    assert json.loads(recorded.out) == json.loads(automax("sweep", DRIVE, *one, *measures).out)
+    assert json.loads(recorded.out)[0]["measures"]["final(RPM)"] > 1
+    assert automax("replay", "bag").code == 0
 
 
 def test_json_has_null_where_a_run_has_no_measure(sweep):

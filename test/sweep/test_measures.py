@@ -46,10 +46,10 @@ def test_each_once(config: RackConfig):
     st.lists(
         st.builds(
             Measure,
-            st.sampled_from(["rms", "itae", "rise"]),
+            st.just("settle"),
             st.sampled_from(["ERR%", "SLOW", "TABLE%(2)"]),
-            st.just(()),
-            st.just(False),
+            st.tuples(st.floats(0, 1e9), st.floats(-1e9, 1e9)) | st.tuples(st.floats(0, 100)),
+            st.booleans(),
             st.integers(0, 4_999_999_999),
             st.none() | st.integers(5 * NS_PER_S, 10 * NS_PER_S),
         ),
@@ -76,7 +76,7 @@ def test_every_function_makes_what_computes_it(config: RackConfig):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "0 measures: a sweep has 1 to 50"),
+        ("", "nothing is measured"),
         ("rsm(ERR%)", "there is no measure 'rsm'"),
         ("rms", "rms is of an INTEGER, DOUBLE INTEGER or REAL, and names none"),
         ("rms(ERR%", "'ERR%': a ) is missing"),
@@ -100,7 +100,10 @@ def test_every_function_makes_what_computes_it(config: RackConfig):
         ("1 + 1", "'1 + 1' is not a measure"),
         ("rms(ERR%) ;", "';' is not a measure"),
         ("x" * 4001, "4001 characters of measures: at most 4000 are read"),
-        (" ".join(f"rms(ERR%, from=0.{number:03d})" for number in range(MOST_MEASURES + 1)), "51 measures"),
+        (
+            " ".join(f"rms(ERR%, from=0.{number:03d})" for number in range(MOST_MEASURES + 1)),
+            "51 measures: a sweep has at most 50",
+        ),
     ],
 )
 def test_what_is_refused(config: RackConfig, text: str, message: str):
