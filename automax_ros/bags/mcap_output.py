@@ -39,6 +39,8 @@ RECORD_HEAD = struct.Struct("<BQ")
 MESSAGE_FIELDS = struct.Struct("<HIQQ")
 """Channel, sequence, log time and publish time: what a message begins with."""
 _pack_message = struct.Struct("<BQHIQQ").pack
+_FIELDS = MESSAGE_FIELDS.size
+_FRAME = _FIELDS + RECORD_HEAD.size
 _MESSAGE_CODE = int(Opcode.MESSAGE)
 """A plain number: packing a member of an enumeration takes longer than all the rest."""
 _INDEX_HEAD = struct.Struct("<BQHI")
@@ -63,14 +65,20 @@ class Output(Protocol):
 
 
 class ChunkBuilder:
-    """The records of an open chunk. Its index tells for each channel the log times and places of the messages."""
+    """The records of an open chunk: ``size`` bytes. Its index tells for each channel where the messages stand."""
 
-    __slots__ = ("data", "index")
+    __slots__ = ("_parts", "index", "size")
 
     def __init__(self) -> None:
-        self.data = bytearray()
+        self._parts: list[bytes] = []
+        self.size = 0
         self.index: dict[int, list[int]] = {}
         """Log time and place of each message, one after the other, by the number of the channel."""
+
+    @property
+    def data(self) -> bytes:
+        """All records."""
+        return b"".join(self._parts)
 
     @property
     def first_time(self) -> int:
@@ -84,17 +92,23 @@ class ChunkBuilder:
 
     def add_record(self, record: McapRecord) -> None:
         """Add a schema or a channel."""
-        self.data += record_bytes(record)
+        data = record_bytes(record)
+        self._parts.append(data)
+        self.size += len(data)
 
     def add_message(self, channel: int, sequence: int, log_time: int, publish_time: int, payload: bytes) -> None:
         """Add a message."""
-        data = self.data
-        try:
-            entries = self.index[channel]
-        except KeyError:
-            entries = self.index[channel] = []
-        entries += (log_time, len(data))
-        data += _pack_message(_MESSAGE_CODE, len(payload) + 22, channel, sequence, log_time, publish_time) + payload
+        length, place = len(payload), self.size
+        entries = self.index.get(channel)
+        if entries is None:
+            self.index[channel] = [log_time, place]
+        else:
+            entries.append(log_time)
+            entries.append(place)
+        append = self._parts.append
+        append(_pack_message(_MESSAGE_CODE, length + _FIELDS, channel, sequence, log_time, publish_time))
+        append(payload)
+        self.size = place + length + _FRAME
 
 
 class McapOutput:
@@ -159,7 +173,7 @@ class McapOutput:
         """Write a chunk with its index; one without messages is left out."""
         if not chunk.index:
             return
-        data = bytes(chunk.data)
+        data = chunk.data
         packed = Chunk(
             compression=self._compression,
             data=self._compress(data),

@@ -11,6 +11,7 @@ import contextlib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -18,6 +19,7 @@ from mcap.records import Attachment, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
 
 import automax_ros
+from automax_ros.bags.chunk_thread import ChunkThread
 from automax_ros.bags.data_file import DataFile, sync_path
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.mcap_output import ChunkBuilder, McapOutput
@@ -116,6 +118,7 @@ class BagWriter:
         """Time of the message before; None when the next one has to be looked at closely."""
         self._chunk_end = 0
         self._open = True
+        self._thread = ChunkThread()
         self._sync_error: OSError | None = None
         self._finished: list[Path] = []
         """Files, and the folder with their names, that ``sync`` has not yet seen to the disk."""
@@ -183,7 +186,7 @@ class BagWriter:
         if stamp > log_time or not log_time:
             log_time = stamp
         chunk = self._chunk
-        if len(payload) + len(chunk.data) > LONGEST_CHUNK_BYTES:
+        if len(payload) + chunk.size > LONGEST_CHUNK_BYTES:
             chunk = self._relieved_chunk(channel, stamp, payload)
         channel.message_count = count = channel.message_count + 1
         chunk.add_message(channel.number, count & 0xFFFFFFFF, log_time, stamp, payload)
@@ -206,6 +209,7 @@ class BagWriter:
         )
         self._attachments = [*(item for item in self._attachments if item.name != name), attachment]
         try:
+            self._thread.settle()
             self._mcap.add_attachment(attachment)
         except OSError as error:
             raise self._failed(error) from error
@@ -232,12 +236,14 @@ class BagWriter:
     def flush(self, now: int | None = None) -> None:
         """Hand the open chunk to the operating system; with a time only if the chunk's own time is over by then.
 
+        Without a time it has it when this returns, else soon.
+
         Raises:
             RecordingError: the disk refuses.
         """
         if self._open and (now is None or now >= self._chunk_end):
             try:
-                self._end_chunk()
+                self._end_chunk(wait=now is None)
             except OSError as error:
                 raise self._failed(error) from error
 
@@ -247,6 +253,7 @@ class BagWriter:
         When the disk refuses, the next ``write``, ``close`` or ``require_synced`` tells.
         """
         try:
+            self._thread.settle()
             while self._finished:
                 sync_path(self._finished.pop())
             self._file.sync()
@@ -273,6 +280,7 @@ class BagWriter:
         self._open, self._stamp = False, None
         try:
             self._finish_file()
+            self._thread.end()
             text = yaml_text({"rosbag2_bagfile_information": self._metadata(self._files).information()})
             (self.folder / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
             self._finished += [self.folder / METADATA_FILE, self.folder]
@@ -298,7 +306,7 @@ class BagWriter:
 
     def _finish_file(self) -> None:
         """Write what is after the messages of a file: description, index, summary."""
-        self._end_chunk()
+        self._end_chunk(wait=True)
         statistics = self._mcap.statistics
         start, end = statistics.message_start_time, statistics.message_end_time
         summary = FileSummary(self._file.path.name, start, end - start, statistics.message_count)
@@ -324,8 +332,8 @@ class BagWriter:
             raise self._bad_message(channel, stamp, payload)
         self.require_synced()
         time = max(stamp, self._last_time + 1)
-        if time >= self._chunk_end or len(self._chunk.data) > CHUNK_BYTES:
-            self.flush()
+        if time >= self._chunk_end or self._chunk.size > CHUNK_BYTES:
+            self._hand_over()
             period = self._options.chunk_ns
             self._chunk_end = (time // period + 1) * period
         self._stamp = stamp
@@ -337,10 +345,20 @@ class BagWriter:
         self.flush()
         return self._chunk
 
-    def _end_chunk(self) -> None:
+    def _hand_over(self) -> None:
+        """Let the thread write the open chunk, as soon as the one before is written."""
+        try:
+            self._end_chunk(wait=bool(self._options.split_bytes))
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _end_chunk(self, *, wait: bool) -> None:
+        """Let the open chunk be written; ``wait`` until it is: then the file may be asked for its size, or written."""
         if self._chunk.index:
-            self._mcap.add_chunk(self._chunk)
+            self._thread.hand(partial(self._mcap.add_chunk, self._chunk))
             self._chunk = ChunkBuilder()
+        if wait:
+            self._thread.settle()
 
     def _metadata(self, files: list[FileSummary]) -> BagMetadata:
         """Describe the whole recording, or its last file alone."""
@@ -374,6 +392,7 @@ class BagWriter:
 
     def _failed(self, error: OSError) -> RecordingError:
         self._open, self._stamp = False, None
+        self._thread.end()
         with contextlib.suppress(OSError):
             self._file.close()
         kept = "what was recorded so far is kept, `automax bag repair` makes a whole recording of it"

@@ -22,7 +22,7 @@ from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 from automax_ros.wire.stream import RackStream
 
 PERIOD_NS = NS_PER_S
@@ -85,12 +85,12 @@ class Diagnostics:
 
     # RackObserver
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         """Look where a scan had errors or came late."""
         if record.errors or record.skipped:
             self.look()
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Writes from outside change the health of nothing."""
 
     def tuned(self, task: Task, now_ns: int) -> None:

@@ -27,7 +27,7 @@ from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.observers import Operation
 from automax_ros.running.error_log import LogEntry
 from automax_ros.running.task import ScanRecord, Status, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 
 ERROR_INTERVAL_S = 1.0
 """A STOP ALL, and a task's run-time errors, are reported at most this often ..."""
@@ -59,7 +59,7 @@ class ProcessorNode(ManagedModuleNode):
 
     # RackObserver
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         """Report errors and printed lines of the Processor's own tasks."""
         if task.slot != self._slot:
             return
@@ -76,7 +76,7 @@ class ProcessorNode(ManagedModuleNode):
             if told and number < ERRORS_SHOWN:
                 self.get_logger().warning(describe())
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Writes from outside do not concern a Processor."""
 
     def tuned(self, task: Task, now_ns: int) -> None:  # noqa: ARG002

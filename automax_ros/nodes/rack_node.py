@@ -25,7 +25,7 @@ from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.observers import Operation
 from automax_ros.running.health import Health
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 
 _RUNS = ("run", "run_all")
 """The operations that put tasks into RUN."""
@@ -60,10 +60,10 @@ class Follower:
         if operation.ok and operation.what in _RUNS:
             self._manager.follow(ACTIVE)
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """Scans change no state."""
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Writes change no state."""
 
     def tuned(self, task: Task, now_ns: int) -> None:

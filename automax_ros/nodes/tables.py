@@ -26,7 +26,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 from automax_ros.wire.qos import LATCHED
 
 PERIOD_NS = NS_PER_S
@@ -62,10 +62,10 @@ class Tables:
 
     # RackObserver
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """What scans change is looked at each second."""
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """A force that a program sets is looked at within the second."""
 
     def tuned(self, task: Task, now_ns: int) -> None:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 
 HALT, STEP, RESUME = "pause", "step", "resume"
 """Operations that concern time alone: they leave every task as it was."""
@@ -37,11 +37,11 @@ class Operation:
 class RackObserver(Protocol):
     """Somebody who is told what happens in a rack, in order."""
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """A task has scanned (or, as scan 0, executed what stands before SCAN_LOOP), with its writes to memory."""
         ...
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Memory was written, or a view forced or released, from outside the tasks."""
         ...
 
@@ -69,13 +69,13 @@ class Observers:
 
     def scanned(self, task: Task, record: ScanRecord) -> None:
         """Tell of a scan and of its writes."""
-        writes = self._memory.drain()
+        writes = self._memory.take_writes()
         for observer in self._all:
             observer.scanned(task, record, writes)
 
     def tell_writes(self) -> None:
         """Tell of writes that no scan has made."""
-        writes = self._memory.drain()
+        writes = self._memory.take_writes()
         if writes:
             for observer in self._all:
                 observer.written(writes)

@@ -9,7 +9,7 @@ from automax_ros.rack.stimuli.reader import RACK_ONLY
 from automax_ros.rack.stimuli.stage import Happened
 from automax_ros.running.scan_record import ScanRecord
 from automax_ros.running.task import Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 
 
 class OperationLog:
@@ -33,10 +33,10 @@ class OperationLog:
         why = "" if operation.ok else operation.reason
         self.happened.append(Happened(operation.at_ns, operation.what, of, operation.ok, why))
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """Keep nothing of scans."""
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Keep nothing of writes."""
 
     def tuned(self, task: Task, now_ns: int) -> None:

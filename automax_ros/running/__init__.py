@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from automax_ros.running.private_image import PrivateImage
     from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
     from automax_ros.running.task import ScanRecord, Status, Task
-    from automax_ros.running.views import Memory, MemoryValueError, ViewSpec, Write
+    from automax_ros.running.views import Memory, MemoryValueError, ViewSpec, Write, WriteGroup
 
 __all__ = [
     "Backplane",
@@ -36,6 +36,7 @@ __all__ = [
     "Task",
     "ViewSpec",
     "Write",
+    "WriteGroup",
 ]
 
 __getattr__ = face(

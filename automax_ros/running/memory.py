@@ -15,7 +15,7 @@ from collections.abc import Callable, Container, Iterable, Sequence
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Value
 from automax_ros.running.image import Image
-from automax_ros.running.views import MemoryValueError, ViewSpec, Write, fitting
+from automax_ros.running.views import MemoryValueError, ViewSpec, Write, WriteGroup, fitting
 
 FORCING = "FORCINGSTATUS@"
 """The pre-defined common that is TRUE while anything is forced (2.4.6)."""
@@ -35,12 +35,33 @@ class CommonMemory(Image):
         self._under: dict[tuple[int, int], Value] = {}
         self._locals_forced = False
         self._force_watchers: list[Callable[[], None]] = []
-        self._log: list[Write] | None = None
+        self._log: list[WriteGroup] | None = None
         self._causes: list[Write] | None = None
+        self._plain = [not spec.is_array and view not in self._shared for view, spec in enumerate(self.specs)]
+        """Whether a write of a view writes its cell and nothing else."""
         self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
 
-    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
-        """Write what a scan's blocks changed: pairs of view and value, already within the view's type."""
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
+        """Write what a scan's blocks changed: pairs of view and value, already within the view's type.
+
+        Whoever asks for the log sees ``changes`` itself: it may not be changed any more.
+        """
+        if self._forced or self._causes is not None:
+            self._commit_each(changes, writer)
+            return
+        plain, cells = self._plain, self._cells
+        for view, _ in changes:
+            if not plain[view]:
+                self._commit_each(changes, writer)
+                return
+        for view, value in changes:
+            cells[view] = value
+        first = self.sequence + 1
+        self.sequence += len(changes)
+        if self._log is not None and changes:
+            self._log.append(WriteGroup(first, self.now_ns, writer, WriteKind.COMMIT, 0, changes))
+
+    def _commit_each(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
         for view, value in changes:
             self._store(view, 0, value, writer, WriteKind.COMMIT)
 
@@ -140,14 +161,21 @@ class CommonMemory(Image):
         self._watched.setdefault((bank, register), []).append(written)
 
     def keep_log(self) -> None:
-        """Begin to keep the write log; whoever asks must ``drain`` it."""
+        """Begin to keep the write log; whoever asks must ``take_writes`` or ``drain`` it."""
         if self._log is None:
             self._log = []
 
+    def take_writes(self) -> list[WriteGroup]:
+        """Return what was logged since it was last taken, oldest first."""
+        groups = self._log
+        if not groups:
+            return []
+        self._log = []
+        return groups
+
     def drain(self) -> list[Write]:
-        """Return the entries since the last drain, oldest first."""
-        entries, self._log = self._log or [], None if self._log is None else []
-        return entries
+        """Return the same as single entries."""
+        return [entry for group in self.take_writes() for entry in group.entries()]
 
     def keep_causes(self) -> None:
         """Begin to keep what was written by name, without what follows from it on views of the same registers.
@@ -198,7 +226,7 @@ class CommonMemory(Image):
             array[element] = value
         self.sequence += 1
         if self._log is not None:
-            self._log.append(Write(self.sequence, self.now_ns, writer, kind, view, element, value))
+            self._log.append(WriteGroup(self.sequence, self.now_ns, writer, kind, element, ((view, value),)))
         if self._causes is not None:
             self._causes.append(Write(self.sequence, self.now_ns, writer, kind, view, element, value))
         if entries:
@@ -208,7 +236,7 @@ class CommonMemory(Image):
                 self._put(other, place, shown)
                 self.sequence += 1
                 if self._log is not None:
-                    self._log.append(Write(self.sequence, self.now_ns, writer, told, other, place, shown))
+                    self._log.append(WriteGroup(self.sequence, self.now_ns, writer, told, place, ((other, shown),)))
         if entries is not None and self._watched:
             self._tell_watchers([(view, element), *(entry[:2] for entry in entries)])
 

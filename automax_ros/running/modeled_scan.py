@@ -7,7 +7,7 @@ memory stays written). It notes what it reads, so that another rack can execute 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,7 +81,7 @@ class HeardMemory:
         self.heard.append(outcome)
         return outcome
 
-    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
         """Write what the scan's blocks changed."""
         if self._told is None:
             self._memory.commit(changes, writer)

@@ -22,7 +22,7 @@ class PrivateImage(Image):
         super().__init__(views)
         self._common = common
 
-    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
         """Write what a scan's blocks changed."""
         for view, value in changes:
             self.write_now(view, value, writer)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Generator
-from dataclasses import dataclass, field
 
 from automax_ros.core.types import Latched, Value
 
@@ -18,7 +17,6 @@ class Status(enum.Enum):
     FAULTED = "faulted"
 
 
-@dataclass
 class ScanRecord:
     """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
 
@@ -26,15 +24,20 @@ class ScanRecord:
     the scan's beginning to its end, the time in which it was suspended included.
     """
 
-    time_ns: int
-    scan: int
-    latched: Latched = ()
-    reads: list[tuple[int, int, Value]] = field(default_factory=list)
-    writes: list[tuple[int, int, Value]] = field(default_factory=list)
-    commits: list[tuple[int, Value]] = field(default_factory=list)
-    errors: list[tuple[int, int]] = field(default_factory=list)
-    skipped: int = 0
-    duration_ns: int = 0
+    # Not a dataclass: every recorded scan makes one, and that takes twice as long.
+    __slots__ = ("commits", "duration_ns", "errors", "latched", "reads", "scan", "skipped", "time_ns", "writes")
+
+    def __init__(self, time_ns: int, scan: int, skipped: int = 0) -> None:
+        """Begin the record of a scan that has seen and done nothing; ``skipped`` deadlines were missed before it."""
+        self.time_ns = time_ns
+        self.scan = scan
+        self.latched: Latched = ()
+        self.reads: list[tuple[int, int, Value]] = []
+        self.writes: list[tuple[int, int, Value]] = []
+        self.commits: list[tuple[int, Value]] = []
+        self.errors: list[tuple[int, int]] = []
+        self.skipped = skipped
+        self.duration_ns = 0
 
 
 Steps = Generator[int, int | None, ScanRecord | None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Protocol, cast
 
@@ -58,7 +58,7 @@ class ScanMemory(Protocol):
 
     def latch(self, plan: LatchPlan) -> Latched: ...  # noqa: D102
 
-    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None: ...  # noqa: D102
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None: ...  # noqa: D102
 
     def read_now(self, view: int, element: int = 0) -> Value: ...  # noqa: D102
 

@@ -8,7 +8,7 @@ such a bank, so that a word and its bits show the same registers.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple, Protocol
@@ -55,6 +55,42 @@ class Write(NamedTuple):
     value: Value
 
 
+class WriteGroup:
+    """Entries of the write log that one operation has made: the same instant, writer, kind and element.
+
+    ``changes`` are (view, value) in order; nobody may change it. ``sequence`` is that of the first. A scan's commit is
+    one group: it costs no object for each value.
+    """
+
+    __slots__ = ("changes", "element", "kind", "sequence", "time_ns", "writer")
+
+    def __init__(
+        self,
+        sequence: int,
+        time_ns: int,
+        writer: int,
+        kind: WriteKind,
+        element: int,
+        changes: Sequence[tuple[int, Value]],
+    ) -> None:
+        self.sequence = sequence
+        self.time_ns = time_ns
+        self.writer = writer
+        self.kind = kind
+        self.element = element
+        self.changes = changes
+
+    @property
+    def key(self) -> tuple[int, int, WriteKind]:
+        """Time, writer and kind: neighbours that have them in common travel in one message."""
+        return self.time_ns, self.writer, self.kind
+
+    def entries(self) -> Iterator[Write]:
+        """Yield the entries one by one."""
+        for number, (view, value) in enumerate(self.changes, self.sequence):
+            yield Write(number, self.time_ns, self.writer, self.kind, view, self.element, value)
+
+
 LatchPlan = Callable[[list[Value]], Latched]
 """Takes all cells of a memory and returns those that a task latches."""
 
@@ -80,7 +116,7 @@ class Memory(Protocol):
         """Return copies of the planned views, in their order (3.3)."""
         ...
 
-    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
         """Write what a scan's blocks changed, at END: pairs of view and value, already within the view's type."""
         ...
 

@@ -15,8 +15,7 @@ from automax_ros.rack.standing import StopCause
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence
 from automax_ros.wire.cdr_parts import CdrError
 from automax_ros.wire.qos import QosProfile
-from automax_ros.wire.rack_messages import values_of
-from automax_ros.wire.values import Values
+from automax_ros.wire.values import Values, values_of
 
 BUS = QosProfile("reliable", "volatile", "keep_last", 1000)
 """Writes and images between processes: every message counts."""

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import struct
+from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import compress, groupby
-from operator import itemgetter, ne
 from typing import Any
 
 from automax_ros.core.kinds import Direction, WriteKind
-from automax_ros.core.types import DataType, Latched, Value
+from automax_ros.core.types import DataType
 from automax_ros.rack.config import CommonVariable
 from automax_ros.rack.observers import Operation as Done
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
+from automax_ros.wire.cdr import CdrError, encoder
 from automax_ros.wire.messages import (
-    HELD_MARK,
     NAMES,
     NO_LAYOUT,
     Bool,
@@ -33,16 +32,16 @@ from automax_ros.wire.messages import (
     MultiArrayDimension,
     MultiArrayLayout,
     Operation,
-    Scan,
-    ScanError,
     String,
-    TaskState,
     UInt8MultiArray,
     Variable,
     VariableTable,
     Writer,
 )
-from automax_ros.wire.values import NO_VALUES, Values
+from automax_ros.wire.prepared import prepared
+from automax_ros.wire.task_messages import TaskMessages
+from automax_ros.wire.values import Values
+from automax_ros.wire.write_messages import WriteMessages
 
 Message = tuple[object, ...]
 SCALED_TYPE = NAMES[Float32]
@@ -62,29 +61,6 @@ _ARRAYS: dict[DataType, Any] = {
     DataType.BOOLEAN: UInt8MultiArray,
 }
 """The classes of arrays' topics: each takes the layout and the values. std_msgs has none for strings."""
-_ENTRY = itemgetter(4, 5, 6)
-"""View, element and value of an entry of the write log."""
-_new = tuple.__new__
-"""Makes a message of a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
-_MOST = 0xFFFFFFFF
-"""The greatest uint32."""
-_GROUP = itemgetter(1, 2, 3)
-"""Time, writer and kind of an entry: those that have them in common travel together."""
-
-
-def values_of(entries: Sequence[tuple[int, int, Value]]) -> Values:
-    """Return (view, element, value) entries as a Values message."""
-    if not entries:
-        return NO_VALUES
-    variables, elements, values = zip(*entries, strict=True)
-    return _values(variables, elements, values)
-
-
-def _values(variables: Sequence[int], elements: Sequence[int], values: Sequence[Value]) -> Values:
-    if str not in map(type, values):
-        return _new(Values, (variables, elements, values, ()))
-    numbers = [0.0 if isinstance(value, str) else value for value in values]
-    return Values(variables, elements, numbers, [value for value in values if isinstance(value, str)])
 
 
 def value_type_name(kind: DataType, *, is_array: bool) -> str | None:
@@ -109,6 +85,31 @@ def message_maker(variable: CommonVariable) -> Callable[[Any], Message]:
     return partial(_ARRAYS[variable.type], _layout(variable.dimensions)) if variable.is_array else maker
 
 
+def value_encoder(variable: CommonVariable) -> Callable[[Any], bytes]:
+    """Return what makes the bytes of the message of a variable's topic: of its value, or of an array's values in order.
+
+    What it returns raises CdrError if the value does not fit.
+    """
+    encode, make, scale = encoder(topic_type_name(variable) or ""), message_maker(variable), variable.scale
+    if variable.is_array:
+        return lambda values: encode(make(values))
+    if scale is not None:
+        # A message of a simple variable has one field: a plain tuple is as good, and cheaper.
+        return lambda value: encode((scale.value_of(value) if isinstance(value, int) else value,))
+    if variable.type is DataType.STRING:
+        return lambda value: encode((value,))
+    alike = prepared(make(variable.type.zero), ("data",))
+    pack, (first, last) = alike.pack, alike.constants
+
+    def encode_number(value: Any) -> bytes:
+        try:
+            return pack(first, value, last)
+        except struct.error as error:
+            raise CdrError(f"{variable.name}: {error}") from error
+
+    return encode_number
+
+
 def _layout(dimensions: tuple[int, ...]) -> MultiArrayLayout:
     if not dimensions:
         return NO_LAYOUT
@@ -119,20 +120,6 @@ def _layout(dimensions: tuple[int, ...]) -> MultiArrayLayout:
             stride *= inner
         parts.append(MultiArrayDimension(f"subscript{number + 1}", size, stride))
     return MultiArrayLayout(parts, 0)
-
-
-class _TaskFacts:
-    """What every message of a task repeats, and what it latched last."""
-
-    def __init__(self, task: Task) -> None:
-        layout = task.layout
-        self.compiled = task.compiled
-        self.name, self.slot = task.name, task.slot
-        self.views = tuple(task.memory.view(name) for name in task.compiled.latched)
-        self.layout_hash, self.source_hash = layout.hash, task.compiled.program.source_hash
-        self.fields = [field.name for field in layout.fields]
-        self.sizes = [field.size for field in layout.fields]
-        self.latched: Latched | None = None
 
 
 class RackMessages:
@@ -147,18 +134,17 @@ class RackMessages:
         self._rack = rack
         self.run_id = run_id
         self.epoch_ns = 0
-        self._sequence = 0
-        self._slots = {writer.id: writer.slot for writer in rack.writers}
+        self._write_log = WriteMessages({writer.id: writer.slot for writer in rack.writers})
         image = rack.memory.image()
         self._image_variables = [view for view, _, _ in image]
         self._image_elements = [element for _, element, _ in image]
         self._text_positions = [position for position, entry in enumerate(image) if isinstance(entry[2], str)]
-        self._tasks = {task: _TaskFacts(task) for task in rack.tasks}
+        self._tasks = {task: TaskMessages(task) for task in rack.tasks}
 
     def reinstalled(self, task: Task) -> None:
         """Describe a task again if it executes another program than before."""
         if task.compiled is not self._tasks[task].compiled:
-            self._tasks[task] = _TaskFacts(task)
+            self._tasks[task] = TaskMessages(task)
 
     def stamp(self, now_ns: int) -> int:
         """Return the stamp of an instant of rack time."""
@@ -202,7 +188,7 @@ class RackMessages:
         for position in self._text_positions:
             values[position] = 0.0
         image = Values(self._image_variables, self._image_elements, values, texts)
-        return CommonImage(self.stamp(now_ns), self.run_id, self._sequence, image)
+        return CommonImage(self.stamp(now_ns), self.run_id, self._write_log.sequence, image)
 
     def forces(self, now_ns: int) -> CommonWrite | None:
         """Return what is forced as a further entry of the write log, None if nothing is: an image does not tell it."""
@@ -210,63 +196,18 @@ class RackMessages:
         if not memory.forced:
             return None
         entries = ((view, element, memory.read_now(view, element)) for view, element in sorted(memory.forced))
-        return self._write((now_ns, PRESET_WRITER, WriteKind.FORCE), entries)
+        return self._write_log.message(self.stamp(now_ns), self.run_id, PRESET_WRITER, WriteKind.FORCE, entries)
 
-    def writes(self, writes: Sequence[Write]) -> list[CommonWrite]:
-        """Return entries of the write log, those of one writer, kind and instant together."""
-        if len(set(map(_GROUP, writes))) == 1:
-            return [self._write(_GROUP(writes[0]), map(_ENTRY, writes))]
-        return [self._write(key, map(_ENTRY, entries)) for key, entries in groupby(writes, key=_GROUP)]
+    def write_bytes(self, groups: Sequence[WriteGroup]) -> list[tuple[int, bytes]]:
+        """Return stamp and bytes of the messages of a part of the write log.
 
-    def _write(self, key: tuple[int, int, int], entries: Iterable[tuple[int, int, Value]]) -> CommonWrite:
-        time_ns, writer, kind = key
-        self._sequence += 1
-        variables, elements, values = zip(*entries, strict=True)
-        fields = (
-            self.epoch_ns + time_ns,
-            self.run_id,
-            writer,
-            self._slots[writer],
-            int(kind),
-            self._sequence,
-            _values(variables, elements, values),
-        )
-        return _new(CommonWrite, fields)
+        Entries of one writer, kind and instant travel together.
+        """
+        return self._write_log.packed(groups, self.epoch_ns, self.run_id)
 
-    def scan(self, task: Task, record: ScanRecord, *, full: bool) -> Scan:
+    def scan_bytes(self, task: Task, record: ScanRecord, *, full: bool) -> bytes:
         """Return the message of a scan; unless ``full``, only what was newly latched since the task's last message."""
-        known = self._tasks[task]
-        latched, before, views = record.latched, known.latched, known.views
-        known.latched = latched if record.scan else None
-        full = full or before is None or not record.scan
-        changed = NO_VALUES
-        if full or before is None:
-            if latched:
-                changed = _values(views, (0,) * len(views), latched)
-        elif latched != before:
-            differs = list(map(ne, latched, before))
-            changed = _values(tuple(compress(views, differs)), (0,) * sum(differs), tuple(compress(latched, differs)))
-        committed = NO_VALUES
-        if record.commits:
-            variables, values = zip(*record.commits, strict=True)
-            committed = _values(variables, (0,) * len(variables), values)
-        reads, writes, errors = record.reads, record.writes, record.errors
-        duration, skipped = record.duration_ns, record.skipped
-        fields = (
-            self.epoch_ns + record.time_ns,
-            known.slot,
-            known.name,
-            record.scan,
-            duration if duration <= _MOST else _MOST,
-            skipped if skipped <= _MOST else _MOST,
-            full,
-            changed,
-            values_of(reads) if reads else NO_VALUES,
-            values_of(writes) if writes else NO_VALUES,
-            committed,
-            [ScanError(line, code) for line, code in errors] if errors else (),
-        )
-        return _new(Scan, fields)
+        return self._tasks[task].scan_bytes(record, self.epoch_ns + record.time_ns, full=full)
 
     def operation(self, operation: Done) -> Operation:
         """Return what was done to the rack."""
@@ -280,20 +221,6 @@ class RackMessages:
             operation.detail,
         )
 
-    def state(self, task: Task, now_ns: int) -> TaskState:
-        """Return a snapshot of a task's state."""
-        known = self._tasks[task]
-        values = task.snapshot()
-        marks = [HELD_MARK + name for name in sorted(task.compiled.held)]
-        return TaskState(
-            self.stamp(now_ns),
-            known.slot,
-            known.name,
-            task.scan_number,
-            known.layout_hash,
-            known.source_hash,
-            [*marks, *known.fields] if marks else known.fields,
-            [*([0] * len(marks)), *known.sizes] if marks else known.sizes,
-            [0.0 if isinstance(value, str) else float(value) for value in values],
-            [value for value in values if isinstance(value, str)],
-        )
+    def state_bytes(self, task: Task, now_ns: int) -> bytes:
+        """Return the message of a snapshot of a task's state."""
+        return self._tasks[task].state_bytes(self.stamp(now_ns))

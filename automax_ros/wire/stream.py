@@ -18,12 +18,11 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
-from automax_ros.wire.cdr import Message, encode, encoder
-from automax_ros.wire.messages import NAMES, CommonWrite, Scan
+from automax_ros.running.views import WriteGroup
+from automax_ros.wire.cdr import Message, encode
 from automax_ros.wire.plant_stream import PlantStream
 from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE
-from automax_ros.wire.rack_messages import RackMessages, message_maker, topic_type_name
+from automax_ros.wire.rack_messages import RackMessages, topic_type_name, value_encoder
 from automax_ros.wire.topics import Sink, Take, Takes, Topic
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
@@ -38,9 +37,7 @@ class _ValueTopic:
         self.variable = variable
         self.topic = topic
         self.takes: list[Take] = []
-        self.make = message_maker(variable)
-        self.scale = variable.scale
-        self.encode = encoder(topic.type_name)
+        self.encode = value_encoder(variable)
         self.interval_ns = round(NS_PER_S / variable.rate_limit_hz) if variable.rate_limit_hz else 0
         self.last_ns = -1
         self.last_payload = b""
@@ -79,15 +76,16 @@ class RackStream:
             slot: Topic(f"{space}/states", "automax_msgs/msg/TaskState", SCAN, slot) for slot in slots
         }
         self._values = self._value_topics(space)
+        self._by_view = [self._values.get(view) for view in range(len(rack.config.variables))]
         self.plants = PlantStream(rack, space, self._messages.stamp)
         self._tables: list[Take] = []
         self._images: list[Take] = []
         self._writes: list[Take] = []
         self._operations: list[Take] = []
         self._tasks = {task: _TaskStream() for task in rack.tasks}
-        self._encode_scan, self._encode_write = encoder(NAMES[Scan]), encoder(NAMES[CommonWrite])
         self._next_image_ns = SNAPSHOT_PERIOD_NS
         self._begun = False
+        self._present = rack.memory.present
 
     @property
     def has_begun(self) -> bool:
@@ -213,7 +211,7 @@ class RackStream:
 
     # RackObserver
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """Send a scan, its writes and the values that changed; every now and then a snapshot after them."""
         stream = self._tasks[task]
         now = max(record.time_ns, self._rack.now_ns)  # a modeled scan is told when it has ended
@@ -222,15 +220,14 @@ class RackStream:
         if own:
             self._send_log(writes[:own])
         if stream.scans:
-            message = self._messages.scan(task, record, full=full)
-            payload = self._encode_scan(message)
+            payload = self._messages.scan_bytes(task, record, full=full)
             stamp = self._messages.stamp(writes[own].time_ns) if own < len(writes) else self._messages.stamp(now)
             for take in stream.scans:
                 take(stamp, payload)
-        if own < len(writes):
-            self._send_log(writes[own:])
         if writes:
-            self._send_values({entry[4]: None for entry in writes}, now)
+            if own < len(writes):
+                self._send_log(writes[own:] if own else writes)
+            self._send_written(writes, now)
         if full or not record.scan or ((stream.held or task.compiled.held) and stream.held != task.held):
             self._send_state(task, now)
         elif stream.each_state:
@@ -241,7 +238,7 @@ class RackStream:
                 self._next_image_ns = stream.next_full_ns
                 self._send_image(now)
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Send writes from outside and the values that changed."""
         self._send_writes(writes, self._rack.now_ns)
 
@@ -272,7 +269,9 @@ class RackStream:
         if takes is None:
             takes, stream.held = stream.states, task.held
         if takes:
-            _send(self._messages.state(task, now_ns), takes)
+            payload, stamp = self._messages.state_bytes(task, now_ns), self._messages.stamp(now_ns)
+            for take in takes:
+                take(stamp, payload)
 
     def _send_image(self, now_ns: int, takes: Collection[Take] | None = None) -> None:
         _send(self._messages.image(now_ns), self._images if takes is None else takes)
@@ -280,23 +279,32 @@ class RackStream:
         if forces is not None:
             _send(forces, self._writes)
 
-    def _send_writes(self, writes: list[Write], now_ns: int) -> None:
+    def _send_writes(self, writes: list[WriteGroup], now_ns: int) -> None:
         self._send_log(writes)
-        self._send_values({entry[4]: None for entry in writes}, now_ns)
+        self._send_written(writes, now_ns)
 
-    def _send_log(self, writes: list[Write]) -> None:
-        for message in self._messages.writes(writes):
-            payload = self._encode_write(message)
+    def _send_log(self, writes: list[WriteGroup]) -> None:
+        for stamp, payload in self._messages.write_bytes(writes):
             for take in self._writes:
-                take(message[0], payload)
+                take(stamp, payload)
+
+    def _send_written(self, writes: list[WriteGroup], now_ns: int) -> None:
+        """Send the values of what was written, each once."""
+        if len(writes) == 1:
+            self._send_values([change[0] for change in writes[0].changes], now_ns)
+        else:
+            self._send_values(dict.fromkeys(change[0] for group in writes for change in group.changes), now_ns)
 
     def _send_values(self, views: Iterable[int], now_ns: int) -> None:
         for view in views:
-            value = self._values.get(view)
+            value = self._by_view[view]
             if value is None:
                 continue
+            if not value.interval_ns:
+                self._send_value(view, value, now_ns)
+                continue
             due = value.last_ns + value.interval_ns
-            if value.last_ns < 0 or not value.interval_ns or now_ns >= due:
+            if value.last_ns < 0 or now_ns >= due:
                 self._send_value(view, value, now_ns)
             elif not value.waits:
                 value.waits = True
@@ -309,11 +317,7 @@ class RackStream:
 
     def _send_value(self, view: int, value: _ValueTopic, now_ns: int) -> None:
         value.waits = False
-        present = self._rack.memory.present(view)
-        # A message of a simple variable has one field: a plain tuple is as good, and cheaper.
-        if value.scale is not None and isinstance(present, int):
-            present = value.scale.value_of(present)
-        payload = value.encode(value.make(present) if value.variable.is_array else (present,))
+        payload = value.encode(self._present(view))
         if payload != value.last_payload:
             value.last_ns, value.last_payload = now_ns, payload
             stamp = self._messages.stamp(now_ns)
@@ -325,7 +329,7 @@ def _as_installed(task: Task) -> bool:
     return not task.compiled.held and task.snapshot() == task.layout.flatten(task.layout.fresh())
 
 
-def own_from(writes: Sequence[Write], writer: int) -> int:
+def own_from(writes: Sequence[WriteGroup], writer: int) -> int:
     """Return where a scan stands among writes: before its own first one, after all that others wrote before that."""
     return next((place for place, entry in enumerate(writes) if entry.writer == writer), len(writes))
 

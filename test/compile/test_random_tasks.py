@@ -152,7 +152,7 @@ def forced_tasks_agree(text: str, history, forced: dict[str, object]) -> None:
         model.scan()
         scan_in_steps(in_steps, now)
         compare_states(task, in_steps)
-        assert other.drain() == list(memory._log or [])
+        assert other.drain() == [entry for group in memory._log or [] for entry in group.entries()]
         compare(task, memory, model, record)
 
 

@@ -18,7 +18,7 @@ from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.report import Kind
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed
 from .replays import YAML as YAML_OF_TWO
@@ -44,7 +44,7 @@ class AfterScans:
         self._rack = rack
         self.values: dict[int, dict[str, object]] = {}
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         seen: dict[str, object] = {}
         for view, variable in enumerate(self._rack.config.variables):
             present = self._rack.memory.present(view)
@@ -54,7 +54,7 @@ class AfterScans:
                 seen[element_name(variable, element)] = exact
         self.values[record.scan] = seen
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Writes between scans are in the next scan's memory."""
 
     def tuned(self, task: Task, now_ns: int) -> None:

@@ -148,7 +148,7 @@ def test_restarted_task_starts_afresh(tmp_path):
     rack.run(0.2)
     record_of_start = task.run(rack.now_ns)
     assert record_of_start is not None
-    stream.scanned(task, record_of_start, rack.memory.drain())
+    stream.scanned(task, record_of_start, rack.memory.take_writes())
     rack.run(0.5)
     stream.end()
     recorder.close()

@@ -133,7 +133,7 @@ class Rewriting:
                 self._output.add_metadata(piece)
         elif isinstance(piece, bytes):
             self._add([_found(piece)], self._loose)
-            if len(self._loose.data) > _LOOSE_BYTES:
+            if self._loose.size > _LOOSE_BYTES:
                 self._end_loose()
 
     def _put_chunk(self, piece: SoundChunk, *, last: bool) -> None:

@@ -25,7 +25,7 @@ from automax_ros.rack.standing import StopCause
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.registers import Part
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import MemoryValueError, Write
+from automax_ros.running.views import MemoryValueError, WriteGroup
 
 _FORCES = (WriteKind.FORCE, WriteKind.RELEASE)
 
@@ -112,12 +112,12 @@ class BusLink:
 
     # RackObserver
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         """Send what a scan has written."""
         if writes:
             self._collect()
 
-    def written(self, writes: list[Write]) -> None:  # noqa: ARG002
+    def written(self, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         """Send what was written from outside the tasks."""
         self._collect()
 

@@ -8,7 +8,7 @@ from automax_ros.rack.loader import load
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 
 HEAD = """\
 rack: PM1
@@ -53,12 +53,12 @@ class Seen:
         self.operations: list[Operation] = []
         rack.observe(self)
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         self.scans.append((record.time_ns, task.name, record.scan))
         self.written(writes)
 
-    def written(self, writes: list[Write]) -> None:
-        for item in writes:
+    def written(self, writes: list[WriteGroup]) -> None:
+        for item in (entry for group in writes for entry in group.entries()):
             spec = self.rack.memory.specs[item.view]
             if not spec.is_array:
                 self.writes.append((item.time_ns, spec.name, item.value))

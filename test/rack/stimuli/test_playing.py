@@ -10,7 +10,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.running.task import ScanRecord, Status, Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 
 from .helpers import SPEED, playing, rack_in
 
@@ -26,15 +26,16 @@ class Log:
         self.latched: list[tuple[int, tuple[Value, ...]]] = []
         rack.observe(self)
 
-    def scanned(self, task: Task, record: ScanRecord, _: list[Write]) -> None:
+    def scanned(self, task: Task, record: ScanRecord, _: list[WriteGroup]) -> None:
         if task.name == "SPEED":
             self.latched.append((record.time_ns, tuple(record.latched)))
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         kinds = {writer.id: writer.kind for writer in self.rack.writers}
         self.writes += [
             (item.time_ns, self.rack.memory.specs[item.view].name, item.value)
-            for item in writes
+            for group in writes
+            for item in group.entries()
             if kinds[item.writer] is WriterKind.OPERATOR
         ]
 

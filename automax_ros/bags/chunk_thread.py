@@ -1,0 +1,97 @@
+"""Compresses and writes chunks on a thread of its own, one after the other: no scan waits for it.
+
+At most one chunk is under way: who hands over the next one waits until the one before is in the file. So a killed
+process loses the open chunk and one under way, order and bytes are those of one thread, and memory is bounded.
+"""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections import deque
+from collections.abc import Callable
+from queue import SimpleQueue
+
+_HAND_OVER_S = 0.0005
+"""Longest wait for the thread to take a chunk over, s (decision): Python lets another thread go on only where this one
+waits or after 5 ms, in which a simulated rack has filled the next chunks."""
+_LOOK_S = 0.05
+"""Pause between two looks whether a job is done, s: where two wait, or a wait was interrupted."""
+
+_Job = Callable[[], None]
+
+
+class ChunkThread:
+    """Carries out one job after the other. The thread begins with the first and ends with this object."""
+
+    def __init__(self) -> None:
+        """Begin without a thread."""
+        self._thread: threading.Thread | None = None
+        self._calls: SimpleQueue[bool] = SimpleQueue()
+        self._jobs: deque[_Job] = deque()
+        """The job under way, or none."""
+        self._taken, self._done = threading.Lock(), threading.Lock()
+        """Free when the job was taken over, and when it is done."""
+        self._failed: list[Exception] = []
+
+    def hand(self, job: _Job) -> None:
+        """Let a job be carried out once the one before is; a quick job may be done when this returns.
+
+        Raises:
+            Exception: what a job before has raised; this one is not carried out.
+        """
+        if self._thread is None:
+            self._begin()
+        self.settle()
+        self._taken.acquire(blocking=False)
+        self._jobs.append(job)
+        self._calls.put(True)
+        self._taken.acquire(timeout=_HAND_OVER_S)
+
+    def settle(self) -> None:
+        """Wait until no job is under way.
+
+        Raises:
+            Exception: what a job has raised.
+        """
+        while self._jobs:
+            if not self._done.acquire(timeout=_LOOK_S):
+                self._calls.put(True)  # a signal may have struck between the job and its call
+        if self._failed:
+            raise self._failed.pop()
+
+    def end(self) -> None:
+        """Let the thread end after the job under way."""
+        if self._thread is not None:
+            self._calls.put(False)
+            self._thread.join()
+            self._thread = None
+
+    def _begin(self) -> None:
+        arguments = self._calls, self._jobs, self._taken, self._done, self._failed
+        self._thread = threading.Thread(target=_work, args=arguments, name="recording", daemon=True)
+        self._thread.start()
+        weakref.finalize(self, self._calls.put, False)
+
+
+def _work(
+    calls: SimpleQueue[bool],
+    jobs: deque[_Job],
+    taken: threading.Lock,
+    done: threading.Lock,
+    failed: list[Exception],
+) -> None:
+    while calls.get():
+        if jobs:
+            _free(taken)
+            try:
+                jobs[0]()
+            except Exception as error:  # noqa: BLE001  # told to whoever hands over the next
+                failed.append(error)
+            jobs.popleft()
+            _free(done)
+
+
+def _free(lock: threading.Lock) -> None:
+    if lock.locked():
+        lock.release()

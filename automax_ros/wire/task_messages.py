@@ -1,0 +1,199 @@
+"""One task's scans and states as messages, and as their bytes without making the messages.
+
+A scan repeats name, slot and variables of its task for ever, so its bytes are those of a pattern with other numbers:
+that takes a fifth of the codec's time. What is seldom (texts, errors, full latches) goes through the codec.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from itertools import compress
+from operator import ne
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Latched, Value
+from automax_ros.running.scan_record import ScanRecord
+from automax_ros.running.task import Task
+from automax_ros.wire.cdr import CdrError, encoder
+from automax_ros.wire.messages import HELD_MARK, NAMES, Scan, ScanError, TaskState
+from automax_ros.wire.patterns import Patterns
+from automax_ros.wire.prepared import Prepared, prepared
+from automax_ros.wire.values import NO_VALUES, Values, as_values, values_of
+
+_new = tuple.__new__
+"""Makes a message of a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
+_MOST = 0xFFFFFFFF
+"""The greatest uint32."""
+_HEAD = ("scan", "duration_ns", "skipped")
+_VALUES = (("latched.value",), ("read.value",), ("written.value",), ("committed.value",))
+Entries = tuple[tuple[tuple[int, ...], ...], tuple[Value, ...]]
+"""What recurs of accesses beside the latch (views, elements), and their values."""
+NOTHING: Entries = ((), ())
+
+
+class TaskMessages:
+    """Makes the messages of one task as it is installed. A stamp is in ns."""
+
+    def __init__(self, task: Task) -> None:
+        """Take what every message of the task repeats."""
+        layout = task.layout
+        self.compiled = task.compiled
+        self._task = task
+        self._views = tuple(task.memory.view(name) for name in task.compiled.latched)
+        self._layout_hash, self._source_hash = layout.hash, task.compiled.program.source_hash
+        self._fields = [field.name for field in layout.fields]
+        self._sizes = [field.size for field in layout.fields]
+        self._latched: Latched | None = None
+        self._scans = Patterns()
+        self._quiet: Prepared | None = None
+        self._alike_states: Prepared | None = None
+        self._encode_scan, self._encode_state = encoder(NAMES[Scan]), encoder(NAMES[TaskState])
+
+    def scan(self, record: ScanRecord, stamp: int, *, full: bool) -> Scan:
+        """Return the message of a scan; unless ``full``, only what was newly latched since the task's last message."""
+        latched, before = record.latched, self._latched
+        self._latched = latched if record.scan else None
+        if full or before is None or not record.scan:
+            views = self._views
+            changed = as_values(views, (0,) * len(views), latched) if latched else NO_VALUES
+            return self._scan(record, stamp, changed, full=True)
+        differs = () if latched == before else tuple(map(ne, latched, before))
+        return self._scan(record, stamp, _changed(self._views, latched, differs), full=False)
+
+    def scan_bytes(self, record: ScanRecord, stamp: int, *, full: bool) -> bytes:
+        """Return the bytes of the same message.
+
+        Raises:
+            CdrError: a value does not fit its field.
+        """
+        before, latched = self._latched, record.latched
+        if full or before is None or not record.scan or record.errors:
+            return self._encode_scan(self.scan(record, stamp, full=full))
+        self._latched = latched
+        if record.reads or record.writes:
+            return self._in_pattern(record, stamp, before, beside(record.reads), beside(record.writes))
+        if latched != before or record.commits:
+            return self._in_pattern(record, stamp, before, NOTHING, NOTHING)
+        quiet = self._quiet
+        if quiet is None:
+            message = self._scan(record, stamp, NO_VALUES, full=False)
+            self._quiet = quiet = prepared(message, ("stamp",), _HEAD)
+        seconds, rest = divmod(stamp, NS_PER_S)
+        first, second, third = quiet.constants
+        duration, skipped = min(record.duration_ns, _MOST), min(record.skipped, _MOST)
+        try:
+            return quiet.pack(first, seconds, rest, second, record.scan, duration, skipped, third)
+        except struct.error as error:
+            raise CdrError(f"scan of task {self._task.name}: {error}") from error
+
+    def state(self, stamp: int) -> TaskState:
+        """Return the message of the task's state as it is."""
+        values = self._task.snapshot()
+        marks = [HELD_MARK + name for name in sorted(self._task.compiled.held)]
+        return TaskState(
+            stamp,
+            self._task.slot,
+            self._task.name,
+            self._task.scan_number,
+            self._layout_hash,
+            self._source_hash,
+            [*marks, *self._fields] if marks else self._fields,
+            [*([0] * len(marks)), *self._sizes] if marks else self._sizes,
+            [0.0 if isinstance(value, str) else float(value) for value in values],
+            [value for value in values if isinstance(value, str)],
+        )
+
+    def state_bytes(self, stamp: int) -> bytes:
+        """Return the bytes of the same message.
+
+        Raises:
+            CdrError: a value does not fit its field.
+        """
+        values = self._task.snapshot()
+        if self._task.compiled.held or str in map(type, values):
+            return self._encode_state(self.state(stamp))
+        alike = self._alike_states
+        if alike is None:
+            self._alike_states = alike = prepared(self.state(stamp), ("stamp",), ("scan",), ("value",))
+        seconds, rest = divmod(stamp, NS_PER_S)
+        first, second, third, last = alike.constants
+        try:
+            return alike.pack(first, seconds, rest, second, self._task.scan_number, third, *values, last)
+        except struct.error as error:
+            raise CdrError(f"state of task {self._task.name}: {error}") from error
+
+    def _in_pattern(self, record: ScanRecord, stamp: int, before: Latched, reads: Entries, writes: Entries) -> bytes:
+        """Return the bytes of a scan in which something has happened that scans before it may have had in common."""
+        latched, commits = record.latched, record.commits
+        differs: tuple[bool, ...] = () if latched == before else tuple(map(ne, latched, before))
+        views, values = zip(*commits, strict=True) if commits else ((), ())
+        key = (differs, views, reads[0], writes[0])
+        pattern = self._scans.known.get(key)
+        if pattern is None:
+            changed = _changed(self._views, latched, differs)
+            message = self._scan(record, stamp, changed, full=False)
+            if not (message.latched.text or message.read.text or message.written.text or message.committed.text):
+                self._scans.learn(key, lambda: prepared(message, ("stamp",), _HEAD, *_VALUES))
+            return self._encode_scan(message)
+        seconds, rest = divmod(stamp, NS_PER_S)
+        constants = pattern.constants
+        duration, skipped = min(record.duration_ns, _MOST), min(record.skipped, _MOST)
+        try:
+            return pattern.pack(
+                constants[0],
+                seconds,
+                rest,
+                constants[1],
+                record.scan,
+                duration,
+                skipped,
+                constants[2],
+                *compress(latched, differs),
+                constants[3],
+                *reads[1],
+                constants[4],
+                *writes[1],
+                constants[5],
+                *values,
+                constants[6],
+            )
+        except struct.error as error:
+            raise CdrError(f"scan of task {self._task.name}: {error}") from error
+
+    def _scan(self, record: ScanRecord, stamp: int, changed: Values, *, full: bool) -> Scan:
+        """Return the message of a scan of which it is known what it tells of its latch."""
+        committed = NO_VALUES
+        if record.commits:
+            variables, values = zip(*record.commits, strict=True)
+            committed = as_values(variables, (0,) * len(variables), values)
+        fields = (
+            stamp,
+            self._task.slot,
+            self._task.name,
+            record.scan,
+            min(record.duration_ns, _MOST),
+            min(record.skipped, _MOST),
+            full,
+            changed,
+            values_of(record.reads),
+            values_of(record.writes),
+            committed,
+            [ScanError(line, code) for line, code in record.errors] if record.errors else (),
+        )
+        return _new(Scan, fields)
+
+
+def beside(entries: Sequence[tuple[int, int, Value]]) -> Entries:
+    """Return accesses beside the latch as what recurs, views and elements, and their values."""
+    if not entries:
+        return NOTHING
+    views, elements, values = zip(*entries, strict=True)
+    return (views, elements), values
+
+
+def _changed(views: Sequence[int], latched: Latched, differs: Sequence[bool]) -> Values:
+    """Return those latched values that differ from the ones before; none do where ``differs`` is empty."""
+    if not differs:
+        return NO_VALUES
+    return as_values(tuple(compress(views, differs)), (0,) * sum(differs), tuple(compress(latched, differs)))

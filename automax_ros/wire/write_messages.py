@@ -1,0 +1,83 @@
+"""The write log of common memory as messages, and as their bytes without making the messages."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain, groupby
+from operator import attrgetter
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Value
+from automax_ros.running.views import WriteGroup
+from automax_ros.wire.cdr import CdrError, encoder
+from automax_ros.wire.messages import NAMES, CommonWrite
+from automax_ros.wire.patterns import Patterns
+from automax_ros.wire.prepared import prepared
+from automax_ros.wire.values import values_of
+
+_KEY = attrgetter("key")
+
+
+class WriteMessages:
+    """Makes the CommonWrites of one run and numbers them; ``sequence`` is the number of the last.
+
+    ``slots`` has the slot of each writer by its id.
+    """
+
+    def __init__(self, slots: Mapping[int, int]) -> None:
+        """Begin with the numbering."""
+        self.sequence = 0
+        self._slots = slots
+        self._patterns = Patterns()
+        self._encode = encoder(NAMES[CommonWrite])
+
+    def message(
+        self, stamp: int, run_id: int, writer: int, kind: WriteKind, entries: Iterable[tuple[int, int, Value]]
+    ) -> CommonWrite:
+        """Return the next message: (view, element, value) that one writer has written at one instant."""
+        self.sequence += 1
+        values = values_of(tuple(entries))
+        return CommonWrite(stamp, run_id, writer, self._slots[writer], int(kind), self.sequence, values)
+
+    def packed(self, groups: Sequence[WriteGroup], epoch_ns: int, run_id: int) -> list[tuple[int, bytes]]:
+        """Return stamp and bytes of what tells of a part of the write log: neighbours of one key travel together.
+
+        ``epoch_ns`` is added to rack time to give stamps.
+
+        Raises:
+            CdrError: a value does not fit its field.
+        """
+        if len(groups) == 1:
+            group = groups[0]
+            stamp = epoch_ns + group.time_ns
+            return [(stamp, self._one(group, stamp, run_id))]
+        found = []
+        for (time_ns, writer, kind), members in groupby(groups, key=_KEY):
+            stamp = epoch_ns + time_ns
+            entries = chain.from_iterable(_triples(member) for member in members)
+            found.append((stamp, self._encode(self.message(stamp, run_id, writer, kind, entries))))
+        return found
+
+    def _one(self, group: WriteGroup, stamp: int, run_id: int) -> bytes:
+        views, values = zip(*group.changes, strict=True)
+        key = (group.writer, group.kind, group.element, views, run_id)
+        pattern = self._patterns.known.get(key)
+        if pattern is None:
+            message = self.message(stamp, run_id, group.writer, group.kind, _triples(group))
+            if not message.values.text:
+                self._patterns.learn(key, lambda: prepared(message, ("stamp",), ("sequence",), ("values.value",)))
+            return self._encode(message)
+        self.sequence += 1
+        seconds, rest = divmod(stamp, NS_PER_S)
+        first, second, third, last = pattern.constants
+        try:
+            return pattern.pack(first, seconds, rest, second, self.sequence, third, *values, last)
+        except struct.error as error:
+            raise CdrError(f"a write to common memory: {error}") from error
+
+
+def _triples(group: WriteGroup) -> Iterable[tuple[int, int, Value]]:
+    element = group.element
+    return ((view, element, value) for view, value in group.changes)
