@@ -60,6 +60,11 @@ class ChunkThread:
         if self._failed:
             raise self._failed.pop()
 
+    @property
+    def failed(self) -> bool:
+        """Whether a job has raised what ``settle`` has not told yet."""
+        return bool(self._failed)
+
     def end(self) -> None:
         """Let the thread end after the job under way."""
         if self._thread is not None:
@@ -86,7 +91,7 @@ def _work(
             _free(taken)
             try:
                 jobs[0]()
-            except Exception as error:  # noqa: BLE001  # told to whoever hands over the next
+            except Exception as error:  # told to whoever hands over the next
                 failed.append(error)
             jobs.popleft()
             _free(done)

@@ -1,8 +1,8 @@
 """Writes a recording: a folder with ``scans_0.mcap``, ... and ``metadata.yaml``, as rosbag2 makes them.
 
 The same messages give the same bytes: nothing depends on the folder's name, the host or the wall clock. Chunks end by
-size or with a second, always between two instants, and reach the operating system when they end, so that a killed
-process loses little and no instant by half.
+size or with half a second, always between two instants. One reaches the operating system while the next is filled, so
+that a killed process loses a second at most and no instant by half.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ CHUNK_BYTES = 1 << 20
 """A chunk ends before the next instant when it holds more bytes than this, uncompressed."""
 LONGEST_CHUNK_BYTES = 24 << 20
 """A chunk of more bytes than this ends even inside an instant, so that every reader takes it."""
+CHUNK_NS = NS_PER_S // 2
+"""A chunk ends with each of these times of the messages, ns (decision: one is open and one is being written, so a
+killed process loses a second at most)."""
 MAX_PAYLOAD_BYTES = 32 << 20
 """Longest message and longest attachment that is written, in bytes (decision: our own reader is sure to accept it)."""
 MAX_STAMP = (2**31 - 1) * NS_PER_S
@@ -49,12 +52,12 @@ class StorageOptions:
     """How a recording is stored.
 
     ``compression`` is a key of COMPRESSIONS. A file ends when it has ``split_bytes`` bytes, 0 for never. A chunk ends
-    each ``chunk_ns`` of the messages' time: what a killed process loses.
+    each ``chunk_ns`` of the messages' time: a killed process loses two of them at most.
     """
 
     compression: str = "zstd"
     split_bytes: int = 0
-    chunk_ns: int = NS_PER_S
+    chunk_ns: int = CHUNK_NS
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.
@@ -124,17 +127,10 @@ class BagWriter:
         """Files, and the folder with their names, that ``sync`` has not yet seen to the disk."""
         try:
             folder.mkdir(parents=True)
-        except FileExistsError:
-            raise RecordingError(
-                "AMX6800",
-                folder,
-                "exists already, not overwriting",
-                "record into another folder, or move this one away",
-            ) from None
-        except OSError as error:
-            raise self._write_error(error) from error
-        try:
             self._begin_file()
+        except FileExistsError:
+            hint = "record into another folder, or move this one away"
+            raise RecordingError("AMX6800", folder, "exists already, not overwriting", hint) from None
         except OSError as error:
             raise self._write_error(error) from error
 
@@ -236,16 +232,13 @@ class BagWriter:
     def flush(self, now: int | None = None) -> None:
         """Hand the open chunk to the operating system; with a time only if the chunk's own time is over by then.
 
-        Without a time it has it when this returns, else soon.
+        Without a time it has it when this returns, else soon, and what the disk refuses the next call tells.
 
         Raises:
             RecordingError: the disk refuses.
         """
-        if self._open and (now is None or now >= self._chunk_end):
-            try:
-                self._end_chunk(wait=now is None)
-            except OSError as error:
-                raise self._failed(error) from error
+        if self._open and (now is None or now >= self._chunk_end or self._thread.failed):
+            self._flush(wait=now is None)
 
     def sync(self) -> None:
         """Wait until what was flushed is on the disk itself; from another thread too, for it may take long.
@@ -333,7 +326,7 @@ class BagWriter:
         self.require_synced()
         time = max(stamp, self._last_time + 1)
         if time >= self._chunk_end or self._chunk.size > CHUNK_BYTES:
-            self._hand_over()
+            self._flush(wait=self._options.split_bytes > 0)
             period = self._options.chunk_ns
             self._chunk_end = (time // period + 1) * period
         self._stamp = stamp
@@ -345,10 +338,9 @@ class BagWriter:
         self.flush()
         return self._chunk
 
-    def _hand_over(self) -> None:
-        """Let the thread write the open chunk, as soon as the one before is written."""
+    def _flush(self, *, wait: bool) -> None:
         try:
-            self._end_chunk(wait=bool(self._options.split_bytes))
+            self._end_chunk(wait=wait)
         except OSError as error:
             raise self._failed(error) from error
 
@@ -357,7 +349,7 @@ class BagWriter:
         if self._chunk.index:
             self._thread.hand(partial(self._mcap.add_chunk, self._chunk))
             self._chunk = ChunkBuilder()
-        if wait:
+        if wait or self._thread.failed:
             self._thread.settle()
 
     def _metadata(self, files: list[FileSummary]) -> BagMetadata:

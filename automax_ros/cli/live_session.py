@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from automax_ros.bags.recorder import Recorder
-from automax_ros.cli.recording_watch import DiskSync, RecordingWatch, live_options
+from automax_ros.cli.recording_watch import DiskSync, RecordingWatch
 from automax_ros.cli.run_plan import RunPlan, conclude, report_at_end, tell_forms, warn
 from automax_ros.cli.signals import StopRequest
 from automax_ros.cli.state_keeping import StateKeeping
@@ -143,7 +143,7 @@ class LiveSession:
     def _recorder(self) -> Recorder | None:
         if self.plan.record is None:
             return None
-        recorder = Recorder(self.rack, self.live.stream, self.plan.record, live_options(self.plan.recording))
+        recorder = Recorder(self.rack, self.live.stream, self.plan.record, self.plan.recording)
         # Closed after the rack, whose last messages it takes.
         rack = self._ending.pop_all()
         self._ending.callback(recorder.sync_at_end)

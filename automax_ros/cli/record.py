@@ -20,7 +20,7 @@ from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.writer import StorageOptions
 from automax_ros.cli.rack_space import config_of, names_file, space_of
 from automax_ros.cli.record_options import split_seconds, storage_options
-from automax_ros.cli.recording_watch import LIVE_CHUNK_NS, DiskSync
+from automax_ros.cli.recording_watch import DiskSync
 from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     1 where recording broke off or ended by itself, or holds nothing (decision: a script must see that).
     """
-    storage = storage_options(arguments.compression, arguments.split_mb, "--", LIVE_CHUNK_NS)
+    storage = storage_options(arguments.compression, arguments.split_mb, "--")
     how = _Storing(storage, arguments.split_s or 0, arguments.tasks)
     with stop_signals() as stop:
         domain = prepare_ros(arguments)

@@ -60,9 +60,7 @@ def recording_options(arguments: argparse.Namespace, config: RackConfig) -> Reco
     return RecordingOptions(storage, arguments.record_split_s or 0, tasks, arguments.record_locals)
 
 
-def storage_options(
-    compression: str | None, split_mb: str | None, prefix: str, chunk_ns: int = NS_PER_S
-) -> StorageOptions:
+def storage_options(compression: str | None, split_mb: str | None, prefix: str) -> StorageOptions:
     """Return how a recording is stored; ``prefix`` begins the names of the options.
 
     Raises:
@@ -73,7 +71,7 @@ def storage_options(
         hint = did_you_mean(chosen, COMPRESSIONS) or f"there are {', '.join(COMPRESSIONS)}"
         raise UsageError(f"{prefix}compression: no compression {quoted(chosen)}", hint)
     try:
-        return StorageOptions(chosen, _split_bytes(split_mb, f"{prefix}split-mb"), chunk_ns)
+        return StorageOptions(chosen, _split_bytes(split_mb, f"{prefix}split-mb"))
     except ValueError as error:
         raise UsageError(f"{prefix}split-mb: {error}") from error
 

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 import threading
 from collections.abc import Callable
 
-from automax_ros.bags.recorder import Recorder, RecordingOptions
+from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.status import StatusDisplay
-from automax_ros.core.ticks import NS_PER_MS
 
-LIVE_CHUNK_NS = 500 * NS_PER_MS
-"""On the wall clock chunks end twice per second: with the time until somebody looks, under a second is ever open."""
 SYNC_PERIOD_S = 0.4
 """Pause between two waits for the disk itself, so that a power failure costs about a second too."""
-
-
-def live_options(options: RecordingOptions) -> RecordingOptions:
-    """Return the options for a run on the wall clock."""
-    return dataclasses.replace(options, storage=dataclasses.replace(options.storage, chunk_ns=LIVE_CHUNK_NS))
 
 
 class RecordingWatch:

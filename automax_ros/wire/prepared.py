@@ -80,14 +80,16 @@ class _Builder:
     def _add(self, code: str, values: Sequence[Any], group: int = -1) -> None:
         """Add values of one code with the padding before them; those of a group that varies only by their number."""
         if group >= 0 and group != self._group:
-            self._pad(code, bool(values), fixed=True)
+            if group != len(self._constants):
+                raise ValueError("the groups are not fields in order, each group together")
+            self._pad(code, needed=bool(values), fixed=True)
             self._cut()
             self._group = group
         elif group < 0:
             self._group = -1
-            self._pad(code, bool(values), fixed=True)
+            self._pad(code, needed=bool(values), fixed=True)
         else:
-            self._pad(code, bool(values), fixed=False)
+            self._pad(code, needed=bool(values), fixed=False)
         if code == "s":
             self._fixed += f"{len(values[0])}s"
             self._values += values
@@ -100,7 +102,7 @@ class _Builder:
             self._format += f"{len(values)}{code}" if values else ""
         self._position += size_of(code) * len(values)
 
-    def _pad(self, code: str, needed: bool, *, fixed: bool) -> None:
+    def _pad(self, code: str, *, needed: bool, fixed: bool) -> None:
         padding = -self._position % size_of(code) if needed else 0
         self._position += padding
         if padding and fixed:
@@ -126,11 +128,12 @@ def prepared(message: Message, *groups: Sequence[str]) -> Prepared:
 
     Raises:
         struct.error: a value does not fit its field.
+        ValueError: the groups are not fields in order.
     """
     name = NAMES[type(message)]
     builder = _Builder(groups)
     builder.add_message(name, message)
     made = builder.finish()
     if len(made.constants) != len(groups) + 1:
-        raise ValueError(f"{name}: {groups} are not its fields in order, each group together")
+        raise ValueError(f"{name} has not all of {groups}")
     return made

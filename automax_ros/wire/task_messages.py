@@ -28,7 +28,7 @@ _MOST = 0xFFFFFFFF
 _HEAD = ("scan", "duration_ns", "skipped")
 _VALUES = (("latched.value",), ("read.value",), ("written.value",), ("committed.value",))
 Entries = tuple[tuple[tuple[int, ...], ...], tuple[Value, ...]]
-"""What recurs of accesses beside the latch (views, elements), and their values."""
+"""What recurs of accesses to actual memory (views, elements), and their values."""
 NOTHING: Entries = ((), ())
 
 
@@ -72,7 +72,7 @@ class TaskMessages:
             return self._encode_scan(self.scan(record, stamp, full=full))
         self._latched = latched
         if record.reads or record.writes:
-            return self._in_pattern(record, stamp, before, beside(record.reads), beside(record.writes))
+            return self._in_pattern(record, stamp, before, accesses(record.reads), accesses(record.writes))
         if latched != before or record.commits:
             return self._in_pattern(record, stamp, before, NOTHING, NOTHING)
         quiet = self._quiet
@@ -184,8 +184,8 @@ class TaskMessages:
         return _new(Scan, fields)
 
 
-def beside(entries: Sequence[tuple[int, int, Value]]) -> Entries:
-    """Return accesses beside the latch as what recurs, views and elements, and their values."""
+def accesses(entries: Sequence[tuple[int, int, Value]]) -> Entries:
+    """Return accesses to actual memory as what recurs, views and elements, and their values."""
     if not entries:
         return NOTHING
     views, elements, values = zip(*entries, strict=True)

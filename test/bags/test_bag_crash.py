@@ -172,6 +172,7 @@ def test_an_idle_rack_reaches_the_disk(tmp_path: Path) -> None:
     recorder.flush(NS_PER_S // 2 - 1)
     assert data.stat().st_size == size
     recorder.flush(NS_PER_S // 2)
+    recorder.sync()
     grown = data.stat().st_size
     assert grown > size
     recorder.flush(10 * NS_PER_S)
