@@ -11,7 +11,7 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import common_named
 from automax_ros.running.scan_record import ScanRecord
 from automax_ros.running.task import Task
-from automax_ros.running.views import Write
+from automax_ros.running.views import WriteGroup
 from automax_ros.sweep.functions import Accumulator
 from automax_ros.sweep.measures import Measure
 
@@ -84,15 +84,16 @@ class Watch:
             signal.flush(end_ns)
         return {measure: window.result() for measure, window in self._windows.items()}
 
-    def written(self, writes: list[Write]) -> None:
+    def written(self, writes: list[WriteGroup]) -> None:
         """Take what was written, by scans too where none keeps records."""
         signals = self._signals
-        for _, time_ns, _, _, view, element, value in writes:
-            signal = signals.get((view, element))
-            if signal is not None:
-                signal.change(time_ns, value)
+        for group in writes:
+            for view, value in group.changes:
+                signal = signals.get((view, group.element))
+                if signal is not None:
+                    signal.change(group.time_ns, value)
 
-    def scanned(self, task: Task, record: ScanRecord, writes: list[Write]) -> None:  # noqa: ARG002
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         """Take what a scan has written."""
         self.written(writes)
 
