@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
-
 from automax_ros.core.types import Latched, Value
 from automax_ros.running.registers import RegisterMap
-from automax_ros.running.views import LatchPlan, ViewSpec, latch_plan
+from automax_ros.running.views import CellLatch, LatchPlan, ViewSpec, latch_plan
 
 
 class Image:
@@ -43,7 +41,7 @@ class Image:
 
     def latching(self, plan: LatchPlan) -> Callable[[], Latched]:
         """Return what does the same as ``latch`` of a plan in one call: cells stay the same list."""
-        return partial(plan, self._cells)
+        return CellLatch(plan, self._cells)
 
     def read_now(self, view: int, element: int = 0) -> Value:
         """Return the actual value of a simple variable or of an array's element (flat index, in range)."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import itemgetter
 from typing import NamedTuple, Protocol
 
@@ -145,6 +146,18 @@ class Memory(Protocol):
 
 class MemoryValueError(ValueError):
     """A value from outside does not fit the variable it is meant for."""
+
+
+class CellLatch(partial[Latched]):
+    """A latch of a plan over ``cells``: native scans, which know the plan's views, read the cells themselves."""
+
+    __slots__ = ()
+
+    @property
+    def cells(self) -> list[Value]:
+        """The cells that it latches, by view."""
+        cells: list[Value] = self.args[0]
+        return cells
 
 
 def latch_plan(views: Sequence[int]) -> LatchPlan:

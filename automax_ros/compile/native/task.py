@@ -39,7 +39,8 @@ class NativeTask:
         kinds = tuple(kind_of(symbols[name].type) for name in compiled.latched)
         places = [compiled.latched.index(name) for name in compiled.written]
         written = tuple((place, compiled.latched_views[place]) for place in places)
-        code = host.Code(str(path), slots.fields, kinds, written, ScanTooLong)
+        latched = tuple(zip(kinds, compiled.latched_views, strict=True))
+        code = host.Code(str(path), slots.fields, latched, written, ScanTooLong)
         self.compiled, self.source = compiled, source
         self.scans: Scans = partial(code.scans, compiled.scans)
         self.scans_forced: Scans = partial(code.scans_forced, _forced_in_python(compiled))

@@ -55,12 +55,13 @@ static int take_fields(Code *self, PyObject *fields)
 static int take_latched(Code *self, PyObject *latched)
 {
     self->latched_count = PyTuple_GET_SIZE(latched);
-    self->latched = PyMem_Calloc(self->latched_count + 1, sizeof(int));
+    self->latched = PyMem_Calloc(self->latched_count + 1, sizeof(latched_spec));
     if (self->latched == NULL)
         return -1;
     for (Py_ssize_t k = 0; k < self->latched_count; k++)
-        self->latched[k] = (int)PyLong_AsLong(PyTuple_GET_ITEM(latched, k));
-    return PyErr_Occurred() ? -1 : 0;
+        if (!PyArg_ParseTuple(PyTuple_GET_ITEM(latched, k), "in", &self->latched[k].kind, &self->latched[k].view))
+            return -1;
+    return 0;
 }
 
 static int take_written(Code *self, PyObject *written)

@@ -1,7 +1,28 @@
 /* The scans of a task: an iterator with close(), as a generator is one. */
 
+/* Reads the cells that a latch would copy: the latched values as they are now. */
+static int latch_cells(Scans *self)
+{
+    const Code *code = self->code;
+    for (Py_ssize_t k = 0; k < code->latched_count; k++) {
+        PyObject *value = PyList_GetItem(self->cells, code->latched[k].view);
+        if (value == NULL)
+            return -1;
+        if (!exact_slot(value, code->latched[k].kind, &self->latched[k]))
+            continue;
+        Py_INCREF(value);
+        int problem = memory_slot(value, code->latched[k].kind, &self->latched[k]);
+        Py_DECREF(value);
+        if (problem)
+            return -1;
+    }
+    return 0;
+}
+
 static int latch(Scans *self)
 {
+    if (self->cells != NULL)
+        return latch_cells(self);
     const Code *code = self->code;
     PyObject *values = PyObject_CallNoArgs(self->latch);
     if (values == NULL)
@@ -12,7 +33,7 @@ static int latch(Scans *self)
         problem = -1;
     }
     for (Py_ssize_t k = 0; !problem && k < code->latched_count; k++)
-        problem = memory_slot(PyTuple_GET_ITEM(values, k), code->latched[k], &self->latched[k]);
+        problem = memory_slot(PyTuple_GET_ITEM(values, k), code->latched[k].kind, &self->latched[k]);
     Py_DECREF(values);
     return problem;
 }
@@ -36,7 +57,7 @@ static int commit(Scans *self)
     PyObject *changes = NULL;
     for (Py_ssize_t k = 0; k < code->written_count; k++) {
         const written_spec *written = &code->written[k];
-        int kind = code->latched[written->latched];
+        int kind = code->latched[written->latched].kind;
         automax_slot before = self->latched[written->latched], now = self->out[k];
         int differs = kind == AUTOMAX_REAL ? now.d != before.d : now.i != before.i;
         if (differs && add_change(&changes, written->view, now, kind)) {
@@ -71,13 +92,28 @@ static PyObject *one_scan(Scans *self)
     return NULL;
 }
 
+/* Takes the latch of the io, and its cells where it has some. */
+static int bind_latch(Scans *self)
+{
+    self->latch = PyObject_GetAttrString(self->io, "latch");
+    if (self->latch == NULL)
+        return -1;
+    self->cells = PyObject_GetAttrString(self->latch, "cells");
+    if (self->cells == NULL) {
+        if (!PyErr_ExceptionMatches(PyExc_AttributeError))
+            return -1;
+        PyErr_Clear();
+    } else if (!PyList_CheckExact(self->cells))
+        Py_CLEAR(self->cells);
+    return 0;
+}
+
 static int begin(Scans *self)
 {
     int misfit = load(self);
     if (!misfit) {
-        self->latch = PyObject_GetAttrString(self->io, "latch");
         self->stage = READY;
-        return self->latch == NULL ? -1 : 0;
+        return bind_latch(self);
     }
     if (misfit < 0)
         return -1;
@@ -130,6 +166,7 @@ static int scans_traverse(Scans *self, visitproc visit, void *arg)
     Py_VISIT(self->state);
     Py_VISIT(self->io);
     Py_VISIT(self->latch);
+    Py_VISIT(self->cells);
     for (int k = 0; k < MEMBERS; k++)
         Py_VISIT(self->members[k]);
     return 0;
@@ -144,6 +181,7 @@ static int scans_clear(Scans *self)
     Py_CLEAR(self->state);
     Py_CLEAR(self->io);
     Py_CLEAR(self->latch);
+    Py_CLEAR(self->cells);
     for (int k = 0; k < MEMBERS; k++)
         Py_CLEAR(self->members[k]);
     return 0;

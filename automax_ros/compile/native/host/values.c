@@ -20,6 +20,11 @@ typedef struct {
 } field_spec;
 
 typedef struct {
+    int kind;
+    Py_ssize_t view;
+} latched_spec;
+
+typedef struct {
     Py_ssize_t latched;
     PyObject *view;
 } written_spec;
@@ -30,7 +35,7 @@ typedef struct {
     scan_function scan, scan_forced;
     field_spec *fields;
     Py_ssize_t field_count, slots;
-    int *latched;
+    latched_spec *latched;
     Py_ssize_t latched_count;
     written_spec *written;
     Py_ssize_t written_count;
@@ -49,7 +54,7 @@ typedef struct {
     automax_host host;
     Code *code;
     scan_function scan;
-    PyObject *make_python, *python, *state, *io, *latch;
+    PyObject *make_python, *python, *state, *io, *latch, *cells;
     PyObject *members[MEMBERS];
     automax_slot *values, *loaded, *latched, *out;
     int stage, running;
