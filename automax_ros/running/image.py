@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+
 from automax_ros.core.types import Latched, Value
 from automax_ros.running.registers import RegisterMap
 from automax_ros.running.views import CellLatch, LatchPlan, ViewSpec, latch_plan
