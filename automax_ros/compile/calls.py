@@ -36,6 +36,7 @@ from automax_ros.compile.simplify import log_in_place
 from automax_ros.compile.stores import write_at
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
+from automax_ros.language.checks.typing_rules import type_of
 from automax_ros.language.program import BoundCall
 from automax_ros.language.syntax.tree import (
     BooleanLiteral,
@@ -275,6 +276,15 @@ def block_value(emitter: Emitter, given: Expression) -> ast.expr:
     return emitter.read(given.name)
 
 
+def _real_value(emitter: Emitter, given: Expression) -> ast.expr:
+    """Return what coefficients are made of: a REAL, also where an INTEGER is given."""
+    value = block_value(emitter, given)
+    literal = value_of(value)
+    if isinstance(literal, (int, float)):
+        return build.constant(float(literal))
+    return value if type_of(given) is DataType.REAL else build.binary(value, "+", build.constant(0.0))
+
+
 def _local(emitter: Emitter, target: Expression) -> str:
     """Return the Python local that an output is stored in, "" where it has none or a force holds it."""
     if isinstance(target, Reference) and target.name not in emitter.held:
@@ -326,10 +336,10 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, values: dict[s
         values.update((name, build.constant(value)) for name, value in zip(declared.names, results, strict=True))
         return
     prefix = instance.prefix
-    now = [emitter.keep(block_value(emitter, bound.arguments[name])) for name in instance.evaluated]
+    now = [emitter.keep(_real_value(emitter, bound.arguments[name])) for name in instance.evaluated]
     seen = [f"{prefix}seen_{name.lower()}" for name in instance.evaluated]
     function = f"{prefix}coefficients"
-    emitter.extra_globals[function] = coefficient_function(bound.block, period_s, literals, instance.evaluated)
+    emitter.extra_globals[function] = CoefficientFunction(bound.block, period_s, literals, instance.evaluated)
     was, kept = f"{prefix}was_limited", [prefix + name for name in kept_names(declared)]
     targets = [*(prefix + name for name in declared.names), *kept, f"{prefix}limited"]
     changed = [build.compare(build.name(old), "<>", new) for old, new in zip(seen, now, strict=True)]
@@ -345,17 +355,20 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, values: dict[s
     values.update((name, build.name(prefix + name)) for name in declared.names)
 
 
-def coefficient_function(
-    block: Block, period_s: float, literals: Mapping[str, float], evaluated: tuple[str, ...]
-) -> Callable[..., tuple[float, ...]]:
-    """Return what computes a block's coefficients from evaluated parameters and what was kept of the last time.
+@dataclass(frozen=True)
+class CoefficientFunction:
+    """Computes a block's coefficients from evaluated parameters and what was kept of the last time.
 
     It returns the coefficients, what to keep, and what is limited as bits of a number.
     """
 
-    def coefficients(*values: float) -> tuple[float, ...]:
-        given = {**literals, **dict(zip(evaluated, values, strict=False))}
-        results, keep, limited = evaluate_noting(block, period_s, given, values[len(evaluated) :])
-        return (*results, *keep, limited)
+    block: Block
+    period_s: float
+    literals: Mapping[str, float]
+    evaluated: tuple[str, ...]
 
-    return coefficients
+    def __call__(self, *values: float) -> tuple[float, ...]:
+        """Return coefficients, what to keep, bits."""
+        given = {**self.literals, **dict(zip(self.evaluated, values, strict=False))}
+        results, keep, limited = evaluate_noting(self.block, self.period_s, given, values[len(self.evaluated) :])
+        return (*results, *keep, limited)

@@ -10,11 +10,13 @@ import ast
 import inspect
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from types import FunctionType
 
 from automax_ros.compile import functions
+from automax_ros.compile.calls import CoefficientFunction
+from automax_ros.compile.native.coefficients import coefficient_tree
 from automax_ros.compile.native.context import Environment
 from automax_ros.compile.native.expressions import extreme
 from automax_ros.compile.native.frame import Frame
@@ -50,26 +52,28 @@ def called(frame: Frame, function: object, node: ast.Call, known: Environment) -
         carry_out = None
     if carry_out is not None:
         return carry_out(frame, arguments)
+    if isinstance(function, CoefficientFunction):
+        arguments = [as_real(item) for item in arguments]
+        return _translated(frame, frame.unit.tree(function, coefficient_tree), _FORMULAS, arguments)
     if not isinstance(function, FunctionType):
         raise NotNative(f"a call of {function!r}")
-    return _translated(frame, function, arguments)
-
-
-def _translated(frame: Frame, function: FunctionType, arguments: list[Typed]) -> list[Typed]:
-    parsed = _parsed(function)
-    if parsed.args.vararg is not None:
-        raise NotNative("coefficients that change while the task runs")
-    parameters = [argument.arg for argument in parsed.args.args]
-    missing = len(parameters) - len(arguments)
+    missing = function.__code__.co_argcount - len(arguments)
     arguments = [*arguments, *map(literal, (function.__defaults__ or ())[-missing:] if missing else ())]
+    return _translated(frame, _parsed(function), function.__globals__, arguments)
+
+
+def _translated(
+    frame: Frame, parsed: ast.FunctionDef, scope: Mapping[str, object], arguments: list[Typed]
+) -> list[Typed]:
+    parameters = [argument.arg for argument in parsed.args.args]
     arguments = [_of_annotation(item, given) for given, item in zip(parsed.args.args, arguments, strict=True)]
-    exact = _frame_of(frame, function, parsed, [item.range for item in arguments])
-    general = _frame_of(frame, function, parsed, [_general(item.range) for item in arguments])
+    exact = _frame_of(frame, parsed, scope, [item.range for item in arguments])
+    general = _frame_of(frame, parsed, scope, [_general(item.range) for item in arguments])
     results = _results(exact)
     kinds = [c_type(item) for item in _results(general)]
     if kinds != [c_type(item) for item in results]:
         general = exact
-    name = _defined(general, function.__name__, parameters, [item.range for item in arguments])
+    name = _defined(general, parsed.name, parameters, [item.range for item in arguments])
     return _delivered(frame, name, [bare(item.text) for item in arguments], results, can_end=general.can_end)
 
 
@@ -107,18 +111,18 @@ def _general(known: Range) -> Range:
     return known
 
 
-def _frame_of(frame: Frame, function: FunctionType, parsed: ast.FunctionDef, ranges: list[Range]) -> Frame:
+def _frame_of(frame: Frame, parsed: ast.FunctionDef, scope: Mapping[str, object], ranges: list[Range]) -> Frame:
     """Return a function translated for arguments of some ranges; those that it cannot be are those of the call."""
-    made = Frame(frame.unit, function.__globals__, caller=called)
+    made = Frame(frame.unit, scope, called)
     known = dict(zip((argument.arg for argument in parsed.args.args), ranges, strict=True))
     for name, item in known.items():
         made.parameter(name, item)
     try:
         left = Body(made).execute(parsed.body, known)
     except NotNative as error:
-        raise NotNative(f"{error.reason}, in {function.__name__}") from None
+        raise NotNative(f"{error.reason}, in {parsed.name}") from None
     if left is not None:
-        raise NotNative(f"{function.__name__} ends without a result")
+        raise NotNative(f"{parsed.name} ends without a result")
     return made
 
 
@@ -228,6 +232,18 @@ def _real_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     return _delivered(frame, "real_power", texts, results, can_end=False)
 
 
+def raised(base: float, exponent: float) -> float:
+    """Return a power as Python has it, for the formulas of coefficients."""
+    return base**exponent
+
+
+def _raised(frame: Frame, arguments: list[Typed]) -> list[Typed]:
+    base, exponent = (bare(as_real(item).text) for item in arguments)
+    return [Typed(f"raised({base}, {exponent}, {frame.ended()})", ANY_REAL)]
+
+
+_FORMULAS: dict[str, object] = {"math": math, "stored_real": stored_real, "raised": raised}
+"""What the formulas of coefficients call."""
 _BUILTINS: dict[object, Carry] = {
     abs: _absolute,
     float: _real,
@@ -249,5 +265,6 @@ _BUILTINS: dict[object, Carry] = {
     functions.store_real: _stored_real,
     functions.integer_power: _integer_power,
     functions.real_power: _real_power,
+    raised: _raised,
 }
 """How each function is carried out that is not translated from its Python."""

@@ -138,3 +138,10 @@ static inline double within(double value, double low, double high, int *ended) {
     if ((value < low || value > high) && *ended == 0) *ended = AUTOMAX_FAULT;
     return value;
 }
+
+/* A power in the formula of a coefficient; Python raises an exception where it overflows. */
+static inline double raised(double base, double exponent, int *ended) {
+    double power = library_pow(base, exponent);
+    if (isinf(power) && isfinite(base) && *ended == 0) *ended = AUTOMAX_FAULT;
+    return power;
+}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ast
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from automax_ros.compile.calls import CoefficientFunction
 from automax_ros.compile.native.ranges import Range
 from automax_ros.compile.native.typed import Typed, c_type
 
@@ -16,7 +18,17 @@ class Unit:
     parts: list[str] = field(default_factory=list)
     _tables: dict[str, str] = field(default_factory=dict)
     _functions: dict[str, str] = field(default_factory=dict)
+    _trees: dict[int, ast.FunctionDef] = field(default_factory=dict)
     _used: set[str] = field(default_factory=set)
+
+    def tree(
+        self, function: CoefficientFunction, make: Callable[[CoefficientFunction], ast.FunctionDef]
+    ) -> ast.FunctionDef:
+        """Return the tree of a block's coefficients, made once: the task is looked through several times."""
+        key = id(function)
+        if key not in self._trees:
+            self._trees[key] = make(function)
+        return self._trees[key]
 
     def table(self, items: Sequence[Typed], place: str, known: Range) -> Typed:
         """Return an element of a table of constants, of an index that lies inside."""
