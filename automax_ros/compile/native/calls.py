@@ -234,7 +234,8 @@ def _real_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:
 
 def raised(base: float, exponent: float) -> float:
     """Return a power as Python has it, for the formulas of coefficients."""
-    return base**exponent
+    power: float = base**exponent
+    return power
 
 
 def _raised(frame: Frame, arguments: list[Typed]) -> list[Typed]:

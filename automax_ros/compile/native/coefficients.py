@@ -80,9 +80,9 @@ class _Tree:
         kept = [build.name(name) for name in kept_names(self._declared)]
         first = traced(relation.first, (self._period_s,), self._known, names, "f", relation.parameters)
         any_kept = build.either(*(build.compare(name, "<>", build.constant(0.0)) for name in kept))
-        last = [build.assign(name, value) for name, value in zip(names, kept, strict=True)]
+        last: list[ast.stmt] = [build.assign(name, value) for name, value in zip(names, kept, strict=True)]
         present = [node_of_known(self._known[name]) for name in relation.parameters]
-        good = [build.assign(name, value) for name, value in zip(names, present, strict=True)]
+        good: list[ast.stmt] = [build.assign(name, value) for name, value in zip(names, present, strict=True)]
         noted = build.assign("bits", build.binary(build.name("bits"), "OR", build.constant(1 << number)))
         body.append(build.when(build.name("holds"), good, [noted, build.when(any_kept, last, first)]))
         self._known.update({name: build.name(new) for name, new in zip(relation.parameters, names, strict=True)})
