@@ -65,7 +65,7 @@ class _Tree:
         inside = ast.Compare(build.name(low), [ast.LtE(), ast.LtE()], [given, build.name(high)])
         equal = [build.compare(given, "=", build.name(f"{bound}_stored")) for bound in (low, high)]
         above = build.compare(given, ">", build.name(high))
-        moved = [
+        moved: list[ast.stmt] = [
             build.assign(value, build.choose(above, build.name(high), build.name(low))),
             build.assign("bits", build.binary(build.name("bits"), "OR", build.constant(1 << number))),
         ]
