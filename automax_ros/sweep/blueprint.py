@@ -10,6 +10,7 @@ from pathlib import Path
 from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.faults import Fault
+from automax_ros.core.problems import Severity
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.installation import Installation
 from automax_ros.rack.loader import load_stored
@@ -40,16 +41,16 @@ class Blueprint:
         Raises:
             Fault: with these numbers the rack file has errors.
         """
-        config = _config(with_numbers(self.text, plants), self.path)
+        config = _config(self.text, self.path, tuple(plants.items()))
         return Rack(config, installation=_installation(self).again(config))
 
 
 @lru_cache(maxsize=1)
-def _config(text: str, path: str) -> RackConfig:
-    """Return what a text means; runs one after the other often have one text."""
-    result = load_stored(SourceText(path, text), Path(path))
+def _config(text: str, path: str, numbers: tuple[tuple[PlantNumber, str], ...] = ()) -> RackConfig:
+    """Return what a text with other numbers of plants means; runs one after the other often have the same."""
+    result = load_stored(SourceText(path, with_numbers(text, dict(numbers))), Path(path))
     if result.config is None:
-        first = next(iter(result.diagnostics))
+        first = next(item for item in result.diagnostics if item.severity is Severity.ERROR)
         raise Fault(first.message, first.hint, code=first.code)
     return result.config
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError
 from automax_ros.core.faults import Fault
+from automax_ros.core.problems import Severity
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.files import FileFault, read_bytes
@@ -136,7 +137,8 @@ def _stimulation(rack: Rack, stimuli: Stimuli | None) -> Stimulation:
         return Stimulation((), rack.scheduler)
     file = read_for_rack(stimuli.path, rack, allow_outside=stimuli.allow_outside)
     if file.stimuli is None:
-        raise Fault(f"stimuli: {file.diagnostics[0].message}", file.diagnostics[0].hint)
+        first = next(item for item in file.diagnostics if item.severity is Severity.ERROR)
+        raise Fault(f"stimuli: {first.message}", first.hint)
     return Stimulation(file.stimuli, rack.scheduler)
 
 
