@@ -71,7 +71,8 @@ class Watch:
 
     def __init__(self, rack: Rack, measures: Sequence[Measure], end_ns: int) -> None:
         """Watch a rack that was just started, until ``end_ns``: presets are what its commons held before."""
-        self._signals: dict[tuple[int, int], _Signal] = {}
+        self._signals: dict[int, dict[int, _Signal]] = {}
+        """By element, then by view: most writes are of simple commons that nobody watches."""
         self._windows: dict[Measure, _Window] = {}
         for measure in measures:
             if measure.is_of_common:
@@ -80,18 +81,21 @@ class Watch:
 
     def results(self, end_ns: int) -> dict[Measure, float | None]:
         """Return what came of the measures of commons."""
-        for signal in self._signals.values():
-            signal.flush(end_ns)
+        for signals in self._signals.values():
+            for signal in signals.values():
+                signal.flush(end_ns)
         return {measure: window.result() for measure, window in self._windows.items()}
 
     def written(self, writes: list[WriteGroup]) -> None:
         """Take what was written, by scans too where none keeps records."""
-        signals = self._signals
+        elements = self._signals
         for group in writes:
+            signals = elements.get(group.element)
+            if signals is None:
+                continue
             for view, value in group.changes:
-                signal = signals.get((view, group.element))
-                if signal is not None:
-                    signal.change(group.time_ns, value)
+                if view in signals:
+                    signals[view].change(group.time_ns, value)
 
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
         """Take what a scan has written."""
@@ -105,10 +109,11 @@ class Watch:
 
     def _add(self, rack: Rack, measure: Measure, end_ns: int) -> None:
         meant = common_named(rack.config, measure.subject)
-        key = rack.memory.view(meant.name), meant.index
-        present = rack.memory.read_now(*key)
+        view = rack.memory.view(meant.name)
+        present = rack.memory.read_now(view, meant.index)
         assert not isinstance(present, str)
         end = end_ns if measure.end_ns is None else measure.end_ns
         window = _Window(measure.accumulator(), measure.start_ns, end, present)
-        self._signals.setdefault(key, _Signal(present, rack.now_ns)).windows.append(window)
+        signals = self._signals.setdefault(meant.index, {})
+        signals.setdefault(view, _Signal(present, rack.now_ns)).windows.append(window)
         self._windows[measure] = window
