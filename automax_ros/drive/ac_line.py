@@ -14,16 +14,18 @@ import heapq
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, cos, exp, fmod, pi, sin, sqrt
+from typing import Final
 
 from automax_ros.drive.errors import LARGEST, ParameterError, require
 from automax_ros.drive.scr import PHASES
 from automax_ros.drive.state import SavedState, Stateful, check_names
 
-SEGMENT_NS = 500_000
+SEGMENT_NS: Final = 500_000
 """Longest segment while the line moves, ns."""
-REBASE_NS = 1_000_000_000
+REBASE_NS: Final = 1_000_000_000
 """The angle is counted from an instant at most this long ago, so that days pass without loss of digits."""
-LOWEST_HZ, HIGHEST_HZ = 48.0, 62.0
+LOWEST_HZ: Final = 48.0
+HIGHEST_HZ: Final = 62.0
 
 
 class Rotation(enum.Enum):

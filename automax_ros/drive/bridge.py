@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import asdict, replace
 from heapq import heappop, heappush
+from math import inf
+from typing import Final
 
 from automax_ros.drive.errors import GateError, require
 from automax_ros.drive.scr import BIT, FORWARD_MASK, MASK, PARTNER, mask_of, numbers_of
 from automax_ros.drive.state import SavedState, Stateful, check_names
 from automax_ros.drive.wiring import Wiring
 
-REST_NS = 10
+REST_NS: Final = 10
 """How long an SCR that went out stays off, gated or not, ns (decision: keeps events from piling up at one instant)."""
-UNLATCHED_NS = 100_000
+UNLATCHED_NS: Final = 100_000
 """How long it stays off if it had conducted for less than ``REST_NS``, ns (decision: it did not latch)."""
 
 
@@ -62,7 +64,14 @@ class Bridge(Stateful):
         Raises:
             GateError: no such SCR, or the window is empty.
         """
-        mask = mask_of(numbers)
+        self.fire_mask(on_ns, off_ns, mask_of(numbers))
+
+    def fire_mask(self, on_ns: int, off_ns: int, mask: int) -> None:
+        """Gate the SCRs of a mask likewise.
+
+        Raises:
+            GateError: an SCR of bridge 2 where there is none, or the window is empty.
+        """
         if mask & ~FORWARD_MASK and not self.reversing:
             raise GateError("an S6 has no bridge 2: only the SCRs 1 to 6 can be fired")
         if off_ns <= on_ns:
@@ -115,7 +124,7 @@ class Bridge(Stateful):
 
     def window_end_ns(self, mask: int, now_ns: float) -> float:
         """Return how long all SCRs of a mask stay candidates, ns."""
-        end = float("inf")
+        end = inf
         while mask:
             low = mask & -mask
             mask ^= low

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from math import cos, inf, sin
+from typing import Final
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.bridge import Bridge
@@ -17,14 +18,13 @@ from automax_ros.drive.errors import GateError, ParameterError
 from automax_ros.drive.events import CircuitEvent, EventKind
 from automax_ros.drive.meter import Sample
 from automax_ros.drive.motor import Machine
-from automax_ros.drive.network import Network
+from automax_ros.drive.network import Network, Phases
 from automax_ros.drive.scr import BIT, mask_of, numbers_of
-from automax_ros.drive.search import Phases
 from automax_ros.drive.state import SavedState, check_names
 from automax_ros.drive.waves import ZERO_A, Piece
 from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC
 
-ARC_V = 1200.0
+ARC_V: Final = 1200.0
 """Voltage of an arc in an opening contactor or fuse, V (decision: above any voltage of these drives)."""
 
 
@@ -85,9 +85,17 @@ class Circuit(Conduction):
         Raises:
             GateError: no such SCR, the window is empty or begins in the past.
         """
+        self.fire_mask(on_ns, off_ns, mask_of(numbers))
+
+    def fire_mask(self, on_ns: int, off_ns: int, mask: int) -> None:
+        """Gate the SCRs of a mask likewise.
+
+        Raises:
+            GateError: an SCR of bridge 2 where there is none, the window is empty or begins in the past.
+        """
         if on_ns < self.now_ns:
             raise GateError(f"a gate window from {on_ns} ns begins in the past; it is {self.now_ns} ns")
-        self.bridge.fire(on_ns, off_ns, numbers)
+        self.bridge.fire_mask(on_ns, off_ns, mask)
 
     def advance(self, until_ns: int) -> None:
         """Let time pass to an instant (ns); gates and changes that begin exactly then wait for the next call.
@@ -132,8 +140,8 @@ class Circuit(Conduction):
         """Return the integrals since the last sample, which goes on; its list of intervals is the circuit's own."""
         volt_s = self._volt_s + self._z.r * self._charge + self._z.l * (self.current_a - self._current_before)
         duration_s = (self.now_ns - self._sample_ns) * 1e-9
-        times = duration_s, self._charge, volt_s, self._zero_s, self._overlap_s
-        return Sample(*times, self._square, self._pieces, self._highest)
+        charge, zero_s, overlap_s = self._charge, self._zero_s, self._overlap_s
+        return Sample(duration_s, charge, volt_s, zero_s, overlap_s, self._square, self._pieces, self._highest)
 
     def pieces(self) -> list[Piece]:
         """Return the armature current since the last sample, interval by interval, without those where none flowed."""

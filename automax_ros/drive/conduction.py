@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 from math import cos, exp, inf, sin
+from typing import Final
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.bridge import Bridge
@@ -15,17 +16,16 @@ from automax_ros.drive.errors import SourceShortError
 from automax_ros.drive.events import ROUTINE, EventKind
 from automax_ros.drive.meter import EnergyMeter
 from automax_ros.drive.motor import Machine
-from automax_ros.drive.network import ARMATURE_SHORT, CROSS_FIRE, LINE_SHORT, Impedances, Network
-from automax_ros.drive.scr import BIT, numbers_of, rail_of
-from automax_ros.drive.search import Phases, next_ending, next_turn_on
+from automax_ros.drive.network import ARMATURE_SHORT, CROSS_FIRE, LINE_SHORT, Impedances, Network, Phases
+from automax_ros.drive.scr import BIT, RAIL_MASKS, numbers_of, rail_of
+from automax_ros.drive.search import next_ending, next_turn_on
 from automax_ros.drive.state import Stateful
 from automax_ros.drive.waves import Piece, RawPiece
 from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC, settle
 
-EVENTS_KEPT = 10_000
-PIECES_KEPT = 64
-_NO_MODES = (0.0, 0.0, 0.0)
-_ALARMS = (
+EVENTS_KEPT: Final = 10_000
+PIECES_KEPT: Final = 64
+_ALARMS: Final = (
     (ARMATURE_SHORT, EventKind.ARMATURE_SHORT),
     (LINE_SHORT, EventKind.LINE_SHORT),
     (CROSS_FIRE, EventKind.CROSS_FIRE),
@@ -52,7 +52,7 @@ class Conduction(Stateful):
         self._trace = trace
         self._z = Impedances.of(line, machine.inductance_h, machine.resistance_ohm, bridge.drop_v)
         self._nets: dict[int, Network] = {}
-        self._modes: Phases = _NO_MODES
+        self._modes: Phases = (0.0, 0.0, 0.0)
         self._newest = [0, 0]
         self._ended_ns = float(line.start_ns)
         self._emf = machine.emf(0.0)
@@ -171,7 +171,7 @@ class Conduction(Stateful):
             self._open(out, t)
         mask = (old.mask | on) & ~out
         net = self._nets.get(mask) or self._network(mask)
-        if net.modes or net.instant or self.bridge.wiring.arcing:
+        if not net.calm:
             net = self._enter(mask, self._phases(old, self.current_a, sine, cosine), sine, cosine)
         else:
             self._take(net)
@@ -189,27 +189,18 @@ class Conduction(Stateful):
     def _enter(self, mask: int, phases: Phases, sine: float, cosine: float) -> Network:
         """Make a set of SCRs conduct from the present, with the phase currents (A) just before."""
         net = self._nets.get(mask) or self._network(mask)
-        if net.instant or self.bridge.wiring.arcing:
+        if net.instant or net.arcing:
             net, phases = self._clear_up(net, phases, sine, cosine)
         self._take(net)
         if net.modes and net.decay_s < inf:
-            modes = [0.0, 0.0, 0.0]
-            for x, y, z in net.tied:
-                # The phases' currents over their common mean; it is what the armature takes.
-                mean = (phases[x] + phases[y]) / 2 if z is None else (phases[x] + phases[y] + phases[z]) / 3
-                first = phases[x] - mean - net.phase_c[x] * cosine - net.phase_d[x] * sine - net.phase_k[x]
-                modes[x], modes[y] = first, -first
-                if z is not None:
-                    last = phases[z] - mean - net.phase_c[z] * cosine - net.phase_d[z] * sine - net.phase_k[z]
-                    modes[y], modes[z] = -first - last, last
-            self._modes = (modes[0], modes[1], modes[2])
+            self._modes = _modes(net, phases, sine, cosine)
         return net
 
     def _take(self, net: Network) -> None:
         """Go on with a circuit, without modes of the source so far."""
         if not net.active:
             self.current_a = 0.0
-        self._modes = _NO_MODES
+        self._modes = (0.0, 0.0, 0.0)
         self._net = net
 
     def _clear_up(self, net: Network, phases: Phases, sine: float, cosine: float) -> tuple[Network, Phases]:
@@ -311,7 +302,7 @@ class Conduction(Stateful):
     def _note_failed_commutation(self, out: int, left: int, t: float) -> None:
         for number in numbers_of(out & 0xFFF):
             rail = rail_of(number)
-            if self._newest[rail] == number and any(rail_of(other) == rail for other in numbers_of(left)):
+            if self._newest[rail] == number and left & RAIL_MASKS[rail]:
                 self._emit(EventKind.COMMUTATION_FAILURE, t, number)
 
     def _note_switch(self, old: Network, net: Network, gone: int, t: float) -> None:
@@ -332,3 +323,29 @@ class Conduction(Stateful):
         if len(self._events) == EVENTS_KEPT:
             self.events_lost += 1
         self._events.append((kind, self.now_ns, t, number, self.current_a))
+
+
+def _modes(net: Network, phases: Phases, sine: float, cosine: float) -> Phases:
+    """Return what the phases' currents (A) are over their common mean, which the armature takes, and the steady part.
+
+    Written out phase by phase: compiled, three numbers in a tuple are quick only where their places are known.
+    """
+    by_c, by_d, const = net.phase_c, net.phase_d, net.phase_k
+    a, b, c = phases
+    mode_a = mode_b = mode_c = 0.0
+    for x, y, z in net.tied:
+        if z >= 0:
+            mean = (a + b + c) / 3
+            mode_a = a - mean - by_c[0] * cosine - by_d[0] * sine - const[0]
+            mode_c = c - mean - by_c[2] * cosine - by_d[2] * sine - const[2]
+            mode_b = -mode_a - mode_c
+        elif x > 0:
+            mode_b = b - (b + c) / 2 - by_c[1] * cosine - by_d[1] * sine - const[1]
+            mode_c = -mode_b
+        else:
+            mode_a = a - (a + (b if y == 1 else c)) / 2 - by_c[0] * cosine - by_d[0] * sine - const[0]
+            if y == 1:
+                mode_b = -mode_a
+            else:
+                mode_c = -mode_a
+    return mode_a, mode_b, mode_c

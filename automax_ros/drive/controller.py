@@ -5,7 +5,9 @@ No registers, no rack: ``rack/modules`` has the module around it, a bench or a P
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import fmod, pi
+from typing import Final
 
 from automax_ros.drive.ac_line import Rotation
 from automax_ros.drive.cml.signals import (
@@ -20,11 +22,12 @@ from automax_ros.drive.cml.signals import (
     gate_numbers,
 )
 from automax_ros.drive.plant import DrivePlant
+from automax_ros.drive.scr import mask_of
 
-LARGEST = (1 << 31) - 1
-LEAST_SYNC = 0.25
+LARGEST: Final = (1 << 31) - 1
+LEAST_SYNC: Final = 0.25
 """Part of the nominal line voltage below which there is no sync voltage (decision)."""
-TURN = 2 * pi
+TURN: Final = 2 * pi
 _new = tuple.__new__
 """A named tuple made as tuples are: its own way takes twice the time."""
 
@@ -33,6 +36,12 @@ def _word(value: float) -> int:
     """Return a value as a double integer, limited to it."""
     number = round(value)
     return number if -LARGEST <= number <= LARGEST else LARGEST if number > 0 else -LARGEST
+
+
+@lru_cache(maxsize=4096)
+def _gate_mask(word: int) -> int:
+    """Return the SCRs of gate bits as a mask of the bridge."""
+    return mask_of(gate_numbers(word))
 
 
 class DriveController:
@@ -107,7 +116,7 @@ class DriveController:
             on_ns = interrupt_ns + after_ns
             off_ns = on_ns + length_ns
             if off_ns > now_ns:
-                plant.circuit.fire(on_ns if on_ns > now_ns else now_ns, off_ns, *gate_numbers(gates))
+                plant.circuit.fire_mask(on_ns if on_ns > now_ns else now_ns, off_ns, _gate_mask(gates))
 
     def off(self, now_ns: int) -> None:
         """Suppress all gates at an instant, ns, and turn the contactor's relay off: nobody commands any more."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Final
 
 
 class EventKind(enum.Enum):
@@ -32,7 +33,9 @@ class EventKind(enum.Enum):
     ARMATURE_CLOSED = "armature closed"
 
 
-ROUTINE = frozenset({EventKind.TURN_ON, EventKind.EXTINCTION, EventKind.COMMUTATION_START, EventKind.COMMUTATION_END})
+ROUTINE: Final = frozenset(
+    {EventKind.TURN_ON, EventKind.EXTINCTION, EventKind.COMMUTATION_START, EventKind.COMMUTATION_END}
+)
 """What happens in every healthy cycle; told only on request."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Final
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.circuit import Circuit
@@ -10,8 +11,8 @@ from automax_ros.drive.errors import ParameterError, require
 from automax_ros.drive.scr import FORWARD, REVERSE, direction_of, phase_of
 from automax_ros.drive.state import Stateful
 
-SIXTH = pi / 3
-_MARGIN_NS = 1000
+SIXTH: Final = pi / 3
+_MARGIN_NS: Final = 1000
 """An instant of a natural commutation is looked for from this long before, lest rounding skip a turn."""
 
 

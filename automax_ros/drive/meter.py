@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from automax_ros.drive.state import Stateful
 from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave, bound
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from automax_ros.drive.wiring import Wiring
 
 
-_STEEPEST = 3.0
+_STEEPEST: Final = 3.0
 """Largest ratio of a current's peak to its mean while it flows that is looked for (decision)."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import exp, fmod, pi, sqrt
-from typing import Protocol
+from typing import Final
 
 from automax_ros.drive.errors import LARGEST, SMALLEST, ParameterError, require
 from automax_ros.drive.state import SavedState, Stateful, check_names
@@ -14,21 +14,22 @@ SpeedLoad = Callable[[float], float]
 """A load torque (N m) that depends on the speed (rad/s), such as a fan's; positive torque brakes positive speed."""
 LoadCallback = Callable[[float, float], float]
 """A load torque (N m) asked for in every interval with the time (s) and the speed (rad/s)."""
-TURN = 2 * pi
-LONGEST_NS, SHORTEST_NS = 3_500_000, 500_000
+TURN: Final = 2 * pi
+LONGEST_NS: Final = 3_500_000
+SHORTEST_NS: Final = 500_000
 """An interval of constant EMF: at most just over a firing interval at 48 Hz, at least this."""
-HELD_V_S = 1e-3
+HELD_V_S: Final = 1e-3
 """The EMF is held over an interval so short that its slope times the interval's square stays below this, V s (decision:
 0.1 % of what the line gives in a firing interval; keeps the error of speed below 0.01 %)."""
-LONGEST_S2 = (LONGEST_NS * 1e-9) ** 2
-SMOOTH_S = 5e-3
+LONGEST_S2: Final = (LONGEST_NS * 1e-9) ** 2
+SMOOTH_S: Final = 5e-3
 """The acceleration that decides it is smoothed with this time constant: ripple does not count."""
-REPAID_S = 1e-3
+REPAID_S: Final = 1e-3
 """Within this time (s), or an interval if that is longer, what the last EMF was off by is made good."""
 
 
-class Machine(Protocol):
-    """What a circuit asks of its load."""
+class Machine(Stateful):
+    """What a circuit asks of its load. A class, not a Protocol: compiled, its methods are called without a lookup."""
 
     inductance_h: float
     resistance_ohm: float
@@ -39,19 +40,15 @@ class Machine(Protocol):
 
     def emf(self, duration_s: float) -> float:
         """Return the EMF (V) expected in the middle of the next ``duration_s``."""
+        raise NotImplementedError
 
     def advance(self, duration_s: float, charge_c: float, change_a: float) -> None:
         """Let time pass, in which the armature took a charge (C) and its current changed by so much (A)."""
-
-    def state(self) -> SavedState:
-        """Return all that its future depends on, besides what it was made of."""
-
-    def restore(self, state: SavedState) -> None:
-        """Take a state over."""
+        raise NotImplementedError
 
 
 @dataclass
-class FixedLoad(Stateful):
+class FixedLoad(Machine):
     """A resistance (ohm), an inductance (H) and a constant EMF (V): a machine at a held speed, a choke, a battery."""
 
     resistance_ohm: float
@@ -75,7 +72,7 @@ class FixedLoad(Stateful):
 FixedLoad._kept = ("emf_v",)
 
 
-SETTLED = 1e-9
+SETTLED: Final = 1e-9
 """A field current (over rated) as near as this to its voltage has settled."""
 
 
@@ -126,7 +123,7 @@ class FieldWinding(Stateful):
 FieldWinding._kept = ("current", "voltage")
 
 
-FASTEST_SWING = 1000.0
+FASTEST_SWING: Final = 1000.0
 """Fastest swing of a machine's current and speed, rad/s (decision: five times the fastest drive's, and speed is held
 for 0.5 ms or more)."""
 
@@ -165,7 +162,7 @@ class MotorData:
             )
 
 
-class Motor(Stateful):
+class Motor(Machine):
     """A DC motor on its shaft: a ``Machine`` whose EMF follows the speed.
 
     The EMF is constant within an interval, at the value that the last acceleration lets expect in its middle; the
@@ -174,7 +171,6 @@ class Motor(Stateful):
     (``test/drive/test_energy``).
     """
 
-    turns = True
     _kept = (
         "inertia_kg_m2", "speed_rad_s", "angle_rad", "acceleration", "time_s", "k_v_s", "step_ns", "_emf", "_owed_v_s",
         "_smooth", "coupling_n_m", "torque_n_m", "shaft_j", "friction_j", "load_j",
@@ -204,6 +200,7 @@ class Motor(Stateful):
         self.resistance_ohm = data.resistance_ohm
         self.inductance_h = data.inductance_h
         self.inertia_kg_m2 = data.inertia_kg_m2
+        self.turns = True
         self.field = field
         self.load = load
         self.load_callback = load_callback
@@ -218,6 +215,16 @@ class Motor(Stateful):
         self.coupling_n_m = 0.0
         self.torque_n_m = 0.0
         self.shaft_j = self.friction_j = self.load_j = 0.0
+
+    @property
+    def load(self) -> float | SpeedLoad:
+        """The load torque, N m: a number, or a function of the speed in rad/s."""
+        return self._steady_nm if self._load_of is None else self._load_of
+
+    @load.setter
+    def load(self, load: float | SpeedLoad) -> None:
+        self._load_of: SpeedLoad | None = load if callable(load) else None
+        self._steady_nm = 0.0 if callable(load) else load
 
     @property
     def kinetic_j(self) -> float:
@@ -236,8 +243,7 @@ class Motor(Stateful):
 
     def load_torque(self, speed_rad_s: float) -> float:
         """Return the load torque (N m) now, at a speed."""
-        load = self.load
-        torque = load(speed_rad_s) if callable(load) else load
+        torque = self._steady_nm if self._load_of is None else self._load_of(speed_rad_s)
         if self.load_callback is not None:
             torque += self.load_callback(self.time_s, speed_rad_s)
         return torque
@@ -250,8 +256,8 @@ class Motor(Stateful):
             self._hold(duration_s, torque)
             mean = before
         else:
-            load = self.load
-            if callable(load) or self.load_callback is not None:
+            load = self._steady_nm
+            if self._load_of is not None or self.load_callback is not None:
                 load = self.load_torque(before + 0.5 * self.acceleration * duration_s)
             self._turn(duration_s, torque, load)
             after = self.speed_rad_s
@@ -275,7 +281,7 @@ class Motor(Stateful):
     def state(self) -> SavedState:
         """Return speed, angle, field and energies, and the load torque where it is a number (None where a function)."""
         field = self.field.state() if self.field else None
-        return super().state() | {"field": field, "load": None if callable(self.load) else self.load}
+        return super().state() | {"field": field, "load": self._steady_nm if self._load_of is None else None}
 
     def restore(self, state: SavedState) -> None:
         """Take a state over; a load that is a function stays the motor's own.
@@ -284,7 +290,7 @@ class Motor(Stateful):
             ParameterError: it is not the state of such a motor.
         """
         check_names("motor", state, (*self._kept, "field", "load"))
-        if (state["field"] is None) != (self.field is None) or (state["load"] is None) != callable(self.load):
+        if (state["field"] is None) != (self.field is None) or (state["load"] is None) != (self._load_of is not None):
             raise ParameterError("the state is that of a motor with another field or another kind of load")
         super().restore({name: state[name] for name in self._kept})
         if self.field is not None:

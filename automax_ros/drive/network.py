@@ -16,15 +16,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot, inf
+from typing import Final
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.scr import FORWARD_MASK, REVERSE_MASK, M, P
 from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC, Wiring, closed_legs, is_line_short, leg_currents
 
-TURN_ON_V = 1e-5
+TURN_ON_V: Final = 1e-5
 """Forward voltage, beyond the drop, at which a gated SCR turns on, V (decision: above rounding, 0.1 ns of a line's
 slope)."""
-SLOWEST_DECAY = 0.01
+SLOWEST_DECAY: Final = 0.01
 """A resistance below L x this (1/s) counts as L x this (decision): so a steady state exists; 20 microohm at 2 mH."""
 
 Potential = tuple[float, float, float, float, float, float]
@@ -49,6 +50,8 @@ class Impedances:
         return Impedances(ls, rs, inductance_h, max(resistance_ohm, SLOWEST_DECAY * inductance_h), drop_v)
 
 
+Phases = tuple[float, float, float]
+"""A value of each of the line's phases."""
 Guard = tuple[int, float, float, float, float, float, float, float, float]
 """A current that must stay positive: SCRs it flows through (mask), factors of cos and sin, share of the armature
 current, constant, shares of the three phases' source modes, curvature omega^2 hypot(c, d)."""
@@ -65,9 +68,9 @@ class Network:
     """The equations of one set of closed legs, as numbers for ``circuit``; built once for a set and a line segment."""
 
     __slots__ = (
-        "_drop_v", "_omega", "active", "alarms", "armature_short", "bend", "c", "constant", "d", "decay", "decay_s",
-        "floating_offset", "guards", "inductance", "instant", "largest_share", "leg_weights", "mask", "modes",
-        "offsets", "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset", "resistance",
+        "_drop_v", "_omega", "active", "alarms", "arcing", "armature_short", "bend", "c", "calm", "constant", "d",
+        "decay", "decay_s", "floating_offset", "guards", "inductance", "instant", "largest_share", "leg_weights",
+        "mask", "modes", "offsets", "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset", "resistance",
         "share", "sign", "tied", "watches",
     )  # fmt: skip
 
@@ -83,6 +86,9 @@ class Network:
         self._solve_phases(line, z)
         self._set_potentials(legs, drops, wiring, line, z)
         self._set_guards(legs, wiring, line.omega)
+        self.arcing = wiring.arcing
+        self.calm = not (self.modes or self.instant or self.arcing)
+        """Whether it is entered with nothing but the armature's current."""
         self.alarms = ARMATURE_SHORT if self.armature_short else 0
         if any(is_line_short(rail, legs) for rail in (P, M)):
             self.alarms |= LINE_SHORT
@@ -96,34 +102,36 @@ class Network:
         both = [x for x in at_p if x in at_m]
         present = [x for x in range(3) if not wiring.open_phases >> x & 1]
         self.armature_short = bool(both)
-        self.offsets = [0.0, 0.0, 0.0]
-        self.share = [0.0, 0.0, 0.0]
+        offsets, share = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         self.rail_offset = 0.0
         if both:
             self.rail_offset = sum(drops[2 * x + 1] - drops[2 * x] for x in both) / len(both)
             groups = [[x for x in present if x in at_p or x in at_m]]
             for x in range(3):
                 if x in both:
-                    self.offsets[x] = (drops[2 * x] + drops[2 * x + 1] - self.rail_offset) / 2
+                    offsets[x] = (drops[2 * x] + drops[2 * x + 1] - self.rail_offset) / 2
                 elif x in at_p:
-                    self.offsets[x] = drops[2 * x]
+                    offsets[x] = drops[2 * x]
                 elif x in at_m:
-                    self.offsets[x] = drops[2 * x + 1] - self.rail_offset
+                    offsets[x] = drops[2 * x + 1] - self.rail_offset
             self.active = wiring.armature_closed
         else:
             on_p, on_m = ([x for x in rail if x in present] for rail in (at_p, at_m))
             groups = [on_p, on_m]
             for rail, group, sign in ((P, on_p, 1.0), (M, on_m, -1.0)):
                 for x in group:
-                    self.offsets[x] = drops[2 * x + rail]
-                    self.share[x] = sign / len(group)
+                    offsets[x] = drops[2 * x + rail]
+                    share[x] = sign / len(group)
             self.active = wiring.armature_closed and bool(on_p and on_m)
             if not self.active:
-                self.share = [0.0, 0.0, 0.0]
-        self.offsets = [offset + arc for offset, arc in zip(self.offsets, wiring.phase_arc_v, strict=True)]
+                share = [0.0, 0.0, 0.0]
+        arcs = wiring.phase_arc_v
+        self.offsets: Phases = offsets[0] + arcs[0], offsets[1] + arcs[1], offsets[2] + arcs[2]
+        self.share: Phases = share[0], share[1], share[2]
         self.largest_share = max(map(abs, self.share))
         self.rail_of_phases = groups
-        self.tied = [(g[0], g[1], g[2] if len(g) > 2 else None) for g in groups if len(g) > 1]
+        self.tied = [(g[0], g[1], g[2] if len(g) > 2 else -1) for g in groups if len(g) > 1]
+        """Phases on one rail, -1 where there are but two."""
         self.modes = bool(self.tied)
 
     def _solve_armature(self, wiring: Wiring, line: AcLine, z: Impedances) -> None:
@@ -143,11 +151,12 @@ class Network:
         self.bend = line.omega * line.omega * hypot(self.c, self.d)
 
     def _solve_phases(self, line: AcLine, z: Impedances) -> None:
-        self.phase_c, self.phase_d, self.phase_k = [0.0] * 3, [0.0] * 3, [0.0] * 3
+        self.phase_c = self.phase_d = self.phase_k = (0.0, 0.0, 0.0)
         self.decay_s = z.rs / z.ls if z.ls else inf
         self.instant = self.modes and not z.ls and not z.rs
         if self.instant:
             return
+        by_c, by_d, const = [0.0] * 3, [0.0] * 3, [0.0] * 3
         for group in self.rail_of_phases:
             if len(group) < 2:
                 continue
@@ -155,8 +164,11 @@ class Network:
             for x in group:
                 wave = line.unit_wave(x)
                 over = line.amplitude_v * wave[0] - cosine, line.amplitude_v * wave[1] - sine
-                self.phase_c[x], self.phase_d[x] = _response(*over, z.rs, line.omega * z.ls)
-                self.phase_k[x] = (offset - self.offsets[x]) / z.rs
+                by_c[x], by_d[x] = _response(*over, z.rs, line.omega * z.ls)
+                const[x] = (offset - self.offsets[x]) / z.rs
+        self.phase_c = by_c[0], by_c[1], by_c[2]
+        self.phase_d = by_d[0], by_d[1], by_d[2]
+        self.phase_k = const[0], const[1], const[2]
 
     def _mean(self, group: list[int], line: AcLine) -> tuple[float, float, float]:
         """Return the factors of cos and sin of the mean source voltage of phases, and their mean offset."""
@@ -272,13 +284,18 @@ class Network:
             for mask, (c, d, constant, *rest) in _watch(self.potentials, self.floating_offset, wanted):
                 level = TURN_ON_V + self._drop_v * (2 if mask & (mask - 1) else 1)
                 by_k, by_a, by_emf = rest
-                found.append((mask, c, d, constant - level, by_k, by_a, by_emf, self._omega**2 * hypot(c, d)))
+                found.append(
+                    (mask, c, d, constant - level, by_k, by_a, by_emf, self._omega * self._omega * hypot(c, d))
+                )
             self.watches[wanted] = found
         return found
 
 
-ARMATURE_SHORT, LINE_SHORT, CROSS_FIRE = 1, 2, 4
+ARMATURE_SHORT: Final = 1
+LINE_SHORT: Final = 2
+CROSS_FIRE: Final = 4
 """Bits of ``Network.alarms``."""
+# Not Final: mypyc 2.4 takes a Final tuple of floats for one that was never set.
 _NOTHING: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _UNIT: Potential = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _EMF: Potential = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import inf, pi
+from typing import Final
 
 from automax_ros.drive.ac_line import AcLine, Rotation
 from automax_ros.drive.bridge import Bridge
@@ -20,15 +21,17 @@ from automax_ros.drive.nameplate import DriveParameters
 from automax_ros.drive.plant_meter import PlantMeter
 from automax_ros.drive.state import SavedState, Stateful, check_names
 
-PICK_UP_NS, DROP_OUT_NS = 60_000_000, 20_000_000
+PICK_UP_NS: Final = 60_000_000
+DROP_OUT_NS: Final = 20_000_000
 """From the relay to closed and to open contacts of the M-contactor, ns (decision)."""
-SCR_DROP_V = 1.5
+SCR_DROP_V: Final = 1.5
 """Voltage over a conducting SCR, V (decision: 1.2 to 1.6 V are usual)."""
-FIELD_TAU_S, FIELD_KNEE = 0.5, 0.5
+FIELD_TAU_S: Final = 0.5
+FIELD_KNEE: Final = 0.5
 """Time constant of the field (s) and knee of its saturation (decision: 0.2 to 3 s by size and 0.5 are usual)."""
-FIELD_AMPS = 0.015
+FIELD_AMPS: Final = 0.015
 """Rated field current over rated armature current (decision: a field of 1 to 2 % of the power is usual)."""
-RAD_S_PER_RPM = pi / 30
+RAD_S_PER_RPM: Final = pi / 30
 
 
 @dataclass(frozen=True)

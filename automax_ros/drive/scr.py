@@ -12,34 +12,40 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from typing import Final
 
 from automax_ros.drive.errors import GateError
 
-PHASES = "ABC"
-P, M = 0, 1
+PHASES: Final = "ABC"
+P: Final = 0
+M: Final = 1
 
-FORWARD = (1, 2, 3, 4, 5, 6)
+FORWARD: Final = (1, 2, 3, 4, 5, 6)
 """The SCRs of bridge 1 in firing order on a line that rotates A, B, C; they carry positive armature current."""
-REVERSE = (11, 12, 13, 14, 15, 16)
+REVERSE: Final = (11, 12, 13, 14, 15, 16)
 """The SCRs of bridge 2, likewise; they carry negative armature current."""
 
 # number: phase, rail, direction (+1 conducts from the phase to the rail)
-_PLACES = {
+_PLACES: Final = {
     1: (0, P, 1), 3: (1, P, 1), 5: (2, P, 1),
     4: (0, M, -1), 6: (1, M, -1), 2: (2, M, -1),
     11: (0, M, 1), 13: (1, M, 1), 15: (2, M, 1),
     14: (0, P, -1), 16: (1, P, -1), 12: (2, P, -1),
 }  # fmt: skip
 
-BIT = {number: 2 * (2 * phase + rail) + (direction < 0) for number, (phase, rail, direction) in _PLACES.items()}
+BIT: Final = {number: 2 * (2 * phase + rail) + (direction < 0) for number, (phase, rail, direction) in _PLACES.items()}
 """The bit of each SCR."""
-NUMBER = tuple(sorted(BIT, key=lambda number: BIT[number]))
+NUMBER: Final = tuple(sorted(BIT, key=lambda number: BIT[number]))
 """The number of the SCR of each bit."""
-PARTNER = {number: NUMBER[bit ^ 1] for number, bit in BIT.items()}
+PARTNER: Final = {number: NUMBER[bit ^ 1] for number, bit in BIT.items()}
 """The SCR anti-parallel to each."""
-MASK = {number: 1 << bit for number, bit in BIT.items()}
-FORWARD_MASK = sum(MASK[number] for number in FORWARD)
-REVERSE_MASK = sum(MASK[number] for number in REVERSE)
+MASK: Final = {number: 1 << bit for number, bit in BIT.items()}
+FORWARD_MASK: Final = sum(MASK[number] for number in FORWARD)
+REVERSE_MASK: Final = sum(MASK[number] for number in REVERSE)
+
+
+RAIL_MASKS: Final = tuple(sum(MASK[number] for number, place in _PLACES.items() if place[1] == rail) for rail in (P, M))
+"""The SCRs on each rail."""
 
 
 def phase_of(number: int) -> int:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import cos, exp, inf, sin
 
 from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.network import Network
+from automax_ros.drive.network import Network, Phases
 from automax_ros.drive.waves import ZERO_A, first_zero
 
-Phases = tuple[float, float, float]
 Start = tuple[float, float, float, float, float]
 """At the start of an interval: the line's angle, its sine and cosine, k and a of the armature current."""
 
@@ -21,18 +20,19 @@ def next_ending(net: Network, omega: float, state: Start, modes: Phases, limit: 
     first, out = limit, 0
     lowest = -ZERO_A
     end_sine = end_cosine = fall = 0.0
-    for mask, c, d, share, part, wa, wb, wc, bend in net.guards:
+    for mask, c, d, share, part, wa, wb, wc, curve in net.guards:
         guard_k, guard_a = share * k + part, share * a
         value = c * cosine + d * sine + guard_k + guard_a
         slope = omega * (d * cosine - c * sine) - decay * guard_a
+        bend = curve
         if guard_a < 0.0:
-            bend -= decay * decay * guard_a  # noqa: PLW2901
+            bend -= decay * decay * guard_a
         guard_b = wa * mode_a + wb * mode_b + wc * mode_c
         if guard_b:
             value += guard_b
             slope -= decay_s * guard_b
             if guard_b < 0.0:
-                bend -= decay_s * decay_s * guard_b  # noqa: PLW2901
+                bend -= decay_s * decay_s * guard_b
         if value < lowest:  # a loop of legs has shared its current again: who would carry it backwards most goes out
             lowest, first, out = value, 0.0, mask
         if lowest < -ZERO_A:
@@ -53,7 +53,7 @@ def next_ending(net: Network, omega: float, state: Start, modes: Phases, limit: 
         if -ZERO_A <= value <= ZERO_A and abs(guard_k) + abs(guard_a) + abs(guard_b) + bend < 1e-9:
             zero = 0.0  # nothing drives it any more
         else:
-            zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, decay_s, first)
+            zero = first_zero(c, d, guard_k, guard_a, guard_b, theta, omega, decay, decay_s, first, curve)
         if zero <= first:
             first, out = zero, mask
     if out and out != net.guards[0][0]:
@@ -82,7 +82,7 @@ def next_turn_on(
     decay = net.decay
     soonest, who = inf, 0
     most, now_on = 0.0, 0
-    for mask, c, d, constant, by_k, by_a, by_emf, bend in net.watches.get(wanted) or net.watch(wanted):
+    for mask, c, d, constant, by_k, by_a, by_emf, curve in net.watches.get(wanted) or net.watch(wanted):
         short = -constant - by_k * k - by_emf * emf
         fade = by_a * a
         value = c * cosine + d * sine + fade - short
@@ -97,13 +97,14 @@ def next_turn_on(
         if not mask & bridge.gated and horizon > bridge.turn_off_ns * 1e-9:
             horizon = bridge.turn_off_ns * 1e-9
         slope = omega * (d * cosine - c * sine) - decay * fade
+        bend = curve
         if fade > 0.0:
-            bend += decay * decay * fade  # noqa: PLW2901
+            bend += decay * decay * fade
         # As for the currents: a parabola that stays above the voltage and is negative proves that nothing happens.
         if value + horizon * (slope + 0.5 * bend * horizon) < 0.0:
             continue
         horizon = min(horizon, (bridge.window_end_ns(mask, now_ns) - now_ns) * 1e-9)
-        zero = first_zero(-c, -d, short, -fade, 0.0, theta, omega, decay, 0.0, horizon)
+        zero = first_zero(-c, -d, short, -fade, 0.0, theta, omega, decay, 0.0, horizon, curve)
         if zero < soonest and mask & bridge.recovering:
             rest = (bridge.rest_end_ns(mask) - now_ns) * 1e-9
             if zero < rest:

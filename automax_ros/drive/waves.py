@@ -11,13 +11,14 @@ the source's decay rate (1/s).
 from __future__ import annotations
 
 from math import cos, exp, expm1, hypot, inf, sin, sqrt
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-STRIDE_S = 1e-8
+STRIDE_S: Final = 1e-8
 """A dip below zero that is shorter than this may be passed over: its depth is below 1e-8 A in any real circuit."""
-NEWTON_S, NEWTON_LEFT = 1e-6, 1e-4
+NEWTON_S: Final = 1e-6
+NEWTON_LEFT: Final = 1e-4
 """Closer than this (s) to a zero two Newton steps find it; they have if the first left at most this part."""
-ZERO_A = 1e-7
+ZERO_A: Final = 1e-7
 """A current that falls and is below this (A) has ended: two orders above rounding in circuits without resistance."""
 
 
@@ -32,6 +33,7 @@ def first_zero(
     decay: float,
     decay_b: float,
     limit: float,
+    curve: float = -1.0,
 ) -> float:
     """Return the first instant in [0, limit] (s) at which a wave that begins at or above 0 falls below; inf if none.
 
@@ -39,8 +41,11 @@ def first_zero(
     exponentials with a negative factor add), so a parabola with that curvature stays under the wave, and its zero is a
     safe step. Near the wave's zero the steps become Newton's; where the wave only grazes zero their number grows with
     the logarithm of the clearance.
+
+    ``curve`` is omega^2 hypot(c, d) where the caller has it; below 0 it is computed.
     """
-    curve = omega * omega * hypot(c, d)
+    if curve < 0.0:
+        curve = omega * omega * hypot(c, d)
     t = before = 0.0
     above = 0.0
     while True:

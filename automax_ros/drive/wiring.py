@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import Final
 
 from automax_ros.drive.scr import P
 
-PHASE_ARC = 1 << 12
+PHASE_ARC: Final = 1 << 12
 """The bit of an arc in phase A; the next two are B's and C's."""
-ARMATURE_ARC = 1 << 15
+ARMATURE_ARC: Final = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Wiring:
     armature_closed: bool = True
     armature_arc_v: float = 0.0
 
-    @cached_property
+    @property
     def arcing(self) -> bool:
         """Whether a phase or the contactor is opening."""
         return self.armature_arc_v != 0.0 or self.phase_arc_v != (0.0, 0.0, 0.0)

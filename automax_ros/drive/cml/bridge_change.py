@@ -9,27 +9,28 @@ from __future__ import annotations
 
 import enum
 from math import acos, pi
+from typing import Final
 
 from automax_ros.drive.cml.regulator import BOUNDARY_WAY
 from automax_ros.drive.cml.signals import VOLTAGE, VOLTS, Measured
 from automax_ros.drive.state import Stateful
 
-DEAD_BAND = 4.0
+DEAD_BAND: Final = 4.0
 """Counts of reference of the other sign that do not ask for a change: it would never rest at reference 0
 (decision)."""
-FLOOR = 27 / 360
+FLOOR: Final = 27 / 360
 """DELTA over the period that inversion needs while current is continuous: overlap at 2.5 times the rated current, and
 the turn-off time of SCRs (decision)."""
-QUIET = 8 / 360
+QUIET: Final = 8 / 360
 """DELTA over the period in the phase back once current is discontinuous: it fires next to nothing, and turns off
 (decision)."""
-RECOVERY_US = 500
+RECOVERY_US: Final = 500
 """Time without current after which SCRs block, with a margin (decision)."""
-VD0 = 1.3505
+VD0: Final = 1.3505
 """Ideal mean voltage of a bridge over the line-to-line voltage: 3 sqrt(2) / pi."""
-PRESET = 0.6
+PRESET: Final = 0.6
 """Largest part of a scan that a preset lets conduct, by the law of ``regulator`` (decision)."""
-HIGHEST_COS = 0.95
+HIGHEST_COS: Final = 0.95
 """Alpha of a preset lies between the angles of this cosine (decision)."""
 
 

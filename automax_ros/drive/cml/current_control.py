@@ -5,7 +5,7 @@ Start, stop and faults are not its business: it is told to begin, to scan with a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from automax_ros.drive.cml.bridge_change import FLOOR, QUIET, RECOVERY_US, BridgeChange, Stage, preset_us
 from automax_ros.drive.cml.firing import Firing
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from automax_ros.drive.cml.outputs import Outputs
     from automax_ros.drive.cml.pll import Pll
 
-COUNTS = FULL * 100 / RATED
+COUNTS: Final = FULL * 100 / RATED
 """Counts of feedback per unit of ``Measured.current`` where LIM_BAR is 1 %."""
-LONGEST_ZERO_US = 3472
+LONGEST_ZERO_US: Final = 3472
 """Largest DC_TIME, us (52.2.1)."""
-FRESH_SCANS = 2
+FRESH_SCANS: Final = 2
 """Scans that a preset is given to show a current before the search goes on from it (decision)."""
 
 

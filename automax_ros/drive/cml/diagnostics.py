@@ -8,15 +8,18 @@ rows are all there are).
 
 from __future__ import annotations
 
+from typing import Final
+
 from automax_ros.drive.cml.signals import Pulse
 from automax_ros.drive.state import Stateful
 
-RECORDS = 12
+RECORDS: Final = 12
 """Records of a page (52.3.2)."""
-ROWS, PAGES = 38, 2
-SIZE = ROWS * PAGES
+ROWS: Final = 38
+PAGES: Final = 2
+SIZE: Final = ROWS * PAGES
 """Elements of the array."""
-PAGE_NUMBER = 0
+PAGE_NUMBER: Final = 0
 """Index of the element that says which page is written: 0 is page 0, anything else page 1."""
 
 Record = tuple[int, int, int]

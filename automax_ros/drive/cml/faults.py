@@ -8,7 +8,7 @@ a level, looked at each system clock tick, not an edge; it takes back nothing th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from automax_ros.drive.cml.signals import EXTERNAL_TRIP, LINE, OVERCURRENT, ROTATION_ABC, Measured
 from automax_ros.drive.state import Stateful
@@ -19,7 +19,13 @@ if TYPE_CHECKING:
     from automax_ros.drive.cml.outputs import Outputs
     from automax_ros.drive.cml.pll import Pll
 
-IOC, SYNC_LOSS, TACH_LOSS, OSV, EXT_IET, PHROT, BAD_SCR = (1 << bit for bit in range(7))
+IOC: Final = 1 << 0
+SYNC_LOSS: Final = 1 << 1
+TACH_LOSS: Final = 1 << 2
+OSV: Final = 1 << 3
+EXT_IET: Final = 1 << 4
+PHROT: Final = 1 << 5
+BAD_SCR: Final = 1 << 6
 
 
 class FaultKind(NamedTuple):
@@ -30,7 +36,7 @@ class FaultKind(NamedTuple):
     problem: int
 
 
-KINDS = (
+KINDS: Final = (
     FaultKind(IOC, "ioc_out", 7110),
     FaultKind(SYNC_LOSS, "sync_loss_out", 7111),
     FaultKind(TACH_LOSS, "tach_loss_out", 7112),
@@ -41,13 +47,13 @@ KINDS = (
 )
 """The drive faults, in the order in which they are logged when several come at once."""
 
-SYNC_SCANS = 360
+SYNC_SCANS: Final = 360
 """Scans from task initialisation within which the line sync must lock, or it is lost: 1 s at 60 Hz (decision)."""
-TACH_SCANS = 16
+TACH_SCANS: Final = 16
 """Scans of DELTA that tach loss looks at (52.4)."""
-TACH_SPEED = 205
+TACH_SPEED: Final = 205
 """SPEED_FDBK below which the motor seems to stand: 5 % of 4095 (52.4)."""
-TACH_HIGHEST_DEG = 127
+TACH_HIGHEST_DEG: Final = 127
 """The threshold of register 4136 is limited to 0 and this in use (52.4.1)."""
 
 

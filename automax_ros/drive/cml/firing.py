@@ -7,12 +7,14 @@ once if the next is not due yet; none is fired twice (decision).
 
 from __future__ import annotations
 
+from typing import Final
+
 from automax_ros.drive.cml.signals import Pulse, gate_bits
 from automax_ros.drive.state import Stateful
 
-STANDARD = (2, 3, 4, 5, 6, 1)
+STANDARD: Final = (2, 3, 4, 5, 6, 1)
 """The SCR whose natural commutation is at each position of a cycle, on a line of the standard rotation."""
-REVERSED = (6, 5, 4, 3, 2, 1)
+REVERSED: Final = (6, 5, 4, 3, 2, 1)
 """The same on a line of the other rotation."""
 
 
@@ -21,7 +23,7 @@ def _words(order: tuple[int, ...], add: int) -> tuple[int, ...]:
     return tuple(gate_bits(order[place] + add, order[place - 1] + add) for place in range(6))
 
 
-_GATES = {
+_GATES: Final = {
     (bridge, reverse): _words(REVERSED if reverse else STANDARD, 10 * (bridge - 1))
     for bridge in (1, 2)
     for reverse in (False, True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 
 class Inputs(NamedTuple):
@@ -41,4 +41,4 @@ class Inputs(NamedTuple):
     fault_reset: bool
 
 
-INPUTS = tuple(name.upper() for name in Inputs._fields)
+INPUTS: Final = tuple(name.upper() for name in Inputs._fields)

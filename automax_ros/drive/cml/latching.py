@@ -11,23 +11,36 @@ CC_THRESH, for which no clock is told, is read each tick (decision).
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Final
 
 from automax_ros.blocks.cml_limits import ioc_is_possible, is_good
 from automax_ros.drive.cml.inputs import Inputs
 from automax_ros.drive.cml.pll import LONGEST_NS, SHORTEST_NS
 from automax_ros.drive.state import Stateful
 
-TICK_NS = 5_500_000
+TICK_NS: Final = 5_500_000
 """The system clock tick, ns."""
-FAST_CHANGE, DIERIKON = 1, 2
+FAST_CHANGE: Final = 1
+DIERIKON: Final = 2
 """Bits of register 4146: fast bridge change (52.6.2), the SCR test of both bridges (52.7)."""
 
-BAD_DYNAMIC, BAD_FIXED, BAD_LEVEL = 7105, 7106, 7107
+BAD_DYNAMIC: Final = 7105
+BAD_FIXED: Final = 7106
+BAD_LEVEL: Final = 7107
 """Problems: a dynamic input out of range, a fixed one, IOC_THRESH of 1.8 LIM_BAR or more."""
 
-_LIMITED = ("ac_line_freq", "ref_lag", "pi_w_lead", "ag_factor", "max_m_dropout", "ioc_thresh", "lim_bar", "osv_thresh")
-_SWITCHES = ("digital_tach", "tach_loss_stop", "auto_phrot")
-_DYNAMIC = ("cc_thresh", "ref_rate", "kp", "test_alpha")
+_LIMITED: Final = (
+    "ac_line_freq",
+    "ref_lag",
+    "pi_w_lead",
+    "ag_factor",
+    "max_m_dropout",
+    "ioc_thresh",
+    "lim_bar",
+    "osv_thresh",
+)
+_SWITCHES: Final = ("digital_tach", "tach_loss_stop", "auto_phrot")
+_DYNAMIC: Final = ("cc_thresh", "ref_rate", "kp", "test_alpha")
 
 
 @lru_cache(maxsize=64)

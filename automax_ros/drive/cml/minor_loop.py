@@ -7,7 +7,7 @@ Given the same state and the same of both it does the same, so a recorded drive 
 from __future__ import annotations
 
 from collections.abc import Sequence as Numbers
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from automax_ros.drive.cml.current_control import CurrentControl
 from automax_ros.drive.cml.diagnostics import Feeding
@@ -32,13 +32,14 @@ from automax_ros.drive.cml.signals import (
 )
 from automax_ros.drive.state import Stateful
 
-_REGISTERS = {
+_REGISTERS: Final = {
     name: Measured._field_defaults[name] for name in ("tach_threshold", "phase_step", "period_step", "options")
 }
 """The registers of the 57C406 at task initialisation (52.7): what they were before does not count."""
 
 
-_SCR_TEST, _RUN = Phase.SCR_TEST, Phase.RUN
+_SCR_TEST: Final = Phase.SCR_TEST
+_RUN: Final = Phase.RUN
 _new = tuple.__new__
 
 
@@ -269,5 +270,5 @@ def _like(old: object, number: float) -> object:
     return type(old)(number) if isinstance(old, (bool, int, float)) else number
 
 
-NUMBERS = len(CurrentMinorLoop().numbers())
+NUMBERS: Final = len(CurrentMinorLoop().numbers())
 """How many numbers the state of a loop is."""

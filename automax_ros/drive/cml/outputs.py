@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from operator import attrgetter
+from typing import Final
 
 from automax_ros.drive.state import Stateful
 
@@ -40,7 +41,7 @@ class Outputs(Stateful):
         return _row(self)
 
 
-_NAMES = tuple(item.name for item in fields(Outputs))
+_NAMES: Final = tuple(item.name for item in fields(Outputs))
 _row = attrgetter(*_NAMES)
-OUTPUTS = tuple(name.upper() for name in _NAMES)
+OUTPUTS: Final = tuple(name.upper() for name in _NAMES)
 Outputs._kept = _NAMES

@@ -10,18 +10,21 @@ phase step above the largest error, 2000 us, changes nothing (52.5.1), and the p
 
 from __future__ import annotations
 
+from typing import Final
+
 from automax_ros.drive.cml.signals import LINE, Measured
 from automax_ros.drive.state import Stateful
 
-LOST_NS = 2_000_000
+LOST_NS: Final = 2_000_000
 """Largest phase error, ns (52.5.1); beyond it the sync is lost."""
-LOCKED_NS = 100_000
+LOCKED_NS: Final = 100_000
 """Phase error within which a cycle counts towards the lock, ns (decision)."""
-LOCK_CYCLES = 6
+LOCK_CYCLES: Final = 6
 """Cycles in a row with a small error that make the lock (decision)."""
-SHORTEST_NS, LONGEST_NS = 16_128_500, 20_833_499
+SHORTEST_NS: Final = 16_128_500
+LONGEST_NS: Final = 20_833_499
 """Range of the period, ns: LINE_PERIOD is 16129 to 20833, 62 to 48 Hz (52.2.1)."""
-NEVER = -1
+NEVER: Final = -1
 
 
 class Pll(Stateful):

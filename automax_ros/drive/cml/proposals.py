@@ -7,19 +7,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
+from typing import Final
 
 from automax_ros.drive.cml.reference import FULL
 from automax_ros.drive.cml.regulator import BOUNDARY_WAY, INTEGRAL_STEP, STEPS
 from automax_ros.drive.nameplate import DriveParameters
 
-VD0 = 1.3505
+VD0: Final = 1.3505
 """Ideal mean voltage of the bridge over the line-to-line voltage: 3 sqrt(2) / pi."""
-BOUNDARY = 0.0931
+BOUNDARY: Final = 0.0931
 """Part of Vd0 / (w L) that is the current at the boundary of continuous conduction, at alpha 90 degrees and R = 0."""
-LOOP_GAIN = 0.65
+LOOP_GAIN: Final = 0.65
 """Part of an error that the proportional gain corrects in a scan, in continuous conduction at alpha 90 degrees
 (decision)."""
-LEAST_CONDUCTION = 0.4
+LEAST_CONDUCTION: Final = 0.4
 """Conducting part of a scan down to which the integral gain is raised (decision)."""
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from automax_ros.drive.state import Stateful
 
-FULL = 4095
+FULL: Final = 4095
 """Counts of LIM_BAR."""
-LIMIT = 32767
+LIMIT: Final = 32767
 
 
 class ReferenceChain(Stateful):

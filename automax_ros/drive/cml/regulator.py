@@ -10,32 +10,37 @@ error in a scan, at most AG_FACTOR times the continuous one (decision). While no
 
 from __future__ import annotations
 
+from typing import Final
+
 from automax_ros.drive.state import Stateful
 
-GAIN_CONTINUOUS, GAIN_LOWEST = 1280, 512
+GAIN_CONTINUOUS: Final = 1280
+GAIN_LOWEST: Final = 512
 """FDBK_GAIN without and with nothing but zero current, in 1/1024; between them it falls in proportion to DC_TIME
 (decision)."""
-RAW_LIMIT = 8190
+RAW_LIMIT: Final = 8190
 """Largest raw feedback: twice LIM_BAR (decision: 8190 x 1.25 is the largest I_FDBK, 10238)."""
-STEPS = 1024
+STEPS: Final = 1024
 """Steps of KP, and of the gains that are shown, in 1."""
-LARGEST_GAIN = 32767
-BOUNDARY_WAY = 1 / 12
+LARGEST_GAIN: Final = 32767
+BOUNDARY_WAY: Final = 1 / 12
 """From the first current to continuous conduction DELTA moves by about this part of a period (decision)."""
-INTEGRAL_STEP = 0.55
+INTEGRAL_STEP: Final = 0.55
 """Part of an error that the integral takes off in a scan, in discontinuous conduction (decision)."""
-LEAST_PART = 0.05
+LEAST_PART: Final = 0.05
 """Conducting part of a scan below which the integral gain rises no more (decision)."""
-RAISED, FALL = 0.13, 0.88
+RAISED: Final = 0.13
+FALL: Final = 0.88
 """After discontinuous conduction the continuous integral gain is greater by this part of an error, which falls by this
 factor each scan: the drop over the resistance comes with the current (decision)."""
-RISE = 0.30
+RISE: Final = 0.30
 """DELTA rises in a scan by at most this part of a scan in discontinuous conduction, or what conducts would not tell
 (decision)."""
-AHEAD = 0.4
+AHEAD: Final = 0.4
 """Part of the last proportional push that the mean of a scan does not show if the SCR is fired at the scan's end
 (decision)."""
-SEARCH_LEAST, SEARCH_MOST = 0.018, 0.040
+SEARCH_LEAST: Final = 0.018
+SEARCH_MOST: Final = 0.040
 """Step of DELTA while nothing conducts, over the period: for the smallest reference and for LIM_BAR (decision)."""
 
 

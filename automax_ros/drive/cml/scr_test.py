@@ -14,21 +14,24 @@ interrupt say which of them is shorted (decision: nothing is published but the n
 
 from __future__ import annotations
 
+from typing import Final
+
 from automax_ros.drive.cml.firing import REVERSED, STANDARD
 from automax_ros.drive.cml.signals import RATED, Measured, Pulse, gate_bits
 from automax_ros.drive.scr import PARTNER
 from automax_ros.drive.state import Stateful
 
-CYCLES = 9
+CYCLES: Final = 9
 """Line cycles for which a bridge is tested (52.3.1)."""
-STEP_NS = 100_000
+STEP_NS: Final = 100_000
 """How much DELTA grows from cycle to cycle, ns: 0 to 800 us (decision: equal steps)."""
-PULSE_NS = 100_000
+PULSE_NS: Final = 100_000
 """Length of the gate pulse, ns (decision)."""
-THRESHOLD = RATED * 5 // 100
+THRESHOLD: Final = RATED * 5 // 100
 """Current that means a short, as ``Measured`` has it: 5 % of the rated one (decision)."""
 
-GO_ON, PASSED = -1, 0
+GO_ON: Final = -1
+PASSED: Final = 0
 
 
 class ScrTest(Stateful):

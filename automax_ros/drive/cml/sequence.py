@@ -7,10 +7,11 @@ comes at another time is forgotten, and not logged (decision). The first tick af
 from __future__ import annotations
 
 import enum
+from typing import Final
 
 from automax_ros.drive.state import Stateful
 
-CLOSE_NS = 80_000_000
+CLOSE_NS: Final = 80_000_000
 """From the relay to the next step, ns: the contactor closes meanwhile (decision: no feedback of it is known)."""
 
 
@@ -28,8 +29,8 @@ class Phase(enum.IntEnum):
     (decision)."""
 
 
-_RUN = int(Phase.RUN)
-_WAITING = (Phase.CLOSING, Phase.SCR_TEST, Phase.STOPPING)
+_RUN: Final = int(Phase.RUN)
+_WAITING: Final = (Phase.CLOSING, Phase.SCR_TEST, Phase.STOPPING)
 
 
 class Sequence(Stateful):

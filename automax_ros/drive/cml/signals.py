@@ -7,34 +7,35 @@ before, and takes a ``Command`` for the time up to the next (decision: nothing i
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-LINE = 1 << 0
+LINE: Final = 1 << 0
 """There is a sync voltage: the phase that the 57C406 synchronizes on is alive."""
-ROTATION_ABC = 1 << 1
+ROTATION_ABC: Final = 1 << 1
 """The phases pass in the order A, B, C: not the standard one, which is C, B, A (52.1.5)."""
-OVERCURRENT = 1 << 2
+OVERCURRENT: Final = 1 << 2
 """The armature current has been above the level of the last command at some instant since the last interrupt, or a
 current of the line is at this one (decision: what the armature does not see must trip, too)."""
-PERMISSIVE = 1 << 3
+PERMISSIVE: Final = 1 << 3
 """The run permissive input of the drive digital I/O module."""
-EXTERNAL_TRIP = 1 << 4
+EXTERNAL_TRIP: Final = 1 << 4
 """The external instantaneous electronic trip (IET) input of the drive digital I/O module."""
-SWITCH_A = 1 << 5
-SWITCH_B = 1 << 6
+SWITCH_A: Final = 1 << 5
+SWITCH_B: Final = 1 << 6
 """The test switch of the 57C406 in position A, in position B; neither in the centre."""
-RESET_SWITCH = 1 << 7
+RESET_SWITCH: Final = 1 << 7
 """The fault reset switch of the 57C406 is closed."""
-VOLTAGE = 1 << 8
+VOLTAGE: Final = 1 << 8
 """A 57C405 gives the armature voltage."""
 
-RATED = 100_000
+RATED: Final = 100_000
 """The rated armature current in the units of ``Measured.current`` (thousandths of a percent)."""
 
-VOLTS = 10_000
+VOLTS: Final = 10_000
 """``Measured.voltage`` where armature voltage and nominal line-to-line voltage (rms) are equal (decision)."""
 
-FMCR, RMCR = 1, 2
+FMCR: Final = 1
+RMCR: Final = 2
 """The contactor relays of the drive digital I/O module, as ``Command.relays`` has them."""
 
 
