@@ -70,8 +70,8 @@ class Network:
     __slots__ = (
         "_drop_v", "_omega", "active", "alarms", "arcing", "armature_short", "bend", "c", "calm", "constant", "d",
         "decay", "decay_s", "floating_offset", "guards", "inductance", "instant", "largest_share", "leg_weights",
-        "mask", "modes", "offsets", "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset", "resistance",
-        "share", "sign", "tied", "watches",
+        "mask", "modes", "offsets", "phase_c", "phase_d", "phase_k", "potentials", "rail_of_phases", "rail_offset",
+        "resistance", "share", "sign", "tied", "watches",
     )  # fmt: skip
 
     def __init__(self, mask: int, wiring: Wiring, line: AcLine, z: Impedances) -> None:
