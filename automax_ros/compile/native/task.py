@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator, Sequence
 from functools import lru_cache, partial
-from importlib import import_module
 from importlib.machinery import ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -18,6 +17,7 @@ from automax_ros.compile.native.columns import Columns
 from automax_ros.compile.native.executed import BesideLatch, Column, Executed
 from automax_ros.compile.native.slots import StateSlots, kind_of
 from automax_ros.compile.native.source import NativeSource, NotNative
+from automax_ros.compile.native.translate import translate
 from automax_ros.compile.scan_io import ScanIo, ScanTooLong, StateValues
 
 _HOST = "automax_host"
@@ -60,7 +60,7 @@ class NativeTask:
 def native_form(
     compiled: CompiledTask,
     cache: NativeCache,
-    translator: Callable[[CompiledTask], NativeSource] | None = None,
+    translator: Callable[[CompiledTask], NativeSource] = translate,
     limit_s: float = LIMIT_S,
 ) -> NativeTask:
     """Return the native form of a task, from the cache or built now. Any thread may ask for it.
@@ -69,7 +69,7 @@ def native_form(
         NotNative: the task cannot be native, or not here, and why.
     """
     try:
-        source = (translator or import_module("automax_ros.compile.native.translate").translate)(compiled)
+        source = translator(compiled)
         path = library(source.text, cache, limit_s=limit_s)
         return NativeTask(compiled, source, path, host_module(cache, limit_s))
     except (OSError, ImportError) as error:
