@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable
 
 from automax_ros.compile.native.build import LIMIT_S
-from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeMode, NativeOutcome
+from automax_ros.compile.native.forms import NativeForms, NativeMode, NativeOutcome
 
 _LIVE_LIMIT_S = 20.0
 """Longest that the start of a rack on the wall clock waits for one task to be built, s (decision)."""
@@ -34,9 +34,10 @@ def native_forms(arguments: argparse.Namespace, expected_ns: int | None, *, wall
     Tasks are built before the rack is put into RUN, those of a reload while the old ones scan (decision).
     """
     mode = NativeMode(arguments.native)
-    if mode is NativeMode.OFF or (wall_clock and mode is NativeMode.AUTO):
-        return IN_PYTHON
-    return NativeForms(mode, expected_ns, limit_s=_LIVE_LIMIT_S if wall_clock else LIMIT_S)
+    forms = NativeForms(mode, expected_ns, limit_s=_LIVE_LIMIT_S if wall_clock else LIMIT_S)
+    if wall_clock and mode is NativeMode.AUTO:
+        return forms.off("on the wall clock scans gain nothing by it (--native on)")
+    return forms
 
 
 def tell_native(outcomes: Iterable[NativeOutcome]) -> None:

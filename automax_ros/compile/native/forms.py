@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from automax_ros.compile.compiler import CompiledTask
@@ -56,17 +56,23 @@ class NativeForms:
         expected_ns: task time that will pass, None without an end: with ``AUTO`` it says whether building pays.
         cache: where they are kept.
         limit_s: time in which each must be built, s.
+        why_off: what is told of each task with ``OFF``.
     """
 
     mode: NativeMode = NativeMode.OFF
     expected_ns: int | None = None
     cache: NativeCache = NativeCache()
     limit_s: float = LIMIT_S
+    why_off: str = "native scans are off"
+
+    def off(self, why: str) -> NativeForms:
+        """Return what a run wants in which no task is native, for a reason of its own."""
+        return self if self.mode is NativeMode.OFF else replace(self, mode=NativeMode.OFF, why_off=why)
 
     def made(self, tasks: Mapping[str, CompiledTask]) -> dict[str, NativeOutcome]:
         """Return tasks as they are to run, by the same names; several are built at a time. Nothing is raised."""
         if self.mode is NativeMode.OFF or not tasks:
-            return {name: NativeOutcome(task, why="native scans are off") for name, task in tasks.items()}
+            return {name: NativeOutcome(task, why=self.why_off) for name, task in tasks.items()}
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(min(len(tasks), os.cpu_count() or 1)) as pool:
@@ -75,7 +81,7 @@ class NativeForms:
     def form(self, compiled: CompiledTask) -> NativeOutcome:
         """Return a task as it is to run: as it is given where it is not native."""
         if self.mode is NativeMode.OFF:
-            return NativeOutcome(compiled, why="native scans are off")
+            return NativeOutcome(compiled, why=self.why_off)
         if self.mode is NativeMode.AUTO and not self._pays(compiled):
             return NativeOutcome(compiled, why="a run this short gains nothing by it (--native on)")
         from automax_ros.compile.native.task import native_form

@@ -1,0 +1,102 @@
+"""``--native`` and ``--verbose``: the same results to the byte, and what became of each task."""
+
+from pathlib import Path
+
+import pytest
+
+from automax_ros.cli.native import native_forms
+from automax_ros.compile.native.forms import NativeMode
+
+CONFIG = Path(__file__).parent.parent.parent / "config"
+TASK = """
+10 COMMON REF%, RUN@, OUT%, GAIN
+20 LOCAL COUNT%, SUM!, REST, TABLE%(4)
+30 CALL SCAN_LOOP(TICKS=2)
+40 CALL LAG(INPUT=REF%, WLG=10.0, RESET=RUN@, OUTPUT=OUT%)
+50 FOR COUNT% = 0 TO 4
+60 TABLE%(COUNT%) = OUT% * 3 - COUNT%
+70 SUM! = SUM! + TABLE%(COUNT%)
+80 NEXT COUNT%
+90 REST = SUM! * 0.25 + GAIN
+100 GAIN = REST * 3
+110 END
+"""
+
+
+@pytest.fixture(scope="module")
+def cache_home(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(cache_home, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache_home))
+
+
+def recording(automax, config, mode, *options):
+    folder = Path(f"bag_{mode}")
+    result = automax("run", config, "--simulated", "--native", mode, "--verbose", "--record", folder, *options)
+    assert result.code == 0, result.err
+    return {path.name: path.read_bytes() for path in folder.iterdir()}, result.err
+
+
+@pytest.mark.parametrize(
+    ("rack", "seconds", "stimuli", "native"),
+    [
+        ("section_drive", "3", None, {"LINE", "SEQUENCE", "MOTOR"}),
+        pytest.param(
+            "web_line", "5", "start.yaml", {"LINE", "UNWIND", "WINDER", "WIND_A", "WIND_B"}, marks=pytest.mark.soak
+        ),
+        pytest.param("dc_drive", "5", "tour.yaml", {"SPEED", "SEQ"}, marks=pytest.mark.soak),
+    ],
+)
+def test_recordings_are_the_same_to_the_byte(automax, rack, seconds, stimuli, native):
+    config = CONFIG / rack / "rack.yaml"
+    options = ["--duration", seconds, *([] if stimuli is None else ["--stimuli", CONFIG / rack / stimuli])]
+    expected, said = recording(automax, config, "off", *options)
+    assert "in Python: native scans are off" in said
+    found, said = recording(automax, config, "on", *options)
+    assert found == expected
+    assert {line.partition(":")[0] for line in said.splitlines() if line.endswith(": native")} >= native
+
+
+def test_traces_are_the_same(automax):
+    automax.write("TASK.BLK", TASK)
+    automax.write("IN.csv", "REF%,RUN@\n" + "".join(f"{n * 37 % 4096},{n // 50 % 2}\n" for n in range(300)))
+    results = {}
+    for mode in ("off", "on"):
+        results[mode] = automax("trace", "TASK.BLK", "--input", "IN.csv", "--native", mode, "--verbose")
+    assert results["on"].out == results["off"].out
+    assert results["on"].err == "TASK: native\n"
+
+
+def test_without_a_compiler_everything_runs_in_python_and_says_so(automax, monkeypatch):
+    automax.write("TASK.BLK", TASK)
+    automax.write("IN.csv", "REF%\n5\n")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    result = automax("trace", "TASK.BLK", "--input", "IN.csv", "--native", "on", "--verbose")
+    assert result.code == 0
+    assert result.err == "TASK: in Python: CC names no-such-compiler, which is not there\n"
+
+
+def test_a_short_run_gains_nothing(automax):
+    automax.write("TASK.BLK", TASK)
+    automax.write("IN.csv", "REF%\n5\n")
+    result = automax("trace", "TASK.BLK", "--input", "IN.csv", "--verbose")
+    assert result.err == "TASK: in Python: a run this short gains nothing by it (--native on)\n"
+
+
+@pytest.mark.parametrize(
+    ("mode", "wall_clock", "expected"),
+    [
+        ("auto", False, NativeMode.AUTO),
+        ("auto", True, NativeMode.OFF),
+        ("on", True, NativeMode.ON),
+        ("off", False, NativeMode.OFF),
+    ],
+)
+def test_on_the_wall_clock_only_what_is_asked_for_is_native(mode, wall_clock, expected):
+    class Arguments:
+        native = mode
+
+    assert native_forms(Arguments(), None, wall_clock=wall_clock).mode is expected
