@@ -48,6 +48,7 @@ class BagReader:
 
     ``on_progress``, if set, is called now and then while messages are read, with the share of all bytes that is read by
     then (0 to 1).
+    ``order`` follows the files' times while messages are read; a part of a recording goes on with that of another.
     ``last_stamp`` is the stamp of the message read last, be it wanted or not; None before the first.
 
     Raises:
@@ -59,6 +60,8 @@ class BagReader:
         self._information: dict[str, Any] | None = None
         self.on_progress: Callable[[float], None] | None = None
         self.last_stamp: int | None = None
+        self.order: FileOrder | None = None
+        self._after: FileOrder | None = None
         if path.is_dir():
             self._information = read_information(path)
             self.files = _data_files(path, self._information)
@@ -67,10 +70,20 @@ class BagReader:
         else:
             raise no_recording(path)
 
+    def part(self, first: int, end: int, after: BagReader | None = None) -> BagReader:
+        """Return a reader of the files from number ``first`` to before ``end``, counted from 0.
+
+        ``after`` has read the files before: the order in time is checked over both.
+        """
+        other = self.again()
+        other.files = self.files[first:end]
+        other._after = after.order if after is not None else None
+        return other
+
     def again(self) -> BagReader:
         """Return a reader of the same recording that tells nobody of its progress."""
         other = copy.copy(self)
-        other.on_progress = other.last_stamp = None
+        other.on_progress = other.last_stamp = other.order = other._after = None
         return other
 
     @cached_property
@@ -125,7 +138,7 @@ class BagReader:
         """The messages as they stand in the files, each with its file."""
         total = sum(size_of(file) for file in self.files)
         before = 0
-        order = FileOrder(0 if self.is_ours else HOLD_NS)
+        order = self.order = copy.copy(self._after) or FileOrder(0 if self.is_ours else HOLD_NS)
         for file in self.files:
             source = _Source(file)
             last_log: int | None = None

@@ -15,17 +15,20 @@ from pathlib import Path
 from automax_ros.bags.errors import BagError
 from automax_ros.cli.numbers import option_number, whole_number
 from automax_ros.cli.output_files import require_different_files, require_picture_file
+from automax_ros.cli.places import add_where_arguments, where_of
 from automax_ros.cli.progress import share_shown
 from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import add_window_arguments, window_of
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.pieces import ClusterFault, Where
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.task_source import read_task_source
 from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
 from automax_ros.replay.picture import can_be_drawn, draw, traces
 from automax_ros.replay.report import ReplayReport
+from automax_ros.replay.side_by_side import replay_side_by_side
 from automax_ros.replay.stored_rack import SourceRefused
 
 _TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
@@ -56,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="numbers that differ by at most this count as equal (default: 0, bit for bit)",
     )
     add_window_arguments(parser)
+    add_where_arguments(parser, "replay the files of a split recording")
     parser.add_argument("--json", action="store_true", help="print the report for programs to read")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the first difference (needs matplotlib)")
     parser.add_argument(
@@ -75,14 +79,18 @@ def run(arguments: argparse.Namespace) -> int:
     require_different_files(read, {"--plot": arguments.plot})
     if arguments.plot is not None:
         require_picture_file(arguments.plot)
+    where = where_of(arguments)
     new = {name: _source(name, path) for name, path in files.items()}
     _require_replayed(options, new)
     try:
-        report = _replayed(Replay(arguments.bag, new, options), arguments)
+        report = _replayed(Replay(arguments.bag, new, options), where, arguments)
     except SourceRefused as error:
         for source, diagnostics in error.findings:
             print_diagnostics(diagnostics, source, sys.stderr)
         print(f"automax replay: errors in {error}; nothing is replayed", file=sys.stderr)
+        return 2
+    except ClusterFault as fault:
+        print(fault, file=sys.stderr)
         return 2
     except BagError as error:
         print(_with_repair(error, arguments.bag), file=sys.stderr)
@@ -90,12 +98,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if report.identical else 1
 
 
-def _replayed(replay: Replay, arguments: argparse.Namespace) -> ReplayReport:
+def _replayed(replay: Replay, where: Where, arguments: argparse.Namespace) -> ReplayReport:
     """Replay, print the report, draw the picture."""
     for source, diagnostics in replay.warnings:
         print_diagnostics(diagnostics, source, sys.stderr)
     with share_shown("replay") as show:
-        report = replay.run(show)
+        report = replay_side_by_side(replay, where, show)
     if arguments.json:
         print(json.dumps(report.as_json(), indent=2, allow_nan=False))
     else:

@@ -9,6 +9,7 @@ from automax_ros.core.face import face
 if TYPE_CHECKING:
     from automax_ros.replay.engine import Replay, ReplayOptions, replay
     from automax_ros.replay.report import ReplayReport
+    from automax_ros.replay.side_by_side import replay_side_by_side
     from automax_ros.replay.stored_rack import SourceRefused
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "ReplayReport",
     "SourceRefused",
     "replay",
+    "replay_side_by_side",
 ]
 
-__getattr__ = face(__name__, "report", "stored_rack", "engine")
+__getattr__ = face(__name__, "report", "stored_rack", "engine", "side_by_side")

@@ -31,6 +31,7 @@ class RecordedCommons(CommonLog):
     """All of common memory as the recording has told it so far; ``rack`` is the recorded rack's configuration.
 
     ``backplane`` finds the registers of its modules.
+    ``asked_back`` tells that forces were asked for at an instant before the first message.
     ``gaps`` counts places where writes are missing; after one nothing is known until the next image. ``forced`` are the
     values that a force holds.
     """
@@ -43,6 +44,8 @@ class RecordedCommons(CommonLog):
         self.gaps = 0
         self.forced: frozenset[Key] = frozenset()
         self._forced_before: deque[tuple[int, frozenset[Key]]] = deque(maxlen=_FORCES_KEPT)
+        self.asked_back = False
+        self._since: int | None = None
         self._start: list[int] = []
         size = 0
         for item in rack.variables:
@@ -58,9 +61,21 @@ class RecordedCommons(CommonLog):
         """
         entries = super().take(message)
         if entries is not None:
+            if self._since is None:
+                self._since = message.stamp
             self._put(entries)
             self._follow_forces(message)
         return entries
+
+    @property
+    def carried(self) -> tuple[object, ...]:
+        """What it has been told so far, but for when forces changed."""
+        return self._cells, self._log.sequence, self.gaps > 0, sorted(self.forced)
+
+    @property
+    def knows_no_force(self) -> bool:
+        """Whether no force has ever held, as far as it was told."""
+        return not self.forced and not self._forced_before
 
     def value(self, key: Key) -> Value:
         """Return a value as it is now.
@@ -79,6 +94,8 @@ class RecordedCommons(CommonLog):
 
     def forced_at(self, stamp: int) -> frozenset[Key]:
         """Return what forces held at an instant not long ago: modeled scans stand in the log where they ended."""
+        if self._since is None or stamp < self._since:
+            self.asked_back = True
         forced = self.forced
         for changed_at, before in reversed(self._forced_before):
             if changed_at <= stamp:

@@ -22,9 +22,11 @@ from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Tallies
+from automax_ros.replay.joining import Beginning, Carried, digest
 from automax_ros.replay.report import ReplayReport
 from automax_ros.replay.stored_rack import ReplaySource, StoredRack, stored_rack
 from automax_ros.replay.task import TaskReplay
+from automax_ros.replay.totals import Totals
 from automax_ros.wire.messages import NAMES, CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable
 
 DEFAULT_MAX_DIFFERENCES = 50
@@ -35,6 +37,8 @@ _KINDS = (CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable)
 _TYPES = frozenset(NAMES[kind] for kind in _KINDS)
 _STATES = frozenset({"automax_msgs/msg/TaskState"})
 
+Stored = tuple[StoredRack, RunFacts]
+"""What a recording stores of its rack, and what describes its run."""
 Watcher = Callable[[TaskReplay, Scan], None]
 """Called after each scan that was executed again."""
 
@@ -73,23 +77,22 @@ def replay(
 class Replay:
     """One recording, ready to be executed again any number of times."""
 
-    def __init__(self, bag: Path, new: Mapping[str, SourceText], options: ReplayOptions) -> None:
-        """Check and compile the tasks.
+    def __init__(
+        self, bag: Path, new: Mapping[str, SourceText], options: ReplayOptions, stored: Stored | None = None
+    ) -> None:
+        """Check and compile the tasks; ``stored`` is what was read of the recording before.
 
         Raises:
             BagError: the recording cannot be read, or lacks a task or its source.
             SourceRefused: a source has errors.
         """
         self.options = options
-        self._reader = reader = BagReader(bag)
-        self.rack: StoredRack = stored_rack(reader)
-        self.facts = run_facts(reader)
-        self.rack.check_table(self.facts.table)
-        names = self.rack.task_names
+        self.bag, self.new = bag, new
+        self.reader = BagReader(bag)
+        self.rack, self.facts = stored or _stored(self.reader)
         self.rack.require_tasks(options.only or ())
-        chosen = [name for name in names if options.only is None or name in options.only]
+        chosen = [name for name in self.rack.task_names if options.only is None or name in options.only]
         self.sources: list[ReplaySource] = self.rack.replay_sources(chosen, new)
-        self._bag = bag
 
     @property
     def warnings(self) -> list[tuple[SourceText, list[Diagnostic]]]:
@@ -107,27 +110,74 @@ class Replay:
         Raises:
             BagError: the recording cannot be read to its end, or does not hold what the replay needs.
         """
-        reader = self._reader.again()
+        reader = self.reader.again()
         options = self.options if to_ns is None else replace(self.options, to_ns=to_ns)
-        starts: Mapping[str, int] = {}
-        if options.from_ns:
-            starts = _last_states(reader, self.facts.table.stamp + options.from_ns)
         reader.on_progress = on_progress
-        run = _Run(self._bag, self.rack, self.facts, self.sources, options, starts, watcher)
+        run = self.begin(self.starts(reader, options), options, watcher)
         run.take_all(reader)
         doubtful = run.ends_in_doubt()
         if doubtful:
             sources = self.rack.replay_sources([task.name for task in doubtful], {})
-            recorded = _Run(self._bag, self.rack, self.facts, sources, options, starts, None)
+            recorded = Run(self.bag, self.rack, self.facts, sources, options, run.starts, None)
             reader.on_progress = None
             recorded.take_all(reader)
             for task in doubtful:
                 task.compare_end(recorded.stopped_in(task.name))
-        return run.report(reader)
+        return self.report(run.totals(), options)
+
+    def starts(self, reader: BagReader, options: ReplayOptions) -> Mapping[str, int]:
+        """Return the log time of the state with which each task begins, where the range begins later than the run."""
+        return _last_states(reader, self.facts.table.stamp + options.from_ns) if options.from_ns else {}
+
+    def begin(self, starts: Mapping[str, int], options: ReplayOptions, watcher: Watcher | None = None) -> Run:
+        """Return a pass over the recording, or over files of it, that has taken nothing yet."""
+        return Run(self.bag, self.rack, self.facts, self.sources, options, starts, watcher)
+
+    def report(self, totals: Totals, options: ReplayOptions) -> ReplayReport:
+        """Return what was found.
+
+        Raises:
+            BagError: there was nothing to compare.
+        """
+        start = self.facts.table.stamp
+        begin = start + options.from_ns
+        from_stamp, to_stamp = max(begin, totals.first_stamp or 0), max(totals.last_stamp or start, begin)
+        tasks = tuple(task.report() for task in totals.tasks.values())
+        report = ReplayReport(
+            bag=str(self.bag),
+            rack=self.rack.config.name,
+            version=self.reader.custom_data.get("version", ""),
+            from_s=(from_stamp - start) / NS_PER_S,
+            to_s=(to_stamp - start) / NS_PER_S,
+            tolerance=options.tolerance,
+            tasks=tasks,
+            first=totals.first,
+            differences=totals.differences,
+            more=totals.more,
+        )
+        self._require_compared(report, options)
+        return report
+
+    def _require_compared(self, report: ReplayReport, options: ReplayOptions) -> None:
+        """Refuse to call the recording, or a task that was asked for, the same when none of its scans was executed."""
+        nothing = not report.scans and report.identical
+        names = tuple(task.name for task in report.tasks)
+        if nothing and (options.from_ns or options.to_ns is not None):
+            require_scans(self.bag, self.facts.table.stamp, names, options.from_ns, options.to_ns)
+        asked = {*(options.only or ()), *(source.name for source in self.sources if source.edited)}
+        for task in report.tasks:
+            if task.name in asked and not task.scans and not task.different:
+                notes = f" ({'; '.join(task.notes)})" if task.notes else ""
+                what = f"no scan of task {task.name} was executed again{notes}"
+                raise BagError("AMX6832", self.bag, what, "see `automax bag info`, or choose another range")
+        if nothing:
+            notes = "; ".join(f"{task.name}: {note}" for task in report.tasks for note in task.notes)
+            what = f"no scan of {', '.join(names)[:80]} can be executed again"
+            raise BagError("AMX6832", self.bag, f"{what}{f' ({notes})' if notes else ''}", "see `automax bag info`")
 
 
-class _Run:
-    """One pass over a recording."""
+class Run:
+    """One pass over a recording, or over files of it."""
 
     def __init__(
         self,
@@ -147,8 +197,9 @@ class _Run:
         self._tallies = Tallies(self._start, options.max_differences)
         self._begin = self._start + options.from_ns
         self._end = None if options.to_ns is None else self._start + options.to_ns
+        self.starts = starts
         self._first_stamp: int | None = None
-        self._last_stamp = self._start
+        self._last_stamp: int | None = None
         self._tasks: dict[str, TaskReplay] = {}
         self._writers: dict[int, TaskReplay] = {}
         writers = {writer.name: writer.id for writer in facts.table.writers if writer.kind == WriterKind.TASK}
@@ -161,11 +212,18 @@ class _Run:
             if source.name in writers:
                 self._writers[writers[source.name]] = task
 
-    def take_all(self, reader: BagReader) -> None:
-        """Take the messages of a recording, up to the end of the range."""
+    def take_all(self, reader: BagReader) -> bool:
+        """Take the messages of a recording, up to the end of the range; return whether that has not come."""
+        return all(map(self.take, reader.messages(types=_TYPES)))
+
+    def take_up_to_scan(self, reader: BagReader) -> bool:
+        """Take the messages before the first scan of any task; return whether the range has not ended among them."""
         for entry in reader.messages(types=_TYPES):
+            if isinstance(entry.message, Scan):
+                return True
             if not self.take(entry):
-                return
+                return False
+        return True
 
     def ends_in_doubt(self) -> list[TaskReplay]:
         """Return the edited tasks that may end where the recorded ones do not, or the other way round."""
@@ -199,42 +257,27 @@ class _Run:
                 task.take_state(message, entry.log_time, counted=message.stamp >= self._begin)
         return True
 
-    def report(self, reader: BagReader) -> ReplayReport:
-        """Return what was found.
+    def totals(self) -> Totals:
+        """Return what was found so far."""
+        tasks = {name: task.totals() for name, task in self._tasks.items()}
+        found = self._tallies
+        return Totals(self._first_stamp, self._last_stamp, tasks, found.first(), found.differences(), found.more)
 
-        Raises:
-            BagError: there was nothing to compare.
-        """
-        tasks = tuple(task.report() for task in self._tasks.values())
-        report = ReplayReport(
-            bag=str(self._bag),
-            rack=self._rack.config.name,
-            version=reader.custom_data.get("version", ""),
-            from_s=self._tallies.time_s(max(self._begin, self._first_stamp or 0)),
-            to_s=self._tallies.time_s(max(self._last_stamp, self._begin)),
-            tolerance=self._options.tolerance,
-            tasks=tasks,
-            first=self._tallies.first(),
-            differences=self._tallies.differences(),
-            more=self._tallies.more,
-        )
-        if not report.scans and report.identical and (self._options.from_ns or self._options.to_ns is not None):
-            require_scans(self._bag, self._start, tuple(self._tasks), self._options.from_ns, self._options.to_ns)
-        self._require_compared(report)
-        if not report.scans and report.identical:
-            notes = "; ".join(f"{task.name}: {note}" for task in tasks for note in task.notes)
-            what = f"no scan of {', '.join(task.name for task in tasks)[:80]} can be executed again"
-            raise BagError("AMX6832", self._bag, f"{what}{f' ({notes})' if notes else ''}", "see `automax bag info`")
-        return report
+    def carried(self) -> Carried:
+        """Return what of all that it has taken decides on what is to come."""
+        tasks = {name: task.carried for name, task in self._tasks.items()}
+        stopped = frozenset(name for name, task in self._tasks.items() if task.stopped)
+        return Carried(digest((self._commons.carried, tasks)), stopped, self._commons.knows_no_force)
 
-    def _require_compared(self, report: ReplayReport) -> None:
-        """Refuse to call a task that was asked for the same when none of its scans was executed."""
-        asked = {*(self._options.only or ()), *(source.name for source in self._sources if source.edited)}
-        for task in report.tasks:
-            if task.name in asked and not task.scans and not task.different:
-                notes = f" ({'; '.join(task.notes)})" if task.notes else ""
-                what = f"no scan of task {task.name} was executed again{notes}"
-                raise BagError("AMX6832", self._bag, what, "see `automax bag info`, or choose another range")
+    @property
+    def beginnings(self) -> dict[str, Beginning]:
+        """What each task has asked of the time before, by its name."""
+        return {name: task.beginning for name, task in self._tasks.items()}
+
+    @property
+    def asked_back(self) -> bool:
+        """Whether it has asked for forces that held before its first message."""
+        return self._commons.asked_back
 
     def _take_scan(self, scan: Scan) -> bool:
         if self._end is not None and scan.stamp > self._end:
@@ -263,6 +306,13 @@ class _Run:
                 "AMX6831", self._bag, f"has scans of a task {name[:40]!r}, which its rack.yaml does not have"
             )
         return task
+
+
+def _stored(reader: BagReader) -> Stored:
+    """Read what a recording stores. BagError, SourceRefused: as ``Replay``."""
+    rack, facts = stored_rack(reader), run_facts(reader)
+    rack.check_table(facts.table)
+    return rack, facts
 
 
 def _last_states(reader: BagReader, latest: int) -> dict[str, int]:

@@ -61,6 +61,11 @@ class ScanMemory:
         self._before: dict[Key, Value] = {}
         """What stood where the recorded scan that is still to come has written already."""
 
+    @property
+    def carried(self) -> tuple[object, ...]:
+        """What was left by scans before, but for what the next full scan tells again."""
+        return sorted(self.apart.items()), sorted(self._before.items())
+
     def view(self, name: str) -> int:
         """Return the view of a variable by its full name; KeyError if the rack has none."""
         return self._index[name]

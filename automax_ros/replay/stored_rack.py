@@ -73,6 +73,18 @@ class ReplaySource:
             return None
         return replace(self, recorded=recorded, compiled=self.compiled if self.edited else recorded)
 
+    def edit_notes(self) -> list[str]:
+        """Say what the person should know of the edit."""
+        if not self.edited:
+            return []
+        if self.recorded is None:
+            return ["what it ran with when it was recorded cannot be compiled here; states are taken over by name"]
+        before, after = self.recorded.program.period_ns, self.compiled.program.period_ns
+        if before == after or not before or not after:
+            return []
+        periods = f"its scan period was {before / 1e6:g} ms and is {after / 1e6:g} ms now"
+        return [f"{periods}; it is executed at the recorded scans all the same"]
+
     @property
     def written_at(self) -> Mapping[str, tuple[int, ...]]:
         """The BASIC lines that can write each common."""

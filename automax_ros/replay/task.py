@@ -14,17 +14,17 @@ from automax_ros.replay.commons import RecordedCommons, UnknownValue
 from automax_ros.replay.compare import Found, Tallies
 from automax_ros.replay.comparison import ScanComparison
 from automax_ros.replay.inputs import ScanMemory
-from automax_ros.replay.report import Kind, TaskReport
+from automax_ros.replay.joining import Beginning
+from automax_ros.replay.report import Kind
 from automax_ros.replay.state import fitting_state, held_in, log_is_empty, state_differences, whole_state
 from automax_ros.replay.stored_rack import ReplaySource
+from automax_ros.replay.totals import MOST_NOTES, TaskTotals
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.make_task import make_task
 from automax_ros.running.snapshot import snapshot_layout
 from automax_ros.running.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status
 from automax_ros.wire.messages import CommonWrite, Operation, Scan, TaskState
 
-_MOST_NOTES = 20
-"""Notes that a report has about one task."""
 _MOST_NAMES = 8
 _STOPPED_KEY = "status"
 _QUIET_SCANS = 2
@@ -71,20 +71,38 @@ class TaskReplay:
         self._installed_again = False
         self._compared = self._different = self._states = self._left_out = 0
         self._notes: dict[str, None] = {}
+        self.beginning = Beginning()
         self._take_up(source)
 
-    def report(self) -> TaskReport:
-        """Return what became of the task."""
-        if self._left_out:
-            scans, them = (f"{self._left_out} scans", "them") if self._left_out > 1 else ("1 scan", "it")
-            self._note(f"{scans} could not be executed again: the state before {them} is not recorded")
-        notes = list(self._notes)
-        if len(notes) > _MOST_NOTES:
-            notes = [*notes[:_MOST_NOTES], f"and {len(notes) - _MOST_NOTES} notes more"]
+    def totals(self) -> TaskTotals:
+        """Return what became of the task so far."""
         source = self._source.source.name if self._source.edited else "as recorded"
-        return TaskReport(
-            self.name, source, self._source.edited, self._compared, self._different, self._states, tuple(notes)
+        counts = self._compared, self._different, self._states, self._left_out
+        return TaskTotals(self.name, source, self._source.edited, *counts, tuple(self._notes))
+
+    @property
+    def carried(self) -> tuple[object, ...]:
+        """What of its past decides on scans to come, but for what a run that begins at a file cannot know.
+
+        What that is, and why it does not matter, ``joining`` says.
+        """
+        task, edited = self._task, self._source.edited
+        state = task.snapshot(), sorted(task.forces.items()), task.scan_number
+        follows = self._last, self._synchronous, self._installed_again, self._stored_ran, self._starts_at
+        ends = (self.stopped, self._stopped_in, self._recorded_ended) if edited else ()
+        return (
+            self._source.compiled.program.source_hash,
+            *state,
+            *follows,
+            *ends,
+            self._tunables.known,
+            self.memory.carried,
         )
+
+    @property
+    def stopped(self) -> bool:
+        """Whether it does not run any more."""
+        return self._task.status is not Status.RUNNING or self._stopped_in is not None
 
     @property
     def edited(self) -> bool:
@@ -169,6 +187,9 @@ class TaskReplay:
             self._starts_at = None
             self._synchronous = False
         last, between = self._last, state.stamp > self._last_stamp
+        if last is not None:
+            clears = log_is_empty(state) and self._task.errors.count > 0
+            self.beginning.asks_back(self._source.edited or state.scan != last or clears)
         if not stored_ran or (last is not None and state.scan < last and not between):
             return
         if last is not None and (state.scan < last or self._installed_again):
@@ -192,6 +213,7 @@ class TaskReplay:
 
     def take_own(self, write: CommonWrite) -> None:
         """Note what a modeled scan wrote before it ended, and so before it stands in the log."""
+        self.beginning.asks_back(self._source.edited)
         if write.kind == WriteKind.BASIC and write.stamp > self._last_end:
             for key in zip(write.values.variable, write.values.element, strict=False):
                 self.memory.written_early(key)
@@ -208,6 +230,7 @@ class TaskReplay:
 
     def _follow(self, scan: Scan) -> None:
         """Keep up with the numbers of scans and with what is latched."""
+        self.beginning.scans(scan)
         if scan.scan == 0:
             first = self._last is None and self._starts_at is None
             if self._last:
@@ -318,8 +341,8 @@ class TaskReplay:
         self._recorded_layout = snapshot_layout(source.recorded) if source.recorded else None
         program = (source.recorded or source.compiled).program
         self._period_ns: float = math.inf if program.event is not None or program.is_basic else program.period_ns
-        if source.edited:
-            self._note_edit()
+        for note in source.edit_notes():
+            self._note(note)
         self._tunables = Tunables(self._bag, source, self._recorded_layout or self._layout, self._note, self._when)
 
     def _follow_source(self, state: TaskState) -> bool:
@@ -363,18 +386,6 @@ class TaskReplay:
         self._synchronous = False
         self.memory.apart.clear()
 
-    def _note_edit(self) -> None:
-        recorded = self._source.recorded
-        if recorded is None:
-            self._note("what it ran with when it was recorded cannot be compiled here; states are taken over by name")
-            return
-        before, after = recorded.program.period_ns, self._source.compiled.program.period_ns
-        if before != after and before and after:
-            self._note(
-                f"its scan period was {before / 1e6:g} ms and is {after / 1e6:g} ms now; "
-                "it is executed at the recorded scans all the same"
-            )
-
     def _variable(self, key: Key) -> CommonVariable:
         return self._commons.rack[key[0]]
 
@@ -382,5 +393,5 @@ class TaskReplay:
         return seconds_text(max(0, stamp - self._tallies.origin))
 
     def _note(self, text: str) -> None:
-        if len(self._notes) < 10 * _MOST_NOTES:
+        if len(self._notes) < MOST_NOTES:
             self._notes[text] = None

@@ -40,6 +40,11 @@ class Tunables:
             old = source_text(self._current[name])
             note(f"tunable {name} starts at its new CURRENT={source_text(value)}, not at {old}")
 
+    @property
+    def known(self) -> list[tuple[str, float]]:
+        """The values that the recording has told last, by name; as numbers of one kind, as states have them."""
+        return sorted((name, float(value)) for name, value in self._known.items())
+
     def fresh(self, state: TaskState) -> dict[str, Value]:
         """Return the tunables that an edited task does not take over from a state: those whose CURRENT was edited.
 

@@ -1,0 +1,127 @@
+"""One part of a recording, some of its files, executed again by itself: what a process of many does."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.replay.engine import Replay, ReplayOptions, Run
+from automax_ros.replay.joining import Carried
+from automax_ros.replay.totals import Totals
+
+
+@dataclass(frozen=True)
+class Part:
+    """Files of a recording, from number ``first`` to before ``end``, counted from 0."""
+
+    first: int
+    end: int
+
+
+@dataclass(frozen=True)
+class PartResult:
+    """What came of a part, up to the first scan that follows on it.
+
+    ``entry`` and ``exit`` are what is carried at its first scan and at that one, ``totals`` what was counted between.
+    ``went_on``: tasks whose first scan is not their start; ``scanned``: those that have scanned. ``unsure``: it may
+    not be what follows on the part before, whatever that is. ``ended``: the range of the replay ends in it.
+    ``doubtful``: were this the end, an edited task might have ended otherwise than the recorded one.
+    """
+
+    entry: Carried
+    exit: Carried
+    totals: Totals
+    scanned: frozenset[str]
+    went_on: frozenset[str]
+    asked_back: bool
+    unsure: bool
+    ended: bool
+    doubtful: bool
+
+    @property
+    def clean(self) -> bool:
+        """Whether nothing differs, and all is told."""
+        return self.totals.clean and not self.totals.full
+
+
+def packed(replay: Replay) -> bytes:
+    """Return a replay as it is handed to other processes."""
+    bag = replay.bag.resolve()
+    return pickle.dumps((bag, dict(replay.new), replay.options, (replay.rack, replay.facts)))
+
+
+def replay_part(what: bytes, part: Part) -> PartResult:
+    """Execute a part again, by itself.
+
+    Raises:
+        BagError: it cannot be read, or does not hold what the replay needs.
+    """
+    replay = _unpacked(what)
+    files = len(replay.reader.files)
+    base, entry = begun(replay, part.first)
+    run = _run(replay, part)
+    body = replay.reader.part(part.first, part.end)
+    goes_on = run.take_all(body)
+    if goes_on and part.end < files:
+        goes_on = run.take_up_to_scan(replay.reader.part(part.end, files, body))
+    totals = run.totals()
+    counted = totals.since(base)
+    scanned, went_on = scanning(run, counted)
+    return PartResult(
+        entry,
+        run.carried(),
+        counted,
+        scanned,
+        went_on,
+        run.asked_back,
+        part.first > 0 and (is_unsure(run) or not base.clean),
+        not goes_on,
+        bool(run.ends_in_doubt()),
+    )
+
+
+def begun(replay: Replay, first: int) -> tuple[Totals, Carried]:
+    """Return what a pass that begins with a file has counted before the first scan, and what it carries there."""
+    run = replay.begin({}, replay.options)
+    if first:
+        run.take_up_to_scan(replay.reader.part(first, len(replay.reader.files)))
+    return run.totals() if first else _nothing(run.totals()), run.carried()
+
+
+def scanning(run: Run, counted: Totals) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the tasks that have scanned, and those whose first scan was not their start."""
+    scanned = {name for name, task in counted.tasks.items() if task.compared or task.left_out}
+    scanned |= {name for name, beginning in run.beginnings.items() if beginning.scanned}
+    return frozenset(scanned), frozenset(name for name, item in run.beginnings.items() if item.went_on)
+
+
+def is_unsure(run: Run) -> bool:
+    """Return whether a pass that has begun with a file has asked for what only the files before could tell."""
+    return any(beginning.unsure for beginning in run.beginnings.values())
+
+
+def _run(replay: Replay, part: Part) -> Run:
+    """Return the pass over a part: the first one begins where the range does."""
+    starts: Mapping[str, int] = {}
+    if not part.first:
+        starts = replay.starts(replay.reader.part(0, part.end), replay.options)
+    return replay.begin(starts, replay.options)
+
+
+def _nothing(totals: Totals) -> Totals:
+    """Return totals in which nothing has been told: what the first part notes at its beginning counts."""
+    return totals.forgetting_notes()
+
+
+@lru_cache(maxsize=1)
+def _unpacked(what: bytes) -> Replay:
+    """Return a replay that was handed over, compiled once for all of its parts."""
+    bag, new, options, stored = pickle.loads(what)
+    assert isinstance(bag, Path)
+    assert isinstance(options, ReplayOptions)
+    sources: dict[str, SourceText] = new
+    return Replay(bag, sources, options, stored)
