@@ -6,4 +6,10 @@ Only `nodes` and `cli` know ROS 2; without them this is a plain Python library. 
 room: `from automax_ros.rack import Rack, load`.
 """
 
+import os
+
+from automax_ros.core.compiled import install
+
 __version__ = "0.1.0"
+
+install(os.path.dirname(__file__))

@@ -1,0 +1,144 @@
+"""Modules of this package that were compiled ahead of time: found, checked for being fresh, and loaded.
+
+The Python files are the reference and always there. Machine code made from them (by mypyc, `make setup`) lies in a folder
+``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter; nothing
+else is looked at. A group of modules is used only if every source that it was made from, and every source that its types
+came from, still has the same content (decision): whoever edits a file runs what was edited. ``AUTOMAX_COMPILED=off`` in
+the environment switches all of it off.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec
+from types import ModuleType
+
+FOLDER = "automax_ros_compiled"
+INDEX = "index.txt"
+VERSION = "1"
+VARIABLE = "AUTOMAX_COMPILED"
+OFF = ("off", "0", "no", "false")
+
+
+class CompiledGroup:
+    """Modules that are loaded together: ``libraries`` by name of module, ``sources`` with what their content was.
+
+    ``stale`` is empty as long as the group may be used, otherwise it says why not; None before the first of its modules
+    was asked for.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.modules: list[str] = []
+        self.libraries: dict[str, str] = {}
+        self.sources: dict[str, str] = {}
+        self.stale: str | None = None
+
+    def fresh(self, package: str) -> bool:
+        """Whether the sources below the folder ``package`` are those that were compiled; looked at once."""
+        if self.stale is None:
+            reasons = (_changed(package, file, digest) for file, digest in self.sources.items())
+            self.stale = next(filter(None, reasons), "")
+        return not self.stale
+
+
+class CompiledFinder:
+    """Finds compiled modules, asked before Python looks for the files (``sys.meta_path``)."""
+
+    def __init__(self, groups: Sequence[CompiledGroup], package: str) -> None:
+        self.groups = tuple(groups)
+        self.package = package
+        self._groups = {name: group for group in groups for name in group.libraries}
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return where the machine code of a module is; None if there is none, or none that is fresh."""
+        group = self._groups.get(fullname)
+        if group is None or not group.fresh(self.package):
+            return None
+        file = group.libraries[fullname]
+        spec = ModuleSpec(fullname, ExtensionFileLoader(fullname, file), origin=file)
+        spec.has_location = True
+        return spec
+
+
+def source_digest(content: bytes) -> str:
+    """Return a short digest of a source, as Python makes it for .pyc files that are checked by content."""
+    from importlib.util import source_hash
+
+    return source_hash(content).hex()
+
+
+def switched_off() -> bool:
+    """Whether the environment says that plain Python shall run."""
+    return os.environ.get(VARIABLE, "").strip().lower() in OFF
+
+
+def install(package: str) -> None:
+    """Let compiled modules be found, if there are any for the package in the folder ``package``."""
+    if switched_off():
+        return
+    for folder in _folders(package):
+        groups = read_index(folder)
+        if groups:
+            sys.meta_path.insert(0, CompiledFinder(groups, package))
+            return
+
+
+def read_index(folder: str) -> list[CompiledGroup]:
+    """Return the groups that a folder holds for this interpreter; none if it is not there or of another form."""
+    try:
+        with open(os.path.join(folder, INDEX), encoding="utf-8") as file:
+            lines = [line.rstrip("\n").split("\t") for line in file]
+    except (OSError, UnicodeDecodeError):
+        return []
+    groups: list[CompiledGroup] = []
+    if lines[:1] != [["automax_ros compiled", VERSION, EXTENSION_SUFFIXES[0]]]:
+        return []
+    for line in lines[1:]:
+        if line[0] == "group":
+            groups.append(CompiledGroup(line[1]))
+        elif line[0] == "library":
+            groups[-1].libraries[line[1]] = os.path.join(folder, line[2])
+        elif line[0] == "module":
+            groups[-1].modules.append(line[1])
+            groups[-1].libraries[line[1]] = os.path.join(folder, line[2])
+        elif line[0] == "source":
+            groups[-1].sources[line[1]] = line[2]
+    return groups
+
+
+def describe(package: str) -> list[str]:
+    """Return what runs, for people: one line, and one for each group that is not used, with the reason."""
+    if switched_off():
+        return [f"plain Python: {VARIABLE}={os.environ[VARIABLE]}"]
+    finder = next((finder for finder in sys.meta_path if isinstance(finder, CompiledFinder)), None)
+    if finder is None:
+        return ["plain Python: nothing was compiled ahead of time for this interpreter"]
+    used = [group for group in finder.groups if group.fresh(package)]
+    count = sum(len(group.modules) for group in used)
+    lines = [f"compiled: {count} modules ({', '.join(group.name for group in used)})"] if used else []
+    return lines + [f"plain Python: {group.name}, for {group.stale}" for group in finder.groups if group not in used]
+
+
+def _folders(package: str) -> tuple[str, ...]:
+    """The places of the installation: next to the package (a wheel), or the interpreter's own site-packages."""
+    import sysconfig
+
+    return (
+        os.path.join(os.path.dirname(package), FOLDER),
+        os.path.join(sysconfig.get_path("platlib"), FOLDER),
+    )
+
+
+def _changed(package: str, file: str, digest: str) -> str:
+    """Why a source is not what was compiled; empty if it is."""
+    try:
+        with open(os.path.join(package, file), "rb") as source:
+            content = source.read()
+    except OSError:
+        return f"{file} cannot be read"
+    return "" if source_digest(content) == digest else f"{file} has changed since"

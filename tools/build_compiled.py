@@ -1,0 +1,200 @@
+"""Build the modules of compiled_groups.py ahead of time into an installation: `make setup` calls it.
+
+tools/build_compiled.py [--folder FOLDER] [--group NAME]...     without FOLDER: site-packages of this interpreter
+
+Each group is translated to C by mypyc and compiled by the C compiler that Python names (or CC), on all cores. A group
+whose sources, compiler and options are those of the last time is kept. Without a compiler, or when a group cannot be
+built, everything works in plain Python: a line says so, and the exit code is 0.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from compiled_groups import GROUPS, PACKAGE, ROOT, Group
+
+sys.path.insert(0, str(ROOT))
+from automax_ros.core import compiled
+
+FLAGS = ("-O2", "-ffp-contract=off", "-fno-fast-math", "-fwrapv", "-fPIC", "-DNDEBUG", "-g0", "-w")
+"""Nothing that changes a result: no fused multiply-add, no reordered sums, integers wrap as in Python's own build."""
+TOOLS = ("build_compiled.py", "compiled_translate.py")
+NICE = 5
+
+
+class NotBuiltError(Exception):
+    """A group cannot be built here: the text says why."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """The C compiler and the linker of extension modules as commands, and what the compiler says that it is."""
+
+    compile: tuple[str, ...]
+    link: tuple[str, ...]
+    version: str
+
+
+def find_compiler() -> Compiler | None:
+    """Return the compiler that Python was built with, or CC of the environment; None if there is none."""
+    command = tuple(shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc"))
+    if not shutil.which(command[0]):
+        command = ("gcc",)
+    if not shutil.which(command[0]) or find_spec("mypyc") is None or find_spec("setuptools") is None:
+        return None
+    header = Path(sysconfig.get_path("include")) / "Python.h"
+    if not header.is_file():
+        return None
+    shared = shlex.split(sysconfig.get_config_var("LDSHARED") or "cc -shared")
+    version = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
+    return Compiler((*command, *FLAGS), (*command, *shared[1:]), version.partition("\n")[0])
+
+
+def digest_of(path: Path) -> str:
+    """Return the digest of a source that the loader compares."""
+    return compiled.source_digest(path.read_bytes())
+
+
+def stamp_of(group: Group, compiler: Compiler) -> str:
+    """Return what a group is made from, but for what its types come from: the index tells these."""
+    from mypy.version import __version__
+
+    text = [sys.version, __version__, compiler.version, *compiler.compile, *compiler.link]
+    text += [digest_of(ROOT / "tools" / name) for name in TOOLS]
+    text += [f"{path.relative_to(PACKAGE)} {digest_of(path)}" for path in group.sources()]
+    return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]
+
+
+def kept(folder: Path, group: Group, compiler: Compiler) -> list[str] | None:
+    """Return the lines of the index for a group that is there and still what would be built; None if it is not."""
+    facts = folder / f"{group.name}-{stamp_of(group, compiler)}" / compiled.INDEX
+    try:
+        lines = facts.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return None
+    for line in lines:
+        word, _, rest = line.partition("\t")
+        if word == "source":
+            file, digest = rest.split("\t")
+            if not (PACKAGE / file).is_file() or digest_of(PACKAGE / file) != digest:
+                return None
+    return lines
+
+
+def run(command: Sequence[str], folder: Path) -> None:
+    """Run a compiler; raise ``NotBuiltError`` with what it said last."""
+    done = subprocess.run(["nice", "-n", str(NICE), *command], cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = (done.stderr or done.stdout).strip().splitlines()
+        raise NotBuiltError(" / ".join(said[-3:]) or f"{command[0]} ended with {done.returncode}")
+
+
+def translated(group: Group, work: Path) -> dict[str, Any]:
+    """Translate a group in a process of its own; return what it tells about it."""
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "tools" / "compiled_translate.py"), group.name, str(work)],
+        cwd=ROOT, capture_output=True, text=True, check=False, env={**os.environ, compiled.VARIABLE: "off"},
+    )  # fmt: skip
+    if done.returncode:
+        said = [line for line in (done.stderr + done.stdout).strip().splitlines() if "warning:" not in line]
+        raise NotBuiltError(" / ".join(said[-3:]))
+    facts: dict[str, Any] = json.loads((work / "facts.json").read_text(encoding="utf-8"))
+    return facts
+
+
+def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecutor) -> list[str]:
+    """Build a group into ``folder``; return its lines of the index."""
+    name = f"{group.name}-{stamp_of(group, compiler)}"
+    digests = {path: digest_of(path) for path in PACKAGE.rglob("*.py")}
+    with tempfile.TemporaryDirectory(prefix="automax_compiled") as temporary:
+        work = Path(temporary)
+        facts = translated(group, work)
+        include = [f"-I{work}", f"-I{sysconfig.get_path('include')}"]
+        objects = sorted([*facts["c"], *facts["runtime"], *facts["shims"].values()],
+                         key=lambda file: -(work / file).stat().st_size)  # fmt: skip
+        list(pool.map(lambda file: run([*compiler.compile, *include, "-c", file, "-o", f"{file}.o"], work), objects))
+        suffix = EXTENSION_SUFFIXES[0]
+        library = f"{facts['library']}{suffix}"
+        run([*compiler.link, *(f"{file}.o" for file in [*facts["c"], *facts["runtime"]]), "-o", library], work)
+        for file in facts["shims"].values():
+            run([*compiler.link, f"{file}.o", "-o", f"{file[:-2]}{suffix}"], work)
+        lines = [f"group\t{group.name}", f"library\t{facts['library']}\t{name}/{library}"]
+        for module in sorted(facts["modules"]):
+            shim = facts["shims"][module.rpartition(".")[0]]
+            lines.append(f"module\t{module}\t{name}/{shim[:-2]}{suffix}")
+        for file in sorted([*facts["modules"].values(), *facts["needs"].values()]):
+            lines.append(f"source\t{Path(file).relative_to('automax_ros').as_posix()}\t{digests[ROOT / file]}")
+        target = folder / name
+        shutil.rmtree(target, ignore_errors=True)
+        target.mkdir(parents=True)
+        for path in work.glob(f"*{suffix}"):
+            shutil.copy(path, target)
+        (target / compiled.INDEX).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return lines
+
+
+def write_index(folder: Path, lines: list[str]) -> None:
+    """Replace the index at once, so that a program that starts now finds the old groups or the new ones."""
+    head = ["\t".join(("automax_ros compiled", compiled.VERSION, EXTENSION_SUFFIXES[0]))]
+    temporary = folder / f"{compiled.INDEX}.new"
+    temporary.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
+    os.replace(temporary, folder / compiled.INDEX)
+    used = {line.split("\t")[2].partition("/")[0] for line in lines if line.startswith("library")}
+    for path in folder.iterdir():
+        if path.is_dir() and path.name not in used:
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Build what has changed; return 0 also where nothing can be built."""
+    parser = argparse.ArgumentParser(description="Build modules ahead of time; see the head of this file.")
+    parser.add_argument("--folder", type=Path, default=Path(sysconfig.get_path("platlib")) / compiled.FOLDER)
+    parser.add_argument("--group", action="append", choices=[group.name for group in GROUPS])
+    chosen = parser.parse_args(arguments)
+    compiler = find_compiler()
+    if compiler is None:
+        print("no C compiler, Python.h or mypyc: the package runs in plain Python, which does the same, slower")
+        return 0
+    chosen.folder.mkdir(parents=True, exist_ok=True)
+    groups = [group for group in GROUPS if not chosen.group or group.name in chosen.group]
+    made: dict[str, list[str]] = {}
+    began = time.monotonic()
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool, ThreadPoolExecutor(os.cpu_count() or 1) as outer:
+        jobs = {}
+        for group in groups:
+            found = kept(chosen.folder, group, compiler)
+            if found is None:
+                print(f"compiling {len(group.sources())} modules of {group.name} ahead of time ...", flush=True)
+                jobs[group.name] = outer.submit(build, group, compiler, chosen.folder, pool)
+            else:
+                made[group.name] = found
+        for name, job in jobs.items():
+            try:
+                made[name] = job.result()
+            except NotBuiltError as error:
+                print(f"{name} stays plain Python: {error}")
+    write_index(chosen.folder, [line for group in groups for line in made.get(group.name, ())])
+    if jobs:
+        print(f"compiled ahead of time in {time.monotonic() - began:.0f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

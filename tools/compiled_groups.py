@@ -1,0 +1,33 @@
+"""Which modules are compiled ahead of time: the one list, and how a change of it is noticed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "automax_ros"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Modules that are translated together: inside a group calls are C, out of it they are Python's.
+
+    ``folders`` are taken whole, with what is below them, but for ``without`` (files, relative to the package); ``files``
+    are single ones. A group is loaded whole or not at all (decision): its modules know each other's memory layout.
+    """
+
+    name: str
+    folders: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+    def sources(self) -> list[Path]:
+        """Return the files of the group, in the order of their names; faces (``__init__``) stay plain."""
+        found = {path for folder in self.folders for path in (PACKAGE / folder).rglob("*.py")}
+        found |= {PACKAGE / file for file in self.files}
+        left = found - {PACKAGE / file for file in self.without}
+        return sorted(path for path in left if path.name != "__init__.py")
+
+
+GROUPS = (Group("drive", folders=("drive",)),)
