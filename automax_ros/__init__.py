@@ -6,10 +6,8 @@ Only `nodes` and `cli` know ROS 2; without them this is a plain Python library. 
 room: `from automax_ros.rack import Rack, load`.
 """
 
-import os
-
-from automax_ros.core.compiled import install
+from automax_ros.core import compiled
 
 __version__ = "0.1.0"
 
-install(os.path.dirname(__file__))
+compiled.install(__path__[0])

@@ -139,8 +139,10 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
         for module in sorted(facts["modules"]):
             shim = facts["shims"][module.rpartition(".")[0]]
             lines.append(f"module\t{module}\t{name}/{shim[:-2]}{suffix}")
-        for file in sorted([*facts["modules"].values(), *facts["needs"].values()]):
-            lines.append(f"source\t{Path(file).relative_to('automax_ros').as_posix()}\t{digests[ROOT / file]}")
+        sources = sorted([*facts["modules"].values(), *facts["needs"].values()])
+        lines += [
+            f"source\t{Path(file).relative_to(PACKAGE.name).as_posix()}\t{digests[ROOT / file]}" for file in sources
+        ]
         target = folder / name
         shutil.rmtree(target, ignore_errors=True)
         target.mkdir(parents=True)

@@ -13,8 +13,8 @@ PACKAGE = ROOT / "automax_ros"
 class Group:
     """Modules that are translated together: inside a group calls are C, out of it they are Python's.
 
-    ``folders`` are taken whole, with what is below them, but for ``without`` (files, relative to the package); ``files``
-    are single ones. A group is loaded whole or not at all (decision): its modules know each other's memory layout.
+    ``folders`` are taken whole, with what is below them, but for ``without`` (files, relative to the package);
+    ``files`` are single ones. A group is loaded whole or not at all (decision): its modules know each other's memory.
     """
 
     name: str

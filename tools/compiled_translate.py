@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 # setuptools first: mypyc looks whether it is there.
-import setuptools  # noqa: F401
+import setuptools  # type: ignore[import-untyped]  # noqa: F401
 from compiled_groups import GROUPS, ROOT
 from mypy.fscache import FileSystemCache
 from mypyc.build import construct_groups, get_mypy_config, include_dir
@@ -40,7 +40,7 @@ PyMODINIT_FUNC PyInit_{last}(void)
     return begin ? begin() : NULL;
 }}
 """
-"""What Python calls to load a module: it asks the group's library for the module. One file of these for each package."""
+"""What Python calls to load a module: it asks the group's library for it. Each package has one file of these."""
 
 
 def translate(name: str, folder: Path) -> dict[str, Any]:

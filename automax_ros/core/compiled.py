@@ -1,10 +1,10 @@
 """Modules of this package that were compiled ahead of time: found, checked for being fresh, and loaded.
 
-The Python files are the reference and always there. Machine code made from them (by mypyc, `make setup`) lies in a folder
-``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter; nothing
-else is looked at. A group of modules is used only if every source that it was made from, and every source that its types
-came from, still has the same content (decision): whoever edits a file runs what was edited. ``AUTOMAX_COMPILED=off`` in
-the environment switches all of it off.
+The Python files are the reference and always there. Machine code made from them (by mypyc, `make setup`) lies in a
+folder ``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter;
+nothing else is looked at. A group of modules is used only if every source that it was made from, and every source that
+its types came from, still has the same content (decision): whoever edits a file runs what was edited.
+``AUTOMAX_COMPILED=off`` in the environment switches all of it off.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec
-from types import ModuleType
 
 FOLDER = "automax_ros_compiled"
 INDEX = "index.txt"
@@ -52,9 +51,7 @@ class CompiledFinder:
         self.package = package
         self._groups = {name: group for group in groups for name in group.libraries}
 
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
+    def find_spec(self, fullname: str, *_: object) -> ModuleSpec | None:
         """Return where the machine code of a module is; None if there is none, or none that is fresh."""
         group = self._groups.get(fullname)
         if group is None or not group.fresh(self.package):
