@@ -215,7 +215,7 @@ def test_room_loads_its_files_when_they_are_asked_for():
         "print(*sorted(name for name in sys.modules if name.count('.') > 1 and name.startswith('automax_ros')))"
     )
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert result.stdout.split() == ["automax_ros.core.face"]
+    assert result.stdout.split() == ["automax_ros.core.compiled", "automax_ros.core.face"]
 
 
 def test_library_loads_without_ros():
