@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from automax_ros.bags.recorder import Recorder
@@ -57,7 +58,7 @@ def sweeps(config: RackConfig) -> None:
     plan = Plan(Blueprint.of(rack), (varied.quantity,), measures, duration_ns)
     points = grid([varied])
     run_points(plan, points[:1])
-    here = min(taken(lambda: run_points(plan, points)) for _ in range(REPEATS)) / len(points)
+    here = min(taken(partial(run_points, plan, [point])) for point in points * REPEATS)
     alone = min(taken(lambda: run(config, None, SWEEP_SECONDS)) for _ in range(3 * REPEATS))
     print(
         f"sweep: {1 / here:.0f} runs of {SWEEP_SECONDS} s a second, {alone / here:.1f} times as many as racks ", end=""
@@ -65,7 +66,8 @@ def sweeps(config: RackConfig) -> None:
     print(f"that are each compiled ({1 / alone:.0f}); {SWEEP_SECONDS / here:.0f} x real time")
     many = points * MORE
     pair = min(taken(lambda: run_sweep(plan, many, Where(2))) for _ in range(REPEATS)) / len(many)
-    print(f"sweep with two jobs, their start counted: {here / pair:.2f} times one job")
+    one = min(taken(lambda: run_sweep(plan, many, Where(1))) for _ in range(REPEATS)) / len(many)
+    print(f"sweep with two jobs, their start counted: {one / pair:.2f} times one job")
 
 
 def taken(work: Callable[[], object]) -> float:
