@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from types import MappingProxyType
 
 from automax_ros.core.diagnostics import Note, Span
@@ -30,6 +31,7 @@ FULL_SCALE_V, FULL_SCALE_COUNTS = 10.0, 4095
 _REGISTERS = Registers(4, by_itself=True)
 
 
+@cache
 def voltage_gain(line_v: float) -> float:
     """Return the gain of the transformer for a line of a nominal voltage (V rms, line to line)."""
     return GAINS[min(GAINS, key=lambda nominal: abs(nominal - line_v))]

@@ -140,12 +140,14 @@ class DriveControllerModule:
         """Return what was measured at the last interrupt, with registers, inputs and switches as they are now."""
         self._digital.slot = dig_slot
         read, view, last = self._parts.memory.read_now, self._view, self._measured
-        return last._replace(
-            status=last.status | self._digital.status | self._switches.status,
+        return Measured(
+            last.status | self._digital.status | self._switches.status,
+            *last[1:6],
             tach_threshold=int(read(view, TACH_THRESHOLD)),
             phase_step=int(read(view, PHASE_STEP)),
             period_step=int(read(view, PERIOD_STEP)),
             options=int(read(view, OPTIONS)),
+            line=last.line,
         )
 
     def command(self, command: Command) -> None:
