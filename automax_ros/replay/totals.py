@@ -78,7 +78,7 @@ class Totals:
 
     @property
     def full(self) -> bool:
-        """Whether there are so many notes that some may have been left out."""
+        """Whether there are as many notes as are kept: some may have been left out."""
         return any(len(task.notes) >= MOST_NOTES for task in self.tasks.values())
 
     def since(self, base: Totals) -> Totals:
