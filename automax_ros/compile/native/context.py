@@ -19,7 +19,12 @@ def joined(first: Environment | None, second: Environment | None) -> Environment
         return second if first is None else first
     if first is second:
         return first
-    return {name: known.joined(second[name]) for name, known in first.items() if name in second}
+    met: Environment = {}
+    for name, known in first.items():
+        other = second.get(name)
+        if other is not None:  # most are the same object: a branch sets few names of the whole task
+            met[name] = known if other is known else known.joined(other)
+    return met
 
 
 class Context(Protocol):
