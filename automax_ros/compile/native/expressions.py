@@ -18,6 +18,7 @@ from automax_ros.compile.native.ranges import (
     Range,
     corners,
     exactly,
+    span,
 )
 from automax_ros.compile.native.source import NotNative
 from automax_ros.compile.native.typed import WIDE, Typed, as_real, bare, c_type, literal, widened
@@ -160,14 +161,22 @@ def _quotient(frame: Context, left: Typed, right: Typed) -> Typed:
     )
 
 
-def _not_zero(right: Typed) -> None:
-    if right.range.low <= 0 <= right.range.high:
-        raise NotNative("a division whose divisor cannot be shown to be other than 0")
+def _not_zero(frame: Context, right: Typed) -> Typed:
+    """Return a divisor that is surely other than 0: where that cannot be shown, the scan ends if it is 0."""
+    low, high = right.range.low, right.range.high
+    if not low <= 0 <= high:
+        return right
+    if right.range.is_wide:
+        raise NotNative("a divisor in 128 bits that may be 0")
+    low, high = low + (low == 0), high - (high == 0)
+    return Typed(
+        f"divisor({bare(right.text)}, {frame.ended()})", Range(Kind.INT, low, high) if low <= high else exactly(1)
+    )
 
 
-def _floor_quotient(_: Context, left: Typed, right: Typed) -> Typed:
-    _not_zero(right)
-    result = corners(left.range, right.range, operator.floordiv, real=False)
+def _floor_quotient(frame: Context, left: Typed, right: Typed) -> Typed:
+    right = _not_zero(frame, right)
+    result = _quotients(left.range, right.range)
     if left.range.low >= 0 and right.range.low > 0:
         return _whole_result(f"{_wide_or_signed(left, result, right)} / {right.text}", result, left, right)
     if WIDE in (c_type(left.range), c_type(right.range), c_type(result)):
@@ -175,8 +184,18 @@ def _floor_quotient(_: Context, left: Typed, right: Typed) -> Typed:
     return Typed(f"floor_quotient({left.text}, {right.text})", result)
 
 
-def _remainder(_: Context, left: Typed, right: Typed) -> Typed:
-    _not_zero(right)
+def _quotients(left: Range, right: Range) -> Range:
+    """Return the range of a quotient rounded down; the divisors nearest to 0 give the largest."""
+    parts = [
+        corners(left, Range(Kind.INT, low, high), operator.floordiv, real=False)
+        for low, high in ((right.low, min(right.high, -1)), (max(right.low, 1), right.high))
+        if low <= high
+    ]
+    return span(parts)
+
+
+def _remainder(frame: Context, left: Typed, right: Typed) -> Typed:
+    right = _not_zero(frame, right)
     least = right.range.low + 1 if right.range.low < 0 else 0
     most = right.range.high - 1 if right.range.high > 0 else 0
     result = Range(Kind.INT, least, most)

@@ -12,7 +12,7 @@ from automax_ros.compile.native import expressions, refinement
 from automax_ros.compile.native.context import Environment
 from automax_ros.compile.native.ranges import Kind, Range, span
 from automax_ros.compile.native.source import NotNative
-from automax_ros.compile.native.typed import WIDE, Typed, bare, c_type, literal
+from automax_ros.compile.native.typed import WIDE, Typed, bare, c_type, literal, whole_text
 from automax_ros.compile.native.unit import Unit
 
 
@@ -168,9 +168,20 @@ class Frame:
     def place_in(self, size: int, index: ast.expr, known: Environment) -> str:
         """Return an index that surely lies inside."""
         place = self.value(index, known)
-        if not place.range.is_whole or place.range.low < 0 or place.range.high >= size:
-            raise NotNative("an index that cannot be shown to lie inside")
-        return place.text
+        return self.held(place.whole, Range(Kind.INT, 0, size - 1)).text
+
+    def held(self, item: Typed, declared: Range | None) -> Typed:
+        """Return a value that is surely within a range: where that cannot be shown, the scan ends if it is not."""
+        if declared is None or declared.holds(item.range):
+            return item
+        if item.range.kind is not declared.kind or declared.kind is not Kind.INT:
+            raise NotNative("a value of another kind than that of its variable")
+        low, high = max(item.range.low, declared.low), min(item.range.high, declared.high)
+        if low > high:
+            low, high = declared.low, declared.high
+        bounds = f"{whole_text(int(declared.low))}, {whole_text(int(declared.high))}"
+        wide = "_wide" * item.range.is_wide
+        return Typed(f"held{wide}({bare(item.text)}, {bounds}, {self.ended()})", Range(Kind.INT, low, high))
 
     def constants(self, values: Sequence[object], index: ast.expr, known: Environment) -> Typed:
         """Return an element of a tuple of constants."""

@@ -37,8 +37,9 @@ def members(types: Mapping[int, DataType]) -> dict[str, Member]:
     def write_now(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
         view, kind = _common(types, node)
         item = frame.value(node.args[1], known)
-        if item.mixed or not of_type(kind).holds(item.range):
-            raise NotNative("a write of what cannot be shown to fit its variable")
+        if item.mixed:
+            raise NotNative("a write of what is an integer or a REAL, as it happens")
+        item = frame.held(item, of_type(kind))
         element = bare(frame.value(node.args[2], known).text) if len(node.args) > 2 else "0"
         arguments = f"{view}, {element}, {TYPE_NUMBERS[kind][1]}, {bare(item.text)}"
         assert item.range.kind is not None

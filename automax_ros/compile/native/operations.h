@@ -27,6 +27,26 @@ static inline int64_t floor_remainder(int64_t left, int64_t right) {
     return rest != 0 && (rest < 0) != (right < 0) ? rest + right : rest;
 }
 
+/* A value that no block leaves beyond its bounds; ranges alone do not show it. */
+static inline int64_t held(int64_t value, int64_t low, int64_t high, int *ended) {
+    if (value >= low && value <= high) return value;
+    if (*ended == 0) *ended = AUTOMAX_FAULT;
+    return low;
+}
+
+static inline int64_t held_wide(__int128 value, int64_t low, int64_t high, int *ended) {
+    if (value >= low && value <= high) return (int64_t)value;
+    if (*ended == 0) *ended = AUTOMAX_FAULT;
+    return low;
+}
+
+/* A divisor; Python raises an exception where it is 0. */
+static inline int64_t divisor(int64_t value, int *ended) {
+    if (value != 0) return value;
+    if (*ended == 0) *ended = AUTOMAX_FAULT;
+    return 1;
+}
+
 /* The quotient of REALs; Python raises an exception where the divisor is 0. */
 static inline double divided(double left, double right, int *ended) {
     if (right == 0.0 && *ended == 0) *ended = AUTOMAX_FAULT;

@@ -27,6 +27,12 @@ class Body:
 
     def execute(self, statements: list[ast.stmt], known: Environment | None) -> Environment | None:
         """Emit statements; return what is known after them, None where nothing comes there."""
+        before, self.frame.touched = self.frame.touched, set()
+        known = self._execute(statements, known)
+        self.frame.touched |= before
+        return known
+
+    def _execute(self, statements: list[ast.stmt], known: Environment | None) -> Environment | None:
         lines = [*(getattr(statement, "lineno", 0) for statement in statements), 0]
         for place, statement in enumerate(statements):
             if known is None:
@@ -60,7 +66,6 @@ class Body:
             frame.emit(f"if ({' || '.join(tests)}) return AUTOMAX_FAULT;")
             low, high = max(present.low, declared.low), min(present.high, declared.high)
             known = {**known, name: Range(declared.kind, low, high)}
-        frame.touched.clear()
         return known
 
     def _one(self, statement: ast.stmt, known: Environment) -> Environment | None:
@@ -117,6 +122,7 @@ class Body:
         if array is None:
             raise NotNative(f"an element of {name}")
         place = self.frame.place_in(array.size, target.slice, known)
+        item = self.frame.held(item, self.frame.declared.get(name))
         self.frame.emit(f"{array.place}[{bare(place)}] = {bare(item.text)};")
         known[name] = known[name].joined(item.range)
         c_type(known[name])

@@ -64,6 +64,9 @@ class Traced:
             return 1.0
         return self if exponent == 1 else self.recorder.kept(build.call("raised", self.node, node_of(float(exponent))))
 
+    def __abs__(self) -> Traced:
+        return self.recorder.kept(build.call("abs", self.node))
+
     def __neg__(self) -> Traced:
         return self.recorder.kept(ast.UnaryOp(ast.USub(), self.node))
 

@@ -71,9 +71,12 @@ class _Translation:
             arrays={name: Array(f"s->{name}", field.size) for name, field in fields.items() if field.is_array},
             tuples=tuples,
             declared={
-                variable_name(name): of_type(symbol.type)
-                for name, symbol in compiled.program.symbols.items()
-                if symbol.scope is Scope.LOCAL or symbol.latched
+                **{name: Range(Kind.INT, 0, field.below - 1) for name, field in fields.items() if field.below},
+                **{
+                    variable_name(name): of_type(symbol.type)
+                    for name, symbol in compiled.program.symbols.items()
+                    if symbol.scope is Scope.LOCAL or symbol.latched
+                },
             },
             is_scan=True,
         )
@@ -157,6 +160,8 @@ def _at_first(field: StateField) -> Range:
     if field.role in _VARIABLES or field.type is DataType.REAL:
         return of_type(field.type)
     assert not isinstance(field.initial, str)
+    if field.below:
+        return Range(Kind.INT, 0, field.below - 1)
     return exactly(field.initial)
 
 

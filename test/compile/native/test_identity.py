@@ -1,0 +1,70 @@
+"""Every block and statement, native and in Python: the same bits."""
+
+from __future__ import annotations
+
+import re
+import shutil
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, seed, settings
+
+from automax_ros.blocks.declaration import Block, Platform
+from automax_ros.compile.native import NativeCache, native_form
+
+from ..block_model import TICKS, Programmed
+from ..support import compiled_of
+from ..test_blocks_in_task import BLOCKS, ON_A_RACK, declarations, with_its_structure
+from .identity import assert_same
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
+
+
+def drawn(strategy, count: int, number: int) -> list:
+    """Examples of a strategy, the same ones in every run."""
+    found: list = []
+
+    @seed(number)
+    @settings(
+        max_examples=count,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(strategy)
+    def collect(example) -> None:
+        found.append(example)
+
+    collect()
+    return found[-count:]
+
+
+def task_text(calls: list[list[Programmed]]) -> str:
+    """A task of all these calls, each with a data structure of its own."""
+    lines = []
+    for number, programmed in enumerate(calls):
+        for place, call in enumerate(programmed):
+            text = call.text(100 + 10 * number + place)
+            lines.append(re.sub(r"QUEUE([%@])", rf"QUEUE{number}\1", text))
+    return f"{declarations()}20 CALL SCAN_LOOP(TICKS={TICKS})\n" + "\n".join(lines) + "\n32000 END\n"
+
+
+def check_blocks(blocks: list[Block], each: int, number: int, stretches: int, cache: NativeCache) -> None:
+    target = Platform.AUTOMAX if all(block in ON_A_RACK for block in blocks) else Platform.UDC
+    calls = [example for block in blocks for example in drawn(with_its_structure(block), each, number)]
+    native = native_form(compiled_of(task_text(calls), target=target), cache)
+    for forced in (False, True):
+        assert_same(native, stretches, 8, forced=forced, seed=number)
+
+
+@pytest.mark.parametrize("on_a_rack", [True, False], ids=["on a rack", "on a UDC"])
+def test_every_block_is_the_same_in_c(on_a_rack: bool, tmp_path) -> None:
+    blocks = [block for block in BLOCKS if (block in ON_A_RACK) is on_a_rack]
+    check_blocks(blocks, 3, 1, 25, NativeCache(tmp_path / "cache"))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
+def test_every_block_is_the_same_in_c_however_it_is_programmed(block: Block, tmp_path) -> None:
+    for number in range(4):
+        check_blocks([block], 60, 100 + number, 60, NativeCache(tmp_path / "cache"))
