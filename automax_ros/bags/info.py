@@ -170,7 +170,11 @@ def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None
             if not info.messages and error.code in {"AMX6810", "AMX6811"}:
                 raise
             info.problems.append(_with_repair(error))
-        entry.chunks, entry.stored_bytes, entry.unpacked_bytes = data.chunks, data.stored_bytes, data.unpacked_bytes
+        entry.chunks, entry.stored_bytes, entry.unpacked_bytes = (
+            data.chunks_read,
+            data.stored_bytes,
+            data.unpacked_bytes,
+        )
         before += entry.size
     if info.table is not None and info.first_stamp is not None and info.last_stamp is not None:
         # A rack sends its files before its run begins; the recording of a run does not begin earlier.

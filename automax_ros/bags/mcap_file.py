@@ -20,6 +20,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
 
+from automax_ros.bags.chunk_table import WholeChunk
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.bags.opening import NO_BAG_HINT, opened
@@ -46,7 +47,7 @@ class RawMessage(NamedTuple):
 class McapFile:
     """One mcap file with ROS 2 messages, to be read once.
 
-    ``chunks``, ``stored_bytes`` and ``unpacked_bytes`` count the chunks read so far and the bytes in them, as they
+    ``chunks_read``, ``stored_bytes`` and ``unpacked_bytes`` count the chunks read so far and the bytes in them, as they
     stand in the file and decompressed.
     """
 
@@ -58,7 +59,7 @@ class McapFile:
         self._position = 0
         self._crc = 0
         self._unpacker = Unpacker(path, 0)
-        self.chunks = 0
+        self.chunks_read = 0
         self.stored_bytes = 0
         self.unpacked_bytes = 0
 
@@ -73,36 +74,93 @@ class McapFile:
         Raises:
             BagError: the file is truncated, damaged, beyond the limits or no recording of ROS 2.
         """
-        with opened(self.path) as file:
-            self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
-            yield from self._records(file, messages)
-
-    def _records(self, file: BinaryIO, messages: bool) -> Iterator[RawMessage | Attachment | Metadata]:
-        if file.read(len(MAGIC)) != MAGIC:
-            raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
-        self._position, self._crc = len(MAGIC), zlib.crc32(MAGIC)
-        self._check_header(*self._next_record(file)[1:])
-        while True:
-            crc_before, opcode, content = self._next_record(file)
+        for opcode, content in self._parts():
             if opcode == Opcode.CHUNK:
                 if messages:
-                    yield from self._chunk_messages(self._parsed(Chunk.read, content))
+                    yield from self.chunk_messages(self._unpacked(self._parsed(Chunk.read, content)))
             elif opcode == Opcode.MESSAGE:
                 if messages:
                     yield self._message(content)
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._define(opcode, content)
             elif opcode == Opcode.ATTACHMENT:
                 yield self._parsed(Attachment.read, content)
             elif opcode == Opcode.METADATA:
                 yield self._parsed(Metadata.read, content)
-            elif opcode == Opcode.DATA_END:
-                expected = self._parsed(DataEnd.read, content).data_section_crc
-                self._check_crc(expected, crc_before, "the data")
-                break
-            elif opcode == Opcode.FOOTER:
-                raise self._damaged("a footer without the end of the data")
-        self._read_summary(file)
+
+    def chunks(self) -> Iterator[WholeChunk | RawMessage]:
+        """Return the chunks, unpacked, with what the file tells of their places, and the messages outside of chunks.
+
+        A chunk is handed out before an error of what follows it is raised. ``chunk_messages`` takes it apart.
+
+        Raises:
+            BagError: as ``records`` does, but for what is wrong inside a chunk.
+        """
+        pending: WholeChunk | None = None
+        parts = self._parts()
+        while True:
+            try:
+                opcode, content = next(parts, (0, b""))
+                chunk = None
+                if opcode == Opcode.CHUNK:
+                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content)))
+            except BagError:
+                if pending is not None:
+                    yield pending
+                raise
+            if opcode == Opcode.MESSAGE_INDEX:
+                if pending is not None:
+                    pending.add_index(content)
+                continue
+            if pending is not None:
+                yield pending
+            pending = chunk
+            if not opcode:
+                return
+            if opcode == Opcode.MESSAGE:
+                yield self._message(content)
+
+    def chunk_messages(self, data: bytes) -> Iterator[RawMessage]:
+        """Return the messages of an unpacked chunk, and take over what it defines.
+
+        Raises:
+            BagError: it is damaged or beyond the limits.
+        """
+        position = 0
+        while position < len(data):
+            start = position + RECORD_HEAD.size
+            if start > len(data):
+                raise self._damaged("a chunk ends inside a record")
+            opcode, length = RECORD_HEAD.unpack_from(data, position)
+            position = start + length
+            if position > len(data):
+                raise self._damaged(f"a record of {length} bytes in the last {len(data) - start} bytes of a chunk")
+            if opcode == Opcode.MESSAGE:
+                yield self._message(data[start:position])
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self.define(opcode, data[start:position])
+            elif opcode < _FIRST_PRIVATE_OPCODE:
+                raise self._damaged(f"a record of kind {opcode} inside a chunk")
+
+    def _parts(self) -> Iterator[tuple[int, bytes]]:
+        """Return opcode and content of each record of the data; checks what stands around them, takes definitions."""
+        with opened(self.path) as file:
+            self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
+            if file.read(len(MAGIC)) != MAGIC:
+                raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
+            self._position, self._crc = len(MAGIC), zlib.crc32(MAGIC)
+            self._check_header(*self._next_record(file)[1:])
+            while True:
+                crc_before, opcode, content = self._next_record(file)
+                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    self.define(opcode, content)
+                elif opcode == Opcode.DATA_END:
+                    expected = self._parsed(DataEnd.read, content).data_section_crc
+                    self._check_crc(expected, crc_before, "the data")
+                    break
+                elif opcode == Opcode.FOOTER:
+                    raise self._damaged("a footer without the end of the data")
+                else:
+                    yield opcode, content
+            self._read_summary(file)
 
     def _read_summary(self, file: BinaryIO) -> None:
         """Read what stands after the data; only its checksum and its end matter here."""
@@ -156,21 +214,27 @@ class McapFile:
         if expected not in (0, actual):
             raise self._damaged(f"the checksum of {what} is wrong")
 
-    def _define(self, opcode: int, content: bytes) -> None:
-        """Take over a schema or channel; files may repeat them, the first one counts."""
+    def define(self, opcode: int, content: bytes) -> None:
+        """Take over a schema or channel; files may repeat them, the first one counts.
+
+        Raises:
+            BagError: it is damaged, or all of them together are beyond the limits.
+        """
         if opcode == Opcode.SCHEMA:
             schema = self._parsed(Schema.read, content)
-            if schema.id in self.schemas:
-                return
-            self.schemas[schema.id] = schema
+            if schema.id not in self.schemas:
+                self._admit_definition(content)
+                self.schemas[schema.id] = schema
         else:
             channel = self._parsed(Channel.read, content)
-            if channel.id in self.channels:
-                return
-            self.channels[channel.id] = channel
-        self._definition_bytes += len(content)
-        if self._definition_bytes > MAX_RECORD_BYTES:
+            if channel.id not in self.channels:
+                self._admit_definition(content)
+                self.channels[channel.id] = channel
+
+    def _admit_definition(self, content: bytes) -> None:
+        if self._definition_bytes + len(content) > MAX_RECORD_BYTES:
             raise self._too_large(f"schemas and channels of more than {MAX_RECORD_BYTES} bytes")
+        self._definition_bytes += len(content)
 
     def _message(self, content: bytes) -> RawMessage:
         if len(content) < MESSAGE_FIELDS.size:
@@ -182,31 +246,17 @@ class McapFile:
         schema = self.schemas.get(channel.schema_id)
         return RawMessage(channel, schema, sequence, log_time, publish_time, content[MESSAGE_FIELDS.size :])
 
-    def _chunk_messages(self, chunk: Chunk) -> Iterator[RawMessage]:
+    def _unpacked(self, chunk: Chunk) -> bytes:
         try:
             data = self._unpacker.unpacked(chunk)
         except BagError as error:
             raise BagError(
                 error.code, self.path, f"{error.message} (before byte {self._position})", error.hint
             ) from error
-        self.chunks += 1
+        self.chunks_read += 1
         self.stored_bytes += len(chunk.data)
         self.unpacked_bytes += len(data)
-        position = 0
-        while position < len(data):
-            start = position + RECORD_HEAD.size
-            if start > len(data):
-                raise self._damaged("a chunk ends inside a record")
-            opcode, length = RECORD_HEAD.unpack_from(data, position)
-            position = start + length
-            if position > len(data):
-                raise self._damaged(f"a record of {length} bytes in the last {len(data) - start} bytes of a chunk")
-            if opcode == Opcode.MESSAGE:
-                yield self._message(data[start:position])
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._define(opcode, data[start:position])
-            elif opcode < _FIRST_PRIVATE_OPCODE:
-                raise self._damaged(f"a record of kind {opcode} inside a chunk")
+        return data
 
     def _too_large(self, message: str) -> BagError:
         return BagError("AMX6814", self.path, message)

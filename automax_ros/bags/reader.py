@@ -115,15 +115,9 @@ class BagReader:
         records = self._sourced()
         for source, record in records if self.is_ours else in_sent_order(records):
             self.last_stamp = record.publish_time
-            channel = source.channels.get(record.channel.id)
-            if channel is None:
-                wanted = _is_wanted(record, topics, types)
-                channel = _ChannelReader(source.path, record.channel, record.schema, wanted)
-                source.channels[record.channel.id] = channel
+            channel = source.channel(record, types, topics)
             if channel.wanted:
-                yield BagMessage(
-                    channel.topic, channel.type_name, record.publish_time, record.log_time, channel.decoded(record)
-                )
+                yield channel.decoded(record)
 
     def records(self) -> Iterator[RawMessage]:
         """Return the messages as they stand in the files.
@@ -134,13 +128,13 @@ class BagReader:
         for _, record in self._sourced():
             yield record
 
-    def _sourced(self) -> Iterator[tuple[_Source, RawMessage]]:
+    def _sourced(self) -> Iterator[tuple[DataSource, RawMessage]]:
         """The messages as they stand in the files, each with its file."""
         total = sum(size_of(file) for file in self.files)
         before = 0
-        order = self.order = copy.copy(self._after) or FileOrder(0 if self.is_ours else HOLD_NS)
+        order = self.new_order()
         for file in self.files:
-            source = _Source(file)
+            source = DataSource(file)
             last_log: int | None = None
             data = McapFile(file)
             for number, record in enumerate(data.records()):
@@ -154,6 +148,11 @@ class BagReader:
                 yield source, record
             before += data.position
             order.end(last_log)
+
+    def new_order(self) -> FileOrder:
+        """Begin with what checks that the files follow each other in time, and on those before them; return it."""
+        self.order = copy.copy(self._after) or FileOrder(0 if self.is_ours else HOLD_NS)
+        return self.order
 
     def attachments(self) -> Iterator[Attachment]:
         """Return the files stored in the recording; messages are not unpacked.
@@ -209,17 +208,31 @@ class FileOrder:
             self._last = log_time
 
 
-class _Source:
+class DataSource:
     """One file of a recording, with the readers of its channels by their numbers."""
 
     __slots__ = ("channels", "path")
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.channels: dict[int, _ChannelReader] = {}
+        self.channels: dict[int, ChannelReader] = {}
+
+    def channel(
+        self, record: RawMessage, types: Collection[str] | None, topics: Collection[str] | None = None
+    ) -> ChannelReader:
+        """Return the reader of a message's channel; it is made at the channel's first message.
+
+        Raises:
+            BagError: messages of the type are wanted and cannot be read.
+        """
+        channel = self.channels.get(record.channel.id)
+        if channel is None:
+            wanted = _is_wanted(record, topics, types)
+            channel = self.channels[record.channel.id] = ChannelReader(self.path, record.channel, record.schema, wanted)
+        return channel
 
 
-class _ChannelReader:
+class ChannelReader:
     """Decodes the messages of one channel of one file."""
 
     def __init__(self, file: Path, channel: Channel, schema: Schema | None, wanted: bool) -> None:
@@ -233,16 +246,29 @@ class _ChannelReader:
             require_known(file, channel.topic, schema)
             self._decode = decoder(self.type_name)
 
-    def decoded(self, record: RawMessage) -> Message:
-        """The message of a record of this channel."""
+    def decoded(self, record: RawMessage) -> BagMessage:
+        """Return a record of this channel with its message.
+
+        Raises:
+            BagError: it is malformed.
+        """
+        message = self.message(record.data, record.log_time)
+        return BagMessage(self.topic, self.type_name, record.publish_time, record.log_time, message)
+
+    def message(self, payload: bytes, log_time: int) -> Message:
+        """Return a message of this channel.
+
+        Raises:
+            BagError: it is malformed.
+        """
         assert self._decode is not None
         try:
-            return self._decode(record.data)
+            return self._decode(payload)
         except CdrError as error:
             raise BagError(
                 "AMX6816",
                 self._file,
-                f"the message on {self.topic[:247]} at {record.log_time} ns is malformed: {error}",
+                f"the message on {self.topic[:247]} at {log_time} ns is malformed: {error}",
                 "`automax bag repair` leaves such messages out",
             ) from error
 

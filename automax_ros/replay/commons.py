@@ -6,6 +6,9 @@ from collections import deque
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from automax_ros.bags.common_log import CommonLog, Entry, Key
 from automax_ros.bags.run_facts import RunFacts
 from automax_ros.core.kinds import WriteKind
@@ -15,6 +18,8 @@ from automax_ros.rack.views import backplane_of, view_specs
 from automax_ros.running.registers import RegisterMap
 from automax_ros.wire.messages import CommonImage, CommonWrite
 
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 _FORCES_KEPT = 1000
 """Changes of the force table that are remembered, those of an image included (decision: a bound on memory)."""
 
@@ -51,6 +56,7 @@ class RecordedCommons(CommonLog):
         for item in rack.variables:
             self._start.append(size)
             size += item.elements
+        self._begins = np.array(self._start, np.int64)
         self._cells: list[Value | None] = [None] * size
 
     def take(self, message: CommonImage | CommonWrite) -> list[Entry] | None:
@@ -102,6 +108,29 @@ class RecordedCommons(CommonLog):
                 break
             forced = before
         return forced
+
+    def unforced_since(self, stamp: int) -> bool:
+        """Return whether it is told that no force has held from an instant on."""
+        is_told = self._since is not None and stamp >= self._since
+        return is_told and not self.forced and all(changed_at <= stamp for changed_at, _ in self._forced_before)
+
+    def take_many(self, sequences: Ints, views: Ints, elements: Ints, values: Floats) -> bool:
+        """Take the entries of writes that follow each other, of this run and fitting; no force is among them.
+
+        Returns FALSE, with nothing taken, where they do not follow on what is known.
+        """
+        log = self._log
+        if log.sequence is None or int(sequences[0]) != log.sequence + 1:
+            return False
+        log.sequence = int(sequences[-1])
+        cells = self._begins[views] + elements
+        last = len(cells) - 1 - np.unique(cells[::-1], return_index=True)[1]
+        chosen = (views[last].tolist(), cells[last].tolist(), values[last].tolist())
+        for view, cell, value in zip(*chosen, strict=True):
+            typed = self._kinds[view][0]
+            assert typed is not None
+            self._cells[cell] = typed(value)
+        return True
 
     def _odd(self, name: str, value: float) -> Value:
         raise ValueError(f"{name} cannot be {value!r}")

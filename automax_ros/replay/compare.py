@@ -160,6 +160,10 @@ class Tallies:
         """Return the time of a stamp since the start of the run."""
         return (stamp - self.origin) / NS_PER_S
 
+    def is_clean(self, task: str) -> bool:
+        """Return whether nothing of a task has differed so far."""
+        return not self._by_task.get(task)
+
     def scan(
         self,
         task: str,

@@ -110,6 +110,20 @@ class ScanMemory:
                 self._recorded[position] = value
                 self._untold.discard(position)
 
+    @property
+    def is_uniform(self) -> bool:
+        """Whether all that a scan sees is what the recorded one latched and read."""
+        return not (self._untold or self.apart or self._before or self._forced)
+
+    @property
+    def latched_last(self) -> Sequence[Value]:
+        """What the task latched last."""
+        return self._recorded
+
+    def follow_skipped(self, latched: Sequence[Value]) -> None:
+        """Take over what the last of the scans latched that were executed elsewhere."""
+        self._recorded[:] = latched
+
     def begin(self, scan: Scan) -> None:
         """Prepare for the execution of a scan that ``follow`` was told of.
 

@@ -27,6 +27,11 @@ class Beginning:
         self.unsure = self.scanned = self.went_on = False
         self._latch_told = False
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether a scan has told what it latched: later ones ask for nothing before the first message."""
+        return self._latch_told
+
     def asks_back(self, matters: bool) -> None:
         """When the task scanned last is asked for."""
         self.unsure = self.unsure or (matters and not self.scanned)

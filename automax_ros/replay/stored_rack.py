@@ -23,7 +23,7 @@ from automax_ros.core.text import did_you_mean
 from automax_ros.language.checks.checker import CheckResult
 from automax_ros.language.program import CommonSpec, Program
 from automax_ros.language.written import lines_that_write
-from automax_ros.rack.config import RackConfig
+from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.loader import load_stored
 from automax_ros.rack.modules.kind import ModuleConfig
@@ -223,6 +223,18 @@ def stored_rack(reader: BagReader) -> StoredRack:
     first = {name: texts[0] for name, texts in stored.sources.items()}
     later = {name: tuple(texts[1:]) for name, texts in stored.sources.items()}
     return StoredRack(bag, result.config, first, later)
+
+
+def unknown_value(bag: Path, source: ReplaySource, variable: CommonVariable, when: str) -> BagError:
+    """Return the error of a variable that a task reads and the recording has not told before a time."""
+    symbol = source.compiled.program.symbols.get(variable.name)
+    place = f"{source.source.name}:{symbol.span.line}" if symbol else source.source.name
+    return BagError(
+        "AMX6833",
+        bag,
+        f"does not tell {variable.name} before {when} s; task {source.name} reads it ({place})",
+        "record with `automax`, or with the topics /<rack>/backplane and /<rack>/backplane/snapshot",
+    )
 
 
 class _StoredFiles:

@@ -5,24 +5,24 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from automax_ros.bags.common_log import Key
 from automax_ros.bags.errors import BagError
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import seconds_text
-from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.commons import RecordedCommons, UnknownValue
 from automax_ros.replay.compare import Found, Tallies
 from automax_ros.replay.comparison import ScanComparison
+from automax_ros.replay.executing import execute
 from automax_ros.replay.inputs import ScanMemory
 from automax_ros.replay.joining import Beginning
 from automax_ros.replay.report import Kind
+from automax_ros.replay.skipped import Skipped
 from automax_ros.replay.state import fitting_state, held_in, log_is_empty, state_differences, whole_state
-from automax_ros.replay.stored_rack import ReplaySource
+from automax_ros.replay.stored_rack import ReplaySource, unknown_value
 from automax_ros.replay.totals import MOST_NOTES, TaskTotals
 from automax_ros.replay.tunables import Tunables
 from automax_ros.running.make_task import make_task
 from automax_ros.running.snapshot import snapshot_layout
-from automax_ros.running.task import EVENT_TIMEOUT, OVERLAP, ScanRecord, Status
+from automax_ros.running.task import ScanRecord, Status, Task
 from automax_ros.wire.messages import CommonWrite, Operation, Scan, TaskState
 
 _MOST_NAMES = 8
@@ -171,6 +171,35 @@ class TaskReplay:
             self._different += self._comparison.scan(scan, record, changes)
         return True
 
+    @property
+    def task(self) -> Task:
+        """The task that is executed again."""
+        return self._task
+
+    @property
+    def last_scan(self) -> int:
+        """The number of the last scan."""
+        return self._last or 0
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether all that its next scans depend on is what they latch and read, and nothing has differed so far."""
+        program = self._task.compiled.program
+        scans_here = not (program.is_basic or program.cml is not None or self._task.forces or self.stopped)
+        follows = self._synchronous and self._starts_at is None and self.beginning.is_settled
+        return scans_here and follows and self.memory.is_uniform and self._tallies.is_clean(self.name)
+
+    def skip(self, skipped: Skipped) -> None:
+        """Take over that scans were executed elsewhere, from the task's state on, and differ in nothing."""
+        self.memory.follow_skipped(skipped.latched)
+        for scan, line, code in skipped.errors:
+            self._task.scan_number = scan
+            self._task.log_error(line, code)
+        self._task.scan_number = self._last = skipped.scan
+        self._last_stamp, self._last_end = skipped.stamp, skipped.stamp + skipped.duration_ns
+        self._recorded_ended = False
+        self._compared += skipped.count if skipped.counted else 0
+
     def take_state(self, state: TaskState, log_time: int, *, counted: bool) -> None:
         """Begin with a recorded state, or compare it with ours; what an operator has done since is done here too.
 
@@ -251,31 +280,14 @@ class TaskReplay:
         self.memory.follow(scan)
 
     def _execute(self, scan: Scan) -> ScanRecord | None:
-        """Execute a scan; None if the task does not run any more.
-
-        Raises:
-            BagError: with the recorded state it cannot be executed; no task can have come to such a state.
-        """
-        now_ns = max(0, scan.stamp - self._tallies.origin)  # rack time: on the wall clock stamps are the time of day
-        try:
-            if scan.scan == 0:
-                self._stopped_in = None
-                record = self._task.run(now_ns)
-            else:
-                self._task.scan_number = scan.scan - 1
-                record = self._overlap(scan) or self._task.scan(now_ns, scan.skipped)
-        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-            what = f"scan {scan.scan} of task {self.name} cannot be executed: {error}"
-            hint = "its recorded state is none that the task can have"
-            raise BagError("AMX6813", self._bag, what, hint) from error
+        """Execute a scan; None if the task does not run any more."""
+        if scan.scan == 0:
+            self._stopped_in = None
+        # Rack time: on the wall clock stamps are the time of day.
+        record = execute(self._bag, self._task, scan, max(0, scan.stamp - self._tallies.origin))
         if record is not None and self._task.status is not Status.RUNNING:
             self._stopped_in = scan.scan
         return record
-
-    def _overlap(self, scan: Scan) -> ScanRecord | None:
-        """Fault the task where the recorded one was faulted by its time: no execution of a source tells that."""
-        code = next((error.code for error in scan.errors if error.code in (OVERLAP, EVENT_TIMEOUT)), None)
-        return None if code is None else self._task.fault(code, max(0, scan.stamp - self._tallies.origin))
 
     def _compare_state(self, state: TaskState) -> None:
         self._states += 1
@@ -369,25 +381,15 @@ class TaskReplay:
 
     def _lose(self, scan: Scan, error: UnknownValue) -> None:
         """A value is missing: after a gap in the write log the task waits for a state, otherwise that is an error."""
-        variable = self._variable(error.key)
+        variable = self._commons.rack[error.key[0]]
         if not self._commons.gaps:
-            symbol = self._source.compiled.program.symbols.get(variable.name)
-            place = f"{self._source.source.name}:{symbol.span.line}" if symbol else self._source.source.name
-            raise BagError(
-                "AMX6833",
-                self._bag,
-                f"does not tell {variable.name} before {self._when(scan.stamp)} s; task {self.name} reads it ({place})",
-                "record with `automax`, or with the topics /<rack>/backplane and /<rack>/backplane/snapshot",
-            ) from error
+            raise unknown_value(self._bag, self._source, variable, self._when(scan.stamp)) from error
         self._note(
             f"at {self._when(scan.stamp)} s {variable.name} is not known: writes are missing in the log; "
             "it goes on from the next recorded state"
         )
         self._synchronous = False
         self.memory.apart.clear()
-
-    def _variable(self, key: Key) -> CommonVariable:
-        return self._commons.rack[key[0]]
 
     def _when(self, stamp: int) -> str:
         return seconds_text(max(0, stamp - self._tallies.origin))

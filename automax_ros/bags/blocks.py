@@ -1,0 +1,207 @@
+"""Reads recordings in blocks of thousands of messages, which then are decoded and taken together.
+
+Where a chunk's index does not tell all of its messages, they come one by one; so they do in recordings of others,
+which stand in another order than that of sending.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from automax_ros.bags.chunk_table import ChunkTable, WholeChunk
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.mcap_file import McapFile, RawMessage
+from automax_ros.bags.opening import size_of
+from automax_ros.bags.reader import BagMessage, BagReader, ChannelReader, DataSource, FileOrder
+
+BLOCK_BYTES = 8 << 20
+"""A block ends with the chunk that makes it larger than this, in bytes unpacked (decision)."""
+_CHANNELS = 1 << 16
+
+
+@dataclass(frozen=True)
+class MessageBlock:
+    """Messages of one file in the order of sending: where each begins in ``data`` and its bytes, and its times in ns.
+
+    ``kinds`` are places in the types that were asked for, ``numbers`` those of the channels.
+    """
+
+    source: DataSource
+    data: NDArray[np.uint8]
+    kinds: NDArray[np.int64]
+    numbers: NDArray[np.int64]
+    starts: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    log_times: NDArray[np.uint64]
+    stamps: NDArray[np.uint64]
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def message(self, number: int) -> BagMessage:
+        """Return one message, decoded by itself.
+
+        Raises:
+            BagError: it is malformed.
+        """
+        channel = self.source.channels[int(self.numbers[number])]
+        start = int(self.starts[number])
+        payload = self.data[start : start + int(self.lengths[number])].tobytes()
+        log_time = int(self.log_times[number])
+        return BagMessage(
+            channel.topic, channel.type_name, int(self.stamps[number]), log_time, channel.message(payload, log_time)
+        )
+
+
+def message_blocks(reader: BagReader, types: Sequence[str]) -> Iterator[MessageBlock | BagMessage]:
+    """Return the messages of these types in the order of sending: in blocks, or one by one.
+
+    Raises:
+        BagError: as ``BagReader.messages`` does, at the same message.
+    """
+    if not reader.is_ours:
+        yield from reader.messages(types=frozenset(types))
+        return
+    total = sum(size_of(file) for file in reader.files)
+    before, order = 0, reader.new_order()
+    for path in reader.files:
+        file = _BlockFile(McapFile(path), DataSource(path), types, order)
+        for item in file.items():
+            if reader.on_progress is not None:
+                reader.on_progress(min(1.0, (before + file.position) / total))
+            yield item
+        before += file.position
+        order.end(file.last_log)
+
+
+class _BlockFile:
+    """One file, read in blocks."""
+
+    def __init__(self, file: McapFile, source: DataSource, types: Sequence[str], order: FileOrder) -> None:
+        self._file, self._source, self._order = file, source, order
+        self._types = frozenset(types)
+        self._kind_of = {name: kind for kind, name in enumerate(types)}
+        self._kinds = np.full(_CHANNELS, -1, np.int64)
+        self._begun = False
+        self.last_log: int | None = None
+        self._chunks: list[bytes] = []
+        self._tables: list[ChunkTable] = []
+        self._bytes = 0
+
+    @property
+    def position(self) -> int:
+        """How many bytes of the file are read."""
+        return self._file.position
+
+    def items(self) -> Iterator[MessageBlock | BagMessage]:
+        """Return what the file holds; what was read before an error is handed out first."""
+        try:
+            for record in self._file.chunks():
+                table = self._table(record) if isinstance(record, WholeChunk) else None
+                if isinstance(record, WholeChunk) and table is not None:
+                    self._keep(record, table)
+                    if self._bytes < BLOCK_BYTES:
+                        continue
+                yield from self._kept()
+                if table is None:
+                    yield from self._one_by_one(record)
+        except BagError:
+            yield from self._kept()
+            raise
+        yield from self._kept()
+
+    def _table(self, chunk: WholeChunk) -> ChunkTable | None:
+        """Return where the messages of a chunk stand; None where they have to be read one by one."""
+        table = chunk.table()
+        if table is None or not self._is_defined(table):
+            return None
+        if not self._begun:
+            self._order.begin(self._file.path, int(table.heads["log_time"][0]))
+            self._begun = True
+        self.last_log = int(table.heads["log_time"][-1])
+        return table
+
+    def _is_defined(self, table: ChunkTable) -> bool:
+        """Take over what a chunk defines; return whether its channels stand before their messages and can be read."""
+        numbers, firsts = np.unique(table.heads["channel"], return_index=True)
+        unknown = [
+            (number, int(table.places[first]))
+            for number, first in zip(numbers.tolist(), firsts.tolist(), strict=True)
+            if number not in self._source.channels
+        ]
+        if not unknown and not table.definitions:
+            return True
+        begins: dict[tuple[int, int], int] = {}
+        for place, opcode, content in table.definitions:
+            try:
+                self._file.define(opcode, content)
+            except BagError:
+                return False
+            begins.setdefault((opcode, int.from_bytes(content[:2], "little")), place)
+        return all(self._is_readable(number, first, begins) for number, first in unknown)
+
+    def _is_readable(self, number: int, first: int, begins: Mapping[tuple[int, int], int]) -> bool:
+        """Make the reader of a channel, if it can be read and was defined before the place of its first message."""
+        channel = self._file.channels.get(number)
+        if channel is None:
+            return False
+        keys = (int(Opcode.CHANNEL), number), (int(Opcode.SCHEMA), channel.schema_id)
+        if any(begins.get(key, -1) > first for key in keys):
+            return False
+        schema = self._file.schemas.get(channel.schema_id)
+        wanted = schema is not None and schema.name in self._types
+        try:
+            made = ChannelReader(self._source.path, channel, schema, wanted)
+        except BagError:
+            return False
+        self._source.channels[number] = made
+        if wanted:
+            self._kinds[number] = self._kind_of[made.type_name]
+        return True
+
+    def _keep(self, chunk: WholeChunk, table: ChunkTable) -> None:
+        self._chunks.append(chunk.data)
+        self._tables.append(table)
+        self._bytes += len(chunk.data)
+
+    def _kept(self) -> Iterator[MessageBlock]:
+        """Return the chunks kept so far as one block, and forget them."""
+        if not self._chunks:
+            return
+        begins = np.cumsum([0, *map(len, self._chunks)])
+        heads = np.concatenate([table.heads for table in self._tables])
+        starts = np.concatenate([table.starts + begin for table, begin in zip(self._tables, begins, strict=False)])
+        lengths = np.concatenate([table.lengths for table in self._tables])
+        data = np.frombuffer(b"".join(self._chunks), np.uint8)
+        self._chunks, self._tables, self._bytes = [], [], 0
+        numbers = heads["channel"].astype(np.int64)
+        kinds = self._kinds[numbers]
+        wanted = np.flatnonzero(kinds >= 0)
+        if len(wanted):
+            yield MessageBlock(
+                self._source,
+                data,
+                kinds[wanted],
+                numbers[wanted],
+                starts[wanted],
+                lengths[wanted],
+                heads["log_time"][wanted],
+                heads["publish_time"][wanted],
+            )
+
+    def _one_by_one(self, record: WholeChunk | RawMessage) -> Iterator[BagMessage]:
+        """Return messages that stand in no block."""
+        records = self._file.chunk_messages(record.data) if isinstance(record, WholeChunk) else iter([record])
+        for raw in records:
+            if not self._begun:
+                self._order.begin(self._file.path, raw.log_time)
+                self._begun = True
+            self.last_log = raw.log_time
+            channel = self._source.channel(raw, self._types)
+            if channel.wanted:
+                yield channel.decoded(raw)

@@ -1,0 +1,117 @@
+"""An unpacked chunk whose messages are found without reading them one by one: by the index that stands after it.
+
+The index is not trusted: it counts only where its messages and the chunk's own definitions fill the chunk without gaps.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from automax_ros.bags.mcap_output import MESSAGE_FIELDS, RECORD_HEAD
+
+_INDEX_HEAD = struct.Struct("<HI")
+"""Channel and bytes of the entries: what the content of a message index begins with."""
+_ENTRY = np.dtype([("log_time", "<u8"), ("place", "<u8")])
+_HEAD = np.dtype(
+    [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time", "<u8"),
+        ("publish_time", "<u8"),
+    ]
+)
+_HEAD_SIZE = RECORD_HEAD.size + MESSAGE_FIELDS.size
+_DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
+_MOST_DEFINITIONS = 10_000
+
+
+@dataclass(frozen=True)
+class ChunkTable:
+    """Where the messages of a chunk stand, in the order of the file: ``heads`` has their channels, lengths and times.
+
+    ``places`` are where their records begin. ``definitions`` are the schemas and channels: place, opcode, content.
+    """
+
+    heads: NDArray[np.void]
+    places: NDArray[np.int64]
+    definitions: tuple[tuple[int, int, bytes], ...]
+
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """Where the messages themselves begin."""
+        return self.places + _HEAD_SIZE
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """How many bytes they have."""
+        return self.heads["length"].astype(np.int64) - MESSAGE_FIELDS.size
+
+
+class WholeChunk:
+    """The unpacked bytes of a chunk, and the indexes that follow it in the file."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self._indexes: list[bytes] | None = []
+        self._left = len(data) // _HEAD_SIZE * _ENTRY.itemsize
+        """How many bytes entries can have at most."""
+
+    def add_index(self, content: bytes) -> None:
+        """Take the content of a message index; one that cannot be that of the chunk makes all of them count nothing."""
+        if self._indexes is None or len(content) < _INDEX_HEAD.size:
+            self._indexes = None
+            return
+        _, size = _INDEX_HEAD.unpack_from(content)
+        self._left -= size
+        if size != len(content) - _INDEX_HEAD.size or size % _ENTRY.itemsize or self._left < 0:
+            self._indexes = None
+        elif size:
+            self._indexes.append(content)
+
+    def table(self) -> ChunkTable | None:
+        """Return where the messages stand; None where the indexes do not tell it for every byte of the chunk."""
+        if not self._indexes:
+            return None
+        parts = [np.frombuffer(content, _ENTRY, offset=_INDEX_HEAD.size)["place"] for content in self._indexes]
+        told = np.sort(np.concatenate(parts))
+        if told[-1] > len(self.data) - _HEAD_SIZE:
+            return None
+        places = told.astype(np.int64)
+        found = np.ndarray((len(self.data) - _HEAD_SIZE + 1,), f"V{_HEAD_SIZE}", self.data, strides=(1,))
+        heads = found[places].view(_HEAD)
+        lengths = heads["length"]
+        if (heads["opcode"] != int(Opcode.MESSAGE)).any() or (lengths < MESSAGE_FIELDS.size).any():
+            return None
+        if (lengths > len(self.data)).any():
+            return None
+        ends = places + RECORD_HEAD.size + lengths.astype(np.int64)
+        begins = np.append(places, len(self.data))
+        known = np.concatenate(([0], ends))
+        if (known > begins).any():
+            return None
+        gaps = np.flatnonzero(known < begins)
+        definitions = list(self._definitions(zip(known[gaps].tolist(), begins[gaps].tolist(), strict=True)))
+        if None in definitions or len(definitions) > _MOST_DEFINITIONS:
+            return None
+        return ChunkTable(heads, places, tuple(item for item in definitions if item is not None))
+
+    def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[tuple[int, int, bytes] | None]:
+        """Return the records between messages; None for one that is no schema and no channel."""
+        for begin, end in gaps:
+            position = begin
+            while position < end:
+                start = position + RECORD_HEAD.size
+                opcode, length = RECORD_HEAD.unpack_from(self.data, position) if start <= end else (0, 0)
+                if opcode not in _DEFINITIONS or start + length > end:
+                    yield None
+                    return
+                yield position, opcode, self.data[start : start + length]
+                position = start + length

@@ -1,0 +1,159 @@
+"""Values of common variables in many messages, one after the other in plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from automax_ros.core.types import DataType
+from automax_ros.rack.config import CommonVariable
+from automax_ros.wire.cdr_columns import Array, Ints, MessageColumns
+from automax_ros.wire.values import Values
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Message k has the entries from ``offsets[k]`` up to ``offsets[k + 1]``."""
+
+    offsets: Ints
+    views: Ints
+    elements: Ints
+    values: Floats
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @property
+    def counts(self) -> Ints:
+        """How many entries each message has."""
+        return np.diff(self.offsets)
+
+    @property
+    def rows(self) -> Ints:
+        """The message of each entry."""
+        return np.repeat(np.arange(len(self)), self.counts)
+
+    def part(self, begin: int, end: int) -> Entries:
+        """Return the entries of the messages from ``begin`` up to ``end``."""
+        offsets = self.offsets[begin : end + 1]
+        first, last = int(offsets[0]), int(offsets[-1])
+        return Entries(offsets - first, self.views[first:last], self.elements[first:last], self.values[first:last])
+
+    def row_of(self, entry: int) -> int:
+        """Return the message of one entry."""
+        return int(np.searchsorted(self.offsets, entry, side="right")) - 1
+
+
+class EntriesBuilder:
+    """Gathers the entries of ``count`` messages in any order; ``bad`` are those whose lists do not fit together."""
+
+    def __init__(self, count: int) -> None:
+        self._counts = np.zeros(count, np.int64)
+        self._parts: list[tuple[Ints, Array, Array, Array]] = []
+        self.bad = np.zeros(count, bool)
+
+    def add(self, columns: MessageColumns, prefix: str) -> None:
+        """Take one field of messages of the same sizes."""
+        views, elements, values = (columns.fields[f"{prefix}.{name}"] for name in ("variable", "element", "value"))
+        if not views.shape[1] == elements.shape[1] == values.shape[1]:
+            self.bad[columns.rows] = True
+            return
+        if views.shape[1]:
+            self._counts[columns.rows] = views.shape[1]
+            self._parts.append((columns.rows, views, elements, values))
+
+    def add_one(self, row: int, values: Values) -> None:
+        """Take one field of one message."""
+        if values.text or not len(values.variable) == len(values.element) == len(values.value):
+            self.bad[row] = True
+        elif values.variable:
+            self._counts[row] = len(values.variable)
+            arrays = np.array([values.variable]), np.array([values.element]), np.array([values.value])
+            self._parts.append((np.array([row]), *arrays))
+
+    def made(self) -> Entries:
+        """Return the entries in the order of the messages."""
+        offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(self._counts)))
+        total = int(offsets[-1])
+        found = Entries(offsets, np.empty(total, np.int64), np.empty(total, np.int64), np.empty(total))
+        for rows, views, elements, values in self._parts:
+            begins = offsets[rows]
+            for place in range(views.shape[1]):
+                to = begins + place
+                found.views[to] = views[:, place]
+                found.elements[to] = elements[:, place]
+                found.values[to] = values[:, place]
+        return found
+
+
+class ValueRules:
+    """What values the variables of a rack can have, by their numbers; strings have none here."""
+
+    def __init__(self, variables: Sequence[CommonVariable]) -> None:
+        count = len(variables)
+        self.count = count
+        self.real = np.array([item.type is DataType.REAL for item in variables], bool)
+        self._elements = np.array([item.elements for item in variables], np.int64)
+        ranges = [item.type.range if item.type is not DataType.STRING else (1, 0) for item in variables]
+        self._least = np.array([low for low, _ in ranges], np.float64)
+        self._greatest = np.array([high for _, high in ranges], np.float64)
+
+    def wrong(self, entries: Entries) -> Ints:
+        """Return the messages that have a value that its variable cannot have, ascending."""
+        if not len(entries.views):
+            return np.zeros(0, np.int64)
+        known = entries.views < self.count
+        views = np.where(known, entries.views, 0)
+        values = entries.values
+        fits = (
+            known
+            & (entries.elements < self._elements[views])
+            & (self._least[views] <= values)
+            & (values <= self._greatest[views])
+            & (self.real[views] | (values == np.floor(values)))
+        )
+        if fits.all():
+            return np.zeros(0, np.int64)
+        return np.unique(entries.rows[~fits])
+
+    def typed(self, entries: Entries) -> Entries:
+        """Return entries as their variables hold them: whole numbers have no negative zero."""
+        if not len(entries.views):
+            return entries
+        values = np.where(self.real[entries.views], entries.values, entries.values + 0.0)
+        return Entries(entries.offsets, entries.views, entries.elements, values)
+
+
+def first_other(recorded: Entries, own: Entries, *, bits: bool) -> int:
+    """Return the first message whose entries are not the same in both, or how many messages there are.
+
+    With ``bits`` values are the same to the last bit, and elements count too.
+    """
+    count = min(len(recorded), len(own))
+    first = min((_first(part) for part in _differing(recorded, own, count, bits=bits)), default=count)
+    return min(first, count)
+
+
+def _differing(recorded: Entries, own: Entries, count: int, *, bits: bool) -> Iterator[Ints]:
+    other_counts = np.flatnonzero(recorded.offsets[1 : count + 1] != own.offsets[1 : count + 1])
+    if len(other_counts):
+        yield other_counts[:1]
+        count = int(other_counts[0])
+    total = int(recorded.offsets[count])
+    same = recorded.views[:total] == own.views[:total]
+    if bits:
+        same &= recorded.elements[:total] == own.elements[:total]
+        same &= recorded.values[:total].view(np.int64) == own.values[:total].view(np.int64)
+    else:
+        same &= recorded.values[:total] == own.values[:total]
+    if not same.all():
+        yield np.array([recorded.row_of(int(np.argmin(same)))])
+
+
+def _first(rows: Ints) -> int:
+    return int(rows[0])

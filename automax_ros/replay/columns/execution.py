@@ -1,0 +1,231 @@
+"""Executes many scans of a task on columns of what they latched and read, and gives columns of what they did.
+
+``PythonColumns`` calls the compiled Python function scan by scan: it is what runs where nothing quicker can be had, and
+the model of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from automax_ros.compile.compiler import CompiledTask
+from automax_ros.compile.scan_io import ScanTooLong, StateValues
+from automax_ros.core.types import DataType, Latched, Value, type_of_name
+from automax_ros.replay.columns.entries import Entries
+from automax_ros.running.backplane import BUS_ERROR, Backplane
+from automax_ros.wire.cdr_columns import Ints
+
+
+@dataclass(frozen=True)
+class Executed:
+    """What scans did. Fewer may be ``done`` than were asked for: the next one has to be executed by itself.
+
+    ``outputs`` has for each of ``CompiledTask.written`` its values at END; ``errors`` has rows of scan (from 0), line
+    and code; ``written`` is what BASIC statements wrote.
+    """
+
+    done: int
+    outputs: list[Ints]
+    errors: Ints
+    written: Entries
+
+
+class ColumnForm(Protocol):
+    """Executes scans of one task; the state is changed in place, to that after the scans done."""
+
+    def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
+        """Execute ``count`` scans.
+
+        They get what each of ``CompiledTask.latched`` was, and what BASIC statements read in ``read``, in that order.
+        """
+        ...
+
+
+class PythonColumns:
+    """The compiled Python function on columns; ``types`` are those of the rack's variables, by their views."""
+
+    def __init__(
+        self, compiled: CompiledTask, views: Sequence[int], types: Sequence[DataType], backplane: Backplane
+    ) -> None:
+        """Take a task; ``views`` are those of ``compiled.latched``."""
+        self._compiled, self._types, self._backplane = compiled, types, backplane
+        self._views = tuple(views)
+        self._flags = [type_of_name(name) is DataType.BOOLEAN for name in compiled.latched]
+        places = {name: place for place, name in enumerate(compiled.latched)}
+        self._outputs = [places[name] for name in compiled.written]
+
+    def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
+        """Execute scans; see ``ColumnForm``."""
+        before = _copied(state)
+        io = self._execute(state, latched, count, read)
+        if io.done < count:
+            # The scan that could not be executed has changed the state: execute those before it again.
+            state[:] = before
+            io = self._execute(state, latched, io.done, read)
+        return self._executed(io, latched)
+
+    def _execute(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> _ColumnIo:
+        columns = [
+            (column[:count] != 0 if flag else column[:count]).tolist()
+            for column, flag in zip(latched, self._flags, strict=True)
+        ]
+        rows: list[Latched] = list(zip(*columns, strict=True)) if columns else [()] * count
+        io = _ColumnIo(rows, read, self._types, self._backplane)
+        scans = self._compiled.scans(state, io)
+        try:
+            for _ in range(count):
+                io.begin()
+                if next(scans):
+                    break
+                if not io.read_all:
+                    break
+                io.done += 1
+        except (ArithmeticError, LookupError, TypeError, ValueError, ScanTooLong, _Elsewhere):
+            pass  # the state is stored
+        finally:
+            scans.close()
+        io.end()
+        return io
+
+    def _executed(self, io: _ColumnIo, latched: Sequence[Ints]) -> Executed:
+        done = io.done
+        position = {self._views[place]: number for number, place in enumerate(self._outputs)}
+        outputs = [latched[place][:done].copy() for place in self._outputs]
+        for scan, changes in io.commits:
+            for view, value in changes:
+                if scan < done:
+                    outputs[position[view]][scan] = value
+        errors = np.array([row for row in io.errors if row[0] < done], np.int64).reshape(-1, 3)
+        return Executed(done, outputs, errors, io.written(done))
+
+
+class _Elsewhere(Exception):
+    """A scan does what columns do not tell."""
+
+
+class _ColumnIo:
+    """What the scans touch: ``done`` of them are executed whole."""
+
+    def __init__(self, rows: list[Latched], read: Entries, types: Sequence[DataType], backplane: Backplane) -> None:
+        self._rows = iter(rows)
+        self._types, self._backplane = types, backplane
+        self._read, self._place, self._end = read, 0, 0
+        self._places = list(zip(read.views.tolist(), read.elements.tolist(), strict=True))
+        self._values = [_typed(types[view], value) for (view, _), value in zip(self._places, read.values, strict=True)]
+        self._offsets = read.offsets.tolist()
+        self.done = 0
+        self._scan = -1
+        self.commits: list[tuple[int, list[tuple[int, Value]]]] = []
+        self.errors: list[tuple[int, int, int]] = []
+        self._writes: list[tuple[int, int, Value]] = []
+        self._write_offsets: list[int] = []
+
+    def begin(self) -> None:
+        """Begin a scan."""
+        self._scan += 1
+        self._place, self._end = self._offsets[self._scan], self._offsets[self._scan + 1]
+        self._write_offsets.append(len(self._writes))
+
+    def end(self) -> None:
+        """End the last scan."""
+        self._write_offsets.append(len(self._writes))
+
+    @property
+    def read_all(self) -> bool:
+        """Whether the scan has read all that the recorded one read."""
+        return self._place == self._end
+
+    def written(self, done: int) -> Entries:
+        """Return what the first scans wrote."""
+        offsets = np.array(self._write_offsets[: done + 1] if done else [0], np.int64)
+        writes = self._writes[: int(offsets[-1])]
+        return Entries(
+            offsets,
+            np.array([view for view, _, _ in writes], np.int64),
+            np.array([element for _, element, _ in writes], np.int64),
+            np.array([value for _, _, value in writes], np.float64),
+        )
+
+    # ScanIo
+
+    def latch(self) -> Latched:
+        """Return what the scan latches."""
+        return next(self._rows)
+
+    def forces(self) -> tuple[bool, ...]:
+        """Nothing is forced on this path."""
+        raise _Elsewhere
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Note what blocks changed."""
+        self.commits.append((self._scan, changes))
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Return what the recorded scan read at this place."""
+        place = self._place
+        if place == self._end or self._places[place] != (view, element):
+            raise _Elsewhere
+        self._place = place + 1
+        return self._values[place]
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Note what a BASIC statement writes."""
+        if isinstance(value, str) or isinstance(value, float) is not (self._types[view] is DataType.REAL):
+            raise _Elsewhere
+        self._writes.append((view, element, value))
+
+    def log(self, line: int, code: int) -> None:
+        """Note a run-time error."""
+        self.errors.append((self._scan, line, code))
+
+    def print_line(self, values: tuple[Value, ...], separators: str) -> None:  # noqa: ARG002
+        """Leave the scan to the path scan by scan."""
+        raise _Elsewhere
+
+    def errors_logged(self) -> bool:
+        """Leave the scan to the path scan by scan."""
+        raise _Elsewhere
+
+    def clear_errors(self) -> None:
+        """Leave the scan to the path scan by scan."""
+        raise _Elsewhere
+
+    def set_event(self, name: str) -> None:  # noqa: ARG002
+        """Leave the scan to the path scan by scan."""
+        raise _Elsewhere
+
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+        """Return a register's word and 0, or 0 and the bus error."""
+        place = self._backplane.readable(slot, register)
+        if place is None:
+            return 0, BUS_ERROR
+        value = self.read_now(*place)
+        assert isinstance(value, int)
+        return value, 0
+
+    def io_write(self, slot: int, register: int, value: int) -> int:
+        """Write a register's word; return 0 or the bus error."""
+        place = self._backplane.writable(slot, register)
+        if place is None:
+            return BUS_ERROR
+        view, element = place
+        self.write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
+        return 0
+
+    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
+        """Leave the scan to the path scan by scan."""
+        raise _Elsewhere
+
+
+def _typed(kind: DataType, value: float) -> Value:
+    if kind is DataType.REAL:
+        return float(value)
+    return bool(value) if kind is DataType.BOOLEAN else int(value)
+
+
+def _copied(state: StateValues) -> StateValues:
+    return [value[:] if isinstance(value, list) else value for value in state]

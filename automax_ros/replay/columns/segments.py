@@ -1,0 +1,137 @@
+"""Takes a recording block by block: what is uniform by columns, the rest message by message, in the recorded order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+
+import numpy as np
+
+from automax_ros.bags.blocks import MessageBlock
+from automax_ros.bags.reader import BagMessage
+from automax_ros.replay.columns.entries import ValueRules
+from automax_ros.replay.columns.scans import SCAN, ScanColumns, scans_by_task
+from automax_ros.replay.columns.stretch import TaskStretches
+from automax_ros.replay.columns.writes import WRITE, write_columns
+from automax_ros.replay.commons import RecordedCommons
+from automax_ros.replay.task import TaskReplay
+
+FEWEST_MESSAGES = 64
+"""Between two messages that have to be taken by themselves, fewer than this go one by one too (decision)."""
+FEWEST_WRITES = 8
+"""Fewer writes than this go one by one (decision)."""
+
+
+class BlockReplay:
+    """Takes blocks of one recording for its tasks; ``take`` takes one message and says whether more are of interest.
+
+    In each stretch the last scan of every task goes by itself, so that all that is kept of a scan is as always.
+    """
+
+    def __init__(
+        self,
+        tasks: Mapping[str, TaskReplay],
+        names: Collection[str],
+        commons: RecordedCommons,
+        take: Callable[[BagMessage], bool],
+        types: Collection[str],
+        begin: int,
+        end: int | None,
+    ) -> None:
+        """Prepare for scans of the tasks of these names; only the given ``tasks`` are executed.
+
+        Scans are counted from the stamp ``begin`` on, and of interest up to the stamp ``end``.
+        """
+        self._tasks, self._names, self._commons, self._take = tasks, sorted(names), commons, take
+        self._begin, self._end = begin, end
+        self._rules = ValueRules(commons.rack)
+        self._stretches = {name: TaskStretches(task, commons, self._rules) for name, task in tasks.items()}
+        self.types = (SCAN, WRITE, *sorted({*types} - {SCAN, WRITE}))
+        """The types of messages to read, in the order in which a block numbers them."""
+
+    def take(self, block: MessageBlock) -> bool:
+        """Take a block; return whether more messages are of interest.
+
+        Raises:
+            BagError: as ``take`` does of each of its messages.
+        """
+        part = _BlockPart(block, self._names, self._commons.facts.table.run_id, self._rules)
+        begin = 0
+        for place in part.by_themselves(self._end):
+            if not self._between(part, begin, place) or not self._take(block.message(place)):
+                return False
+            begin = place + 1
+        return self._between(part, begin, len(block))
+
+    def _between(self, part: _BlockPart, begin: int, end: int) -> bool:
+        """Take what stands between two messages that have to be taken by themselves."""
+        if end - begin < FEWEST_MESSAGES:
+            return self._one_by_one(part, range(begin, end))
+        left: list[int] = []
+        for name in self._tasks:
+            scans = part.scans_between(name, begin, end)
+            if scans is not None:
+                left += scans.places[self._taken(name, scans) :].tolist()
+        position = begin
+        for place in sorted(left):
+            if not self._writes(part, position, place) or not self._take(part.block.message(place)):
+                return False
+            position = place + 1
+        return self._writes(part, position, end)
+
+    def _taken(self, name: str, scans: ScanColumns) -> int:
+        """Take scans of a task by columns, all but the last; return how many."""
+        counted = scans.stamps >= self._begin
+        alike = counted == counted[0]
+        count = len(scans) if alike.all() else int(np.argmin(alike))
+        return self._stretches[name].take(scans.part(0, min(count, len(scans) - 1)), counted=bool(counted[0]))
+
+    def _writes(self, part: _BlockPart, begin: int, end: int) -> bool:
+        """Take the writes between two places."""
+        writes = part.writes.between(begin, end)
+        if len(writes.places) >= FEWEST_WRITES and not self._looks_at_writes(part):
+            entries = writes.entries
+            if self._commons.take_many(writes.sequences, entries.views, entries.elements, entries.values):
+                return True
+        return self._one_by_one(part, writes.places.tolist())
+
+    def _looks_at_writes(self, part: _BlockPart) -> bool:
+        """Return whether a task has to be told of each write: what others write counts, or scans stand after writes."""
+        return any(
+            task.memory.is_apart or (task.edited and part.is_modeled(task.name)) for task in self._tasks.values()
+        )
+
+    def _one_by_one(self, part: _BlockPart, places: Collection[int]) -> bool:
+        return all(self._take(part.block.message(place)) for place in places)
+
+
+class _BlockPart:
+    """A block with its scans and writes as columns."""
+
+    def __init__(self, block: MessageBlock, names: Collection[str], run_id: int, rules: ValueRules) -> None:
+        self.block = block
+        self._scans, self._bad_scans = scans_by_task(block, np.flatnonzero(block.kinds == 0), tuple(names), rules)
+        self.writes, self._bad_writes = write_columns(block, np.flatnonzero(block.kinds == 1), run_id, rules)
+        self._modeled = {name: bool(scans.durations.any()) for name, scans in self._scans.items()}
+
+    def by_themselves(self, end: int | None) -> list[int]:
+        """Return the places of what has to be taken by itself: from a scan beyond ``end`` on that is all."""
+        rare = np.flatnonzero(self.block.kinds > 1)
+        found = [rare, self._bad_scans, self._bad_writes]
+        if end is not None:
+            beyond = [scans.places[scans.stamps > end] for scans in self._scans.values()]
+            first = min((int(places[0]) for places in beyond if len(places)), default=len(self.block))
+            found.append(np.arange(first, len(self.block)))
+        places: list[int] = np.unique(np.concatenate(found)).tolist()
+        return places
+
+    def scans_between(self, name: str, begin: int, end: int) -> ScanColumns | None:
+        """Return the scans of a task between two places, None where there are none."""
+        scans = self._scans.get(name)
+        if scans is None:
+            return None
+        first, last = np.searchsorted(scans.places, (begin, end)).tolist()
+        return scans.part(first, last) if last > first else None
+
+    def is_modeled(self, name: str) -> bool:
+        """Return whether scans of a task took time."""
+        return self._modeled.get(name, False)

@@ -1,0 +1,143 @@
+"""Executes stretches of one task's scans by columns, and compares them with what was recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from automax_ros.core.types import DataType, type_of_name
+from automax_ros.replay.columns.entries import Entries, ValueRules, first_other
+from automax_ros.replay.columns.execution import ColumnForm, Executed, PythonColumns
+from automax_ros.replay.columns.latched import LatchedColumns
+from automax_ros.replay.columns.scans import ScanColumns
+from automax_ros.replay.commons import RecordedCommons
+from automax_ros.replay.skipped import Skipped
+from automax_ros.replay.task import TaskReplay
+from automax_ros.running.task import Task
+from automax_ros.wire.cdr_columns import Ints
+
+FEWEST_SCANS = 16
+"""Stretches of fewer scans go scan by scan (decision: columns cost as much as that many scans)."""
+
+
+@dataclass(frozen=True)
+class _Form:
+    """How the task that runs now is executed."""
+
+    task: Task
+    columns: ColumnForm
+    latched: LatchedColumns
+    written: Ints
+    """The views of the outputs."""
+    places: Ints
+    """The places of the outputs among what is latched."""
+    flags: tuple[bool, ...]
+    """Which of the latched views are BOOLEANs."""
+
+
+class TaskStretches:
+    """Takes scans of one task by columns as far as nothing differs; those that it leaves go one by one.
+
+    What is doubtful counts as different: the path scan by scan decides it.
+    """
+
+    def __init__(self, replay: TaskReplay, commons: RecordedCommons, rules: ValueRules) -> None:
+        self._replay, self._commons, self._rules = replay, commons, rules
+        self._form: _Form | None = None
+
+    def take(self, scans: ScanColumns, *, counted: bool) -> int:
+        """Execute scans and compare them; return how many were taken over, from the first on."""
+        replay = self._replay
+        if len(scans) < FEWEST_SCANS or not replay.is_uniform:
+            return 0
+        form = self._present_form()
+        scans = scans.part(0, self._uniform(scans, form))
+        if len(scans) < FEWEST_SCANS:
+            return 0
+        latched = form.latched.columns(scans.latched, [int(value) for value in replay.memory.latched_last])
+        state = form.task.state
+        before = [value[:] if isinstance(value, list) else value for value in state]
+        executed = form.columns.columns(state, list(latched), len(scans), scans.read)
+        same = self._same(scans, executed, latched, form)
+        if same < executed.done:
+            state[:] = before
+            executed = form.columns.columns(state, list(latched), same, scans.read.part(0, same))
+        if same:
+            last = latched[:, same - 1].tolist()
+            replay.skip(
+                Skipped(
+                    count=same,
+                    scan=int(scans.scans[same - 1]),
+                    stamp=int(scans.stamps[same - 1]),
+                    duration_ns=int(scans.durations[same - 1]),
+                    latched=[value != 0 if flag else value for value, flag in zip(last, form.flags, strict=True)],
+                    errors=[(int(scans.scans[row]), line, code) for row, line, code in executed.errors.tolist()],
+                    counted=counted,
+                )
+            )
+        return same
+
+    def _present_form(self) -> _Form:
+        """Return how the task is executed: it may have been reloaded."""
+        task = self._replay.task
+        if self._form is None or self._form.task.compiled is not task.compiled or self._form.task is not task:
+            compiled, commons = task.compiled, self._commons
+            views = [task.memory.view(name) for name in compiled.latched]
+            places = {name: place for place, name in enumerate(compiled.latched)}
+            types = [variable.type for variable in commons.rack]
+            self._form = _Form(
+                task,
+                PythonColumns(compiled, views, types, commons.backplane),
+                LatchedColumns(views, len(types)),
+                np.array([task.memory.view(name) for name in compiled.written], np.int64),
+                np.array([places[name] for name in compiled.written], np.int64),
+                tuple(type_of_name(name) is DataType.BOOLEAN for name in compiled.latched),
+            )
+        return self._form
+
+    def _uniform(self, scans: ScanColumns, form: _Form) -> int:
+        """Return how many scans are of the kind that columns tell: they follow each other, and nothing is forced."""
+        replay = self._replay
+        if not self._commons.unforced_since(int(scans.stamps.min())):
+            return 0
+        following = scans.scans == replay.last_scan + 1 + np.arange(len(scans))
+        if replay.edited:
+            # An edited scan that writes before it reads may find its own value or another's.
+            following &= (scans.read.counts == 0) | (scans.written.counts == 0)
+        count = len(scans) if following.all() else int(np.argmin(following))
+        return min(count, form.latched.whole(scans))
+
+    def _same(self, scans: ScanColumns, executed: Executed, latched: Ints, form: _Form) -> int:
+        """Return how many scans did what was recorded."""
+        done = executed.done
+        scans = scans.part(0, done)
+        committed = _commits(np.array(executed.outputs, np.int64).reshape(-1, done), latched[form.places, :done], form)
+        return min(
+            first_other(self._rules.typed(scans.committed), committed, bits=False),
+            first_other(self._rules.typed(scans.written), executed.written, bits=True),
+            self._same_errors(scans, executed),
+        )
+
+    def _same_errors(self, scans: ScanColumns, executed: Executed) -> int:
+        """Return how many scans logged the same errors; in an edited task lines do not count."""
+        rows, lines, codes = executed.errors.T
+        offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(rows, minlength=len(scans)))))
+        recorded, own = scans.errors.lines, lines
+        if self._replay.edited:
+            recorded, own = np.zeros_like(recorded), np.zeros_like(own)
+        zeros = np.zeros(max(len(codes), len(scans.errors.codes)), np.int64)
+        return first_other(
+            Entries(scans.errors.offsets, recorded, zeros, scans.errors.codes.astype(np.float64)),
+            Entries(offsets, own, zeros, codes.astype(np.float64)),
+            bits=False,
+        )
+
+
+def _commits(outputs: Ints, latched: Ints, form: _Form) -> Entries:
+    """Return what END wrote back: the outputs that differ from what was latched, in their order."""
+    changed = (outputs != latched).T
+    rows, numbers = np.nonzero(changed)
+    offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(rows, minlength=len(changed)))))
+    values = outputs[numbers, rows].astype(np.float64)
+    return Entries(offsets, form.written[numbers], np.zeros(len(rows), np.int64), values)
