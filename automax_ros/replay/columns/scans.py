@@ -39,7 +39,11 @@ class ScanErrors:
 
 @dataclass(frozen=True)
 class ScanColumns:
-    """Scans of one task in the order of the file; ``places`` are those of their messages in the block."""
+    """Scans of one task in the order of the file; ``places`` are those of their messages in the block.
+
+    ``odd`` are those that have to be taken one by one: malformed, not fitting the variables of the rack, with strings
+    or with what came from elsewhere than common memory, or telling of a fault by time.
+    """
 
     places: Ints
     stamps: Ints
@@ -51,6 +55,7 @@ class ScanColumns:
     written: Entries
     committed: Entries
     errors: ScanErrors
+    odd: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.places)
@@ -68,6 +73,7 @@ class ScanColumns:
             self.written.part(begin, end),
             self.committed.part(begin, end),
             self.errors.part(begin, end),
+            self.odd[begin:end],
         )
 
 
@@ -76,22 +82,17 @@ def scans_by_task(
 ) -> tuple[dict[str, ScanColumns], Ints]:
     """Decode the scans at these places of a block, by the names of their tasks.
 
-    Returns too which of the places have to be taken one by one: what is malformed, does not fit the variables of the
-    rack, holds strings or what came from elsewhere than common memory, is no scan of these tasks, or tells of a fault
-    by time.
+    Returns too which of the places hold no scan of these tasks, as far as can be told.
     """
     found: dict[str, ScanColumns] = {}
-    bad: list[Ints] = []
     names = _Names(block, places)
     left = np.ones(len(places), bool)
     for task in tasks:
         chosen = names.of(task)
         left &= ~chosen
         if chosen.any():
-            builder = _Builder(block, places[chosen])
-            found[task] = builder.made()
-            bad.append(builder.places[builder.bad(found[task], rules)])
-    return found, np.sort(np.concatenate([places[left], *bad]))
+            found[task] = _Builder(block, places[chosen]).made(rules)
+    return found, places[left]
 
 
 class _Names:
@@ -133,23 +134,20 @@ class _Builder:
         for row in odd.tolist():
             self._add_one(block, row)
 
-    def bad(self, scans: ScanColumns, rules: ValueRules) -> NDArray[np.bool_]:
-        """Return which scans have to be taken by themselves."""
-        bad = self._bad.copy()
-        for builder in self._entries.values():
-            bad |= builder.bad
-        for entries in (scans.latched, scans.read, scans.written, scans.committed):
-            bad[rules.wrong(entries)] = True
-        timed = np.flatnonzero(np.isin(scans.errors.codes, (OVERLAP, EVENT_TIMEOUT)))
-        bad[np.searchsorted(scans.errors.offsets, timed, side="right") - 1] = True
-        return np.asarray(bad, bool)
-
-    def made(self) -> ScanColumns:
+    def made(self, rules: ValueRules) -> ScanColumns:
         """Return the columns."""
         stamps, scans, durations = self._numbers.values()
-        latched, read, written, committed = (builder.made() for builder in self._entries.values())
+        entries = [builder.made() for builder in self._entries.values()]
+        errors = self._made_errors()
+        odd = self._bad.copy()
+        for builder, made in zip(self._entries.values(), entries, strict=True):
+            odd |= builder.bad
+            odd[rules.wrong(made)] = True
+        timed = np.flatnonzero(np.isin(errors.codes, (OVERLAP, EVENT_TIMEOUT)))
+        odd[np.searchsorted(errors.offsets, timed, side="right") - 1] = True
+        latched, read, written, committed = entries
         return ScanColumns(
-            self.places, stamps, scans, durations, self._full, latched, read, written, committed, self._made_errors()
+            self.places, stamps, scans, durations, self._full, latched, read, written, committed, errors, odd
         )
 
     def _add(self, group: MessageColumns) -> None:

@@ -11,7 +11,7 @@ from automax_ros.bags.reader import BagMessage
 from automax_ros.replay.columns.entries import ValueRules
 from automax_ros.replay.columns.scans import SCAN, ScanColumns, scans_by_task
 from automax_ros.replay.columns.stretch import TaskStretches
-from automax_ros.replay.columns.writes import WRITE, write_columns
+from automax_ros.replay.columns.writes import WRITE, WriteColumns, write_columns
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.task import TaskReplay
 
@@ -66,7 +66,7 @@ class BlockReplay:
         """Take what stands between two messages that have to be taken by themselves."""
         if end - begin < FEWEST_MESSAGES:
             return self._one_by_one(part, range(begin, end))
-        left: list[int] = []
+        left = part.strays_between(begin, end)
         for name in self._tasks:
             scans = part.scans_between(name, begin, end)
             if scans is not None:
@@ -79,20 +79,23 @@ class BlockReplay:
         return self._writes(part, position, end)
 
     def _taken(self, name: str, scans: ScanColumns) -> int:
-        """Take scans of a task by columns, all but the last; return how many."""
+        """Take scans of a task by columns up to the first odd one, and never the last; return how many."""
         counted = scans.stamps >= self._begin
-        alike = counted == counted[0]
-        count = len(scans) if alike.all() else int(np.argmin(alike))
-        return self._stretches[name].take(scans.part(0, min(count, len(scans) - 1)), counted=bool(counted[0]))
+        alike = (counted == counted[0]) & ~scans.odd
+        alike[-1] = False
+        return self._stretches[name].take(scans.part(0, int(np.argmin(alike))), counted=bool(counted[0]))
 
     def _writes(self, part: _BlockPart, begin: int, end: int) -> bool:
         """Take the writes between two places."""
-        writes = part.writes.between(begin, end)
-        if len(writes.places) >= FEWEST_WRITES and not self._looks_at_writes(part):
-            entries = writes.entries
-            if self._commons.take_many(writes.sequences, entries.views, entries.elements, entries.values):
+        return all(self._write_run(part, run) for run in part.writes.between(begin, end).runs())
+
+    def _write_run(self, part: _BlockPart, run: WriteColumns) -> bool:
+        """Take writes that are all good or all not."""
+        if len(run.places) >= FEWEST_WRITES and run.good[0] and not self._looks_at_writes(part):
+            entries = run.entries
+            if self._commons.take_many(run.sequences, entries.views, entries.elements, entries.values):
                 return True
-        return self._one_by_one(part, writes.places.tolist())
+        return self._one_by_one(part, run.places.tolist())
 
     def _looks_at_writes(self, part: _BlockPart) -> bool:
         """Return whether a task has to be told of each write: what others write counts, or scans stand after writes."""
@@ -109,19 +112,24 @@ class _BlockPart:
 
     def __init__(self, block: MessageBlock, names: Collection[str], run_id: int, rules: ValueRules) -> None:
         self.block = block
-        self._scans, self._bad_scans = scans_by_task(block, np.flatnonzero(block.kinds == 0), tuple(names), rules)
-        self.writes, self._bad_writes = write_columns(block, np.flatnonzero(block.kinds == 1), run_id, rules)
+        self._scans, self._strays = scans_by_task(block, np.flatnonzero(block.kinds == 0), tuple(names), rules)
+        self.writes, self._forcing = write_columns(block, np.flatnonzero(block.kinds == 1), run_id, rules)
         self._modeled = {name: bool(scans.durations.any()) for name, scans in self._scans.items()}
 
     def by_themselves(self, end: int | None) -> list[int]:
-        """Return the places of what has to be taken by itself: from a scan beyond ``end`` on that is all."""
-        rare = np.flatnonzero(self.block.kinds > 1)
-        found = [rare, self._bad_scans, self._bad_writes]
+        """Return the places of what parts scans, ascending; from a scan beyond ``end`` on that is all."""
+        found = [np.flatnonzero(self.block.kinds > 1), self._forcing]
         if end is not None:
             beyond = [scans.places[scans.stamps > end] for scans in self._scans.values()]
             first = min((int(places[0]) for places in beyond if len(places)), default=len(self.block))
             found.append(np.arange(first, len(self.block)))
         places: list[int] = np.unique(np.concatenate(found)).tolist()
+        return places
+
+    def strays_between(self, begin: int, end: int) -> list[int]:
+        """Return the places of the scans of no known task."""
+        first, last = np.searchsorted(self._strays, (begin, end)).tolist()
+        places: list[int] = self._strays[first:last].tolist()
         return places
 
     def scans_between(self, name: str, begin: int, end: int) -> ScanColumns | None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from automax_ros.bags.blocks import MessageBlock
 from automax_ros.bags.errors import BagError
@@ -14,51 +17,63 @@ from automax_ros.wire.cdr_columns import Ints, decode_columns
 from automax_ros.wire.messages import NAMES, CommonWrite
 
 WRITE = NAMES[CommonWrite]
+_LIMIT = np.iinfo(np.int64).max
 _FORCING = (int(WriteKind.FORCE), int(WriteKind.RELEASE))
 
 
 @dataclass(frozen=True)
 class WriteColumns:
-    """Writes in the order of the file; ``places`` are those of their messages in the block."""
+    """Writes in the order of the file; ``places`` are those of their messages in the block.
+
+    ``good`` are those that may be taken together: the others have to be taken one by one, since they are malformed, of
+    another run, do not fit the variables of the rack, hold strings or do not follow on the write before.
+    """
 
     places: Ints
     sequences: Ints
     entries: Entries
+    good: NDArray[np.bool_]
 
     def between(self, begin: int, end: int) -> WriteColumns:
         """Return the writes whose places are from ``begin`` up to ``end``."""
         first, last = np.searchsorted(self.places, (begin, end)).tolist()
-        return WriteColumns(self.places[first:last], self.sequences[first:last], self.entries.part(first, last))
+        return self.part(first, last)
+
+    def part(self, begin: int, end: int) -> WriteColumns:
+        """Return the writes from ``begin`` up to ``end``."""
+        entries = self.entries.part(begin, end)
+        return WriteColumns(self.places[begin:end], self.sequences[begin:end], entries, self.good[begin:end])
+
+    def runs(self) -> Iterator[WriteColumns]:
+        """Return the writes in stretches that are all good or all not."""
+        ends = np.flatnonzero(self.good[1:] != self.good[:-1]) + 1
+        bounds = [0, *ends.tolist(), len(self.places)]
+        yield from (self.part(begin, end) for begin, end in pairwise(bounds) if end > begin)
 
 
 def write_columns(block: MessageBlock, places: Ints, run_id: int, rules: ValueRules) -> tuple[WriteColumns, Ints]:
-    """Decode the writes at these places of a block.
-
-    Returns too which of the places have to be taken one by one: what is malformed, of another run, does not fit the
-    variables of the rack, holds strings, tells of a force, or does not follow on the write before it.
-    """
+    """Decode the writes at these places of a block; return too at which of them a force begins or ends."""
     count = len(places)
-    sequences = np.zeros(count, np.int64)
+    sequences, kinds = np.zeros(count, np.int64), np.zeros(count, np.int64)
     builder = EntriesBuilder(count)
     good = np.zeros(count, bool)
     groups, odd = decode_columns(WRITE, block.data, block.starts[places], block.lengths[places])
-    limit = np.iinfo(np.int64).max
     for group in groups:
-        fields = group.fields
-        sequences[group.rows] = fields["sequence"]
+        fields, rows = group.fields, group.rows
+        sequences[rows], kinds[rows] = fields["sequence"], fields["kind"]
+        good[rows] = (fields["run_id"] == np.uint64(run_id)) & (fields["sequence"] < _LIMIT)
         builder.add(group, "values")
-        forcing = np.isin(fields["kind"], _FORCING)
-        good[group.rows] = (fields["run_id"] == np.uint64(run_id)) & ~forcing & (fields["sequence"] < limit)
     for row in odd.tolist():
         write = _decoded(block, int(places[row]))
-        if write is not None and write.run_id == run_id and write.kind not in _FORCING and write.sequence < limit:
-            sequences[row], good[row] = write.sequence, True
+        if write is not None and write.sequence < _LIMIT:
+            sequences[row], kinds[row], good[row] = write.sequence, write.kind, write.run_id == run_id
             builder.add_one(row, write.values)
     entries = builder.made()
-    good &= ~builder.bad
+    forcing = np.isin(kinds, _FORCING)
+    good &= ~(builder.bad | forcing)
     good[rules.wrong(entries)] = False
     good[1:] &= np.diff(sequences) == 1
-    return WriteColumns(places, sequences, rules.typed(entries)), places[~good]
+    return WriteColumns(places, sequences, rules.typed(entries), good), places[forcing]
 
 
 def _decoded(block: MessageBlock, place: int) -> CommonWrite | None:

@@ -1,0 +1,60 @@
+"""How tasks are executed on columns: as machine code where that is wanted and can be had, else in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from automax_ros.compile.compiler import CompiledTask
+from automax_ros.compile.native.executed import BesideLatch
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeOutcome
+from automax_ros.compile.native.task import NativeTask
+from automax_ros.compile.scan_io import StateValues
+from automax_ros.core.types import DataType
+from automax_ros.rack.config import CommonVariable
+from automax_ros.replay.columns.entries import Entries
+from automax_ros.replay.columns.execution import ColumnForm, Executed, PythonColumns
+from automax_ros.running.backplane import Backplane
+from automax_ros.wire.cdr_columns import Ints
+
+
+class ColumnForms:
+    """Makes the forms of the tasks of one recording, each once; ``outcomes`` tell what became of them."""
+
+    def __init__(
+        self, variables: Sequence[CommonVariable], backplane: Backplane, native: NativeForms = IN_PYTHON
+    ) -> None:
+        self._types: list[DataType] = [variable.type for variable in variables]
+        self._backplane, self._native = backplane, native
+        self.outcomes: list[NativeOutcome] = []
+
+    def form(self, compiled: CompiledTask, views: Sequence[int]) -> ColumnForm:
+        """Return the form of a task that latches these views."""
+        outcome = self._native.form(compiled)
+        self.outcomes.append(outcome)
+        if outcome.native is not None:
+            return NativeColumns(outcome.native)
+        return PythonColumns(compiled, views, self._types, self._backplane)
+
+
+class NativeColumns:
+    """A native task on columns."""
+
+    def __init__(self, task: NativeTask) -> None:
+        self._task = task
+
+    def columns(self, state: StateValues, latched: Sequence[Ints], count: int, read: Entries) -> Executed:
+        """Execute scans; see ``ColumnForm``."""
+        actual = BesideLatch(read.offsets, read.views, read.elements, read.values)
+        executed = self._task.columns(state, latched, count, actual)
+        done, written = executed.done, executed.written
+        within = written.scans < done
+        counts = np.bincount(written.scans[within], minlength=done)
+        offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts)))
+        return Executed(
+            done,
+            [np.asarray(column, np.int64) for column in executed.outputs],
+            executed.errors[executed.errors[:, 0] < done],
+            Entries(offsets, written.views[within], written.elements[within], written.values[within]),
+        )
