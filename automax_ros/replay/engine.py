@@ -18,10 +18,13 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.run_facts import RunFacts, run_facts
 from automax_ros.bags.span import require_scans
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeOutcome
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.views import backplane_of
 from automax_ros.replay.columns import BlockReplay
+from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.commons import RecordedCommons
 from automax_ros.replay.compare import Tallies
 from automax_ros.replay.joining import Beginning, Carried, digest
@@ -49,9 +52,10 @@ Watcher = Callable[[TaskReplay, Scan], None]
 class ReplayOptions:
     """What to replay: tasks (``only``, None: all), the range in ns since the start of the run, both ends included.
 
-    Numbers that differ by at most ``tolerance`` count as equal; ``max_differences`` are told in full. ``by_columns``:
-    where scans are uniform, thousands are executed and compared at once; the report is the same either way (decision:
-    an option of the library alone, to prove just that).
+    Numbers that differ by at most ``tolerance`` count as equal; ``max_differences`` are told in full.
+
+    ``by_columns``: where scans are uniform, thousands are executed, as ``native`` says, and compared at once. The
+    report is the same either way, so only the library has this option (decision): the tests prove it.
     """
 
     only: tuple[str, ...] | None = None
@@ -60,6 +64,7 @@ class ReplayOptions:
     to_ns: int | None = None
     max_differences: int = DEFAULT_MAX_DIFFERENCES
     by_columns: bool = True
+    native: NativeForms = IN_PYTHON
 
 
 def replay(
@@ -98,6 +103,13 @@ class Replay:
         self.rack.require_tasks(options.only or ())
         chosen = [name for name in self.rack.task_names if options.only is None or name in options.only]
         self.sources: list[ReplaySource] = self.rack.replay_sources(chosen, new)
+        config = self.rack.config
+        self._forms = ColumnForms(config.variables, backplane_of(config), options.native)
+
+    @property
+    def native(self) -> list[NativeOutcome]:
+        """What became of the tasks that were executed by columns: native ones, and why others are not."""
+        return self._forms.outcomes
 
     @property
     def warnings(self) -> list[tuple[SourceText, list[Diagnostic]]]:
@@ -123,7 +135,7 @@ class Replay:
         doubtful = run.ends_in_doubt()
         if doubtful:
             sources = self.rack.replay_sources([task.name for task in doubtful], {})
-            recorded = Run(self.bag, self.rack, self.facts, sources, options, run.starts, None)
+            recorded = Run(self.bag, self.rack, self.facts, sources, options, run.starts, None, self._forms)
             reader.on_progress = None
             recorded.take_all(reader)
             for task in doubtful:
@@ -136,7 +148,7 @@ class Replay:
 
     def begin(self, starts: Mapping[str, int], options: ReplayOptions, watcher: Watcher | None = None) -> Run:
         """Return a pass over the recording, or over files of it, that has taken nothing yet."""
-        return Run(self.bag, self.rack, self.facts, self.sources, options, starts, watcher)
+        return Run(self.bag, self.rack, self.facts, self.sources, options, starts, watcher, self._forms)
 
     def report(self, totals: Totals, options: ReplayOptions) -> ReplayReport:
         """Return what was found.
@@ -193,9 +205,10 @@ class Run:
         options: ReplayOptions,
         starts: Mapping[str, int],
         watcher: Watcher | None,
+        forms: ColumnForms,
     ) -> None:
         self._bag, self._rack, self._sources, self._options = bag, rack, sources, options
-        self._watcher = watcher
+        self._watcher, self._forms = watcher, forms
         self._start = facts.table.stamp
         self._commons = RecordedCommons(bag, facts, rack.config)
         self._all_tasks = frozenset(rack.task_names)
@@ -222,7 +235,8 @@ class Run:
         if self._watcher is not None or not self._options.by_columns:
             return all(map(self.take, reader.messages(types=_TYPES)))
         names = self._all_tasks
-        blocks = BlockReplay(self._tasks, names, self._commons, self.take, _TYPES, self._begin, self._end)
+        span = self._begin, self._end
+        blocks = BlockReplay(self._tasks, names, self._commons, self.take, _TYPES, span, self._forms)
         return all(self._take_item(blocks, item) for item in message_blocks(reader, blocks.types))
 
     def _take_item(self, blocks: BlockReplay, item: MessageBlock | BagMessage) -> bool:

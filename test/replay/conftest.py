@@ -1,6 +1,5 @@
 """Each replay of these tests runs both ways, by columns and scan by scan: reports and errors are the same."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -18,7 +17,7 @@ def outcome(run, *arguments, **named) -> ReplayReport | tuple[str, str]:
 
 
 @pytest.fixture(autouse=True)
-def both_ways(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Replay.run
 
     def run_both(self, on_progress=None, watcher=None, to_ns=None) -> ReplayReport:
@@ -31,4 +30,3 @@ def both_ways(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         return run(self, on_progress, watcher, to_ns)
 
     monkeypatch.setattr(Replay, "run", run_both)
-    yield

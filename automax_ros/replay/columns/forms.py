@@ -20,19 +20,25 @@ from automax_ros.wire.cdr_columns import Ints
 
 
 class ColumnForms:
-    """Makes the forms of the tasks of one recording, each once; ``outcomes`` tell what became of them."""
+    """Makes the forms of the tasks of one recording, each once."""
 
     def __init__(
         self, variables: Sequence[CommonVariable], backplane: Backplane, native: NativeForms = IN_PYTHON
     ) -> None:
         self._types: list[DataType] = [variable.type for variable in variables]
         self._backplane, self._native = backplane, native
-        self.outcomes: list[NativeOutcome] = []
+        self._made: dict[int, NativeOutcome] = {}
+
+    @property
+    def outcomes(self) -> list[NativeOutcome]:
+        """What became of the tasks."""
+        return list(self._made.values())
 
     def form(self, compiled: CompiledTask, views: Sequence[int]) -> ColumnForm:
         """Return the form of a task that latches these views."""
-        outcome = self._native.form(compiled)
-        self.outcomes.append(outcome)
+        outcome = self._made.get(id(compiled))
+        if outcome is None:
+            outcome = self._made[id(compiled)] = self._native.form(compiled)  # it keeps the task, so the id stays
         if outcome.native is not None:
             return NativeColumns(outcome.native)
         return PythonColumns(compiled, views, self._types, self._backplane)

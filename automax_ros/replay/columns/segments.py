@@ -9,6 +9,7 @@ import numpy as np
 from automax_ros.bags.blocks import MessageBlock
 from automax_ros.bags.reader import BagMessage
 from automax_ros.replay.columns.entries import ValueRules
+from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.scans import SCAN, ScanColumns, scans_by_task
 from automax_ros.replay.columns.stretch import TaskStretches
 from automax_ros.replay.columns.writes import WRITE, WriteColumns, write_columns
@@ -34,17 +35,17 @@ class BlockReplay:
         commons: RecordedCommons,
         take: Callable[[BagMessage], bool],
         types: Collection[str],
-        begin: int,
-        end: int | None,
+        span: tuple[int, int | None],
+        forms: ColumnForms,
     ) -> None:
-        """Prepare for scans of the tasks of these names; only the given ``tasks`` are executed.
+        """Prepare for scans of the tasks of these names; only the given ``tasks`` are executed, in these ``forms``.
 
-        Scans are counted from the stamp ``begin`` on, and of interest up to the stamp ``end``.
+        ``span``: scans are counted from this stamp on, and of interest up to that one.
         """
         self._tasks, self._names, self._commons, self._take = tasks, sorted(names), commons, take
-        self._begin, self._end = begin, end
+        self._begin, self._end = span
         self._rules = ValueRules(commons.rack)
-        self._stretches = {name: TaskStretches(task, commons, self._rules) for name, task in tasks.items()}
+        self._stretches = {name: TaskStretches(task, commons, self._rules, forms) for name, task in tasks.items()}
         self.types = (SCAN, WRITE, *sorted({*types} - {SCAN, WRITE}))
         """The types of messages to read, in the order in which a block numbers them."""
 

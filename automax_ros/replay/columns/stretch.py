@@ -8,7 +8,8 @@ import numpy as np
 
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.replay.columns.entries import Entries, ValueRules, first_other
-from automax_ros.replay.columns.execution import ColumnForm, Executed, PythonColumns
+from automax_ros.replay.columns.execution import ColumnForm, Executed
+from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.latched import LatchedColumns
 from automax_ros.replay.columns.scans import ScanColumns
 from automax_ros.replay.commons import RecordedCommons
@@ -42,8 +43,9 @@ class TaskStretches:
     What is doubtful counts as different: the path scan by scan decides it.
     """
 
-    def __init__(self, replay: TaskReplay, commons: RecordedCommons, rules: ValueRules) -> None:
+    def __init__(self, replay: TaskReplay, commons: RecordedCommons, rules: ValueRules, forms: ColumnForms) -> None:
         self._replay, self._commons, self._rules = replay, commons, rules
+        self._forms = forms
         self._form: _Form | None = None
 
     def take(self, scans: ScanColumns, *, counted: bool) -> int:
@@ -82,14 +84,13 @@ class TaskStretches:
         """Return how the task is executed: it may have been reloaded."""
         task = self._replay.task
         if self._form is None or self._form.task.compiled is not task.compiled or self._form.task is not task:
-            compiled, commons = task.compiled, self._commons
+            compiled = task.compiled
             views = [task.memory.view(name) for name in compiled.latched]
             places = {name: place for place, name in enumerate(compiled.latched)}
-            types = [variable.type for variable in commons.rack]
             self._form = _Form(
                 task,
-                PythonColumns(compiled, views, types, commons.backplane),
-                LatchedColumns(views, len(types)),
+                self._forms.form(compiled, views),
+                LatchedColumns(views, self._rules.count),
                 np.array([task.memory.view(name) for name in compiled.written], np.int64),
                 np.array([places[name] for name in compiled.written], np.int64),
                 tuple(type_of_name(name) is DataType.BOOLEAN for name in compiled.latched),
@@ -111,6 +112,8 @@ class TaskStretches:
     def _same(self, scans: ScanColumns, executed: Executed, latched: Ints, form: _Form) -> int:
         """Return how many scans did what was recorded."""
         done = executed.done
+        if not done:
+            return 0
         scans = scans.part(0, done)
         committed = _commits(np.array(executed.outputs, np.int64).reshape(-1, done), latched[form.places, :done], form)
         return min(
