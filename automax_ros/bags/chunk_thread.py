@@ -26,7 +26,7 @@ class ChunkThread:
 
     def __init__(self) -> None:
         """Begin without a thread."""
-        self._thread: threading.Thread | None = None
+        self._worker: threading.Thread | None = None
         self._calls: SimpleQueue[bool] = SimpleQueue()
         self._jobs: deque[_Job] = deque()
         """The job under way, or none."""
@@ -40,7 +40,7 @@ class ChunkThread:
         Raises:
             Exception: what a job before has raised; this one is not carried out.
         """
-        if self._thread is None:
+        if self._worker is None:
             self._begin()
         self.settle()
         self._taken.acquire(blocking=False)
@@ -67,15 +67,15 @@ class ChunkThread:
 
     def end(self) -> None:
         """Let the thread end after the job under way."""
-        if self._thread is not None:
+        if self._worker is not None:
             self._calls.put(False)
-            self._thread.join()
-            self._thread = None
+            self._worker.join()
+            self._worker = None
 
     def _begin(self) -> None:
         arguments = self._calls, self._jobs, self._taken, self._done, self._failed
-        self._thread = threading.Thread(target=_work, args=arguments, name="recording", daemon=True)
-        self._thread.start()
+        self._worker = threading.Thread(target=_work, args=arguments, name="recording", daemon=True)
+        self._worker.start()
         weakref.finalize(self, self._calls.put, False)
 
 

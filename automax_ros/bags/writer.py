@@ -121,7 +121,7 @@ class BagWriter:
         """Time of the message before; None when the next one has to be looked at closely."""
         self._chunk_end = 0
         self._open = True
-        self._thread = ChunkThread()
+        self._chunks = ChunkThread()
         self._sync_error: OSError | None = None
         self._finished: list[Path] = []
         """Files, and the folder with their names, that ``sync`` has not yet seen to the disk."""
@@ -205,7 +205,7 @@ class BagWriter:
         )
         self._attachments = [*(item for item in self._attachments if item.name != name), attachment]
         try:
-            self._thread.settle()
+            self._chunks.settle()
             self._mcap.add_attachment(attachment)
         except OSError as error:
             raise self._failed(error) from error
@@ -237,7 +237,7 @@ class BagWriter:
         Raises:
             RecordingError: the disk refuses.
         """
-        if self._open and (now is None or now >= self._chunk_end or self._thread.failed):
+        if self._open and (now is None or now >= self._chunk_end or self._chunks.failed):
             self._flush(wait=now is None)
 
     def sync(self) -> None:
@@ -246,7 +246,7 @@ class BagWriter:
         When the disk refuses, the next ``write``, ``close`` or ``require_synced`` tells.
         """
         try:
-            self._thread.settle()
+            self._chunks.settle()
             while self._finished:
                 sync_path(self._finished.pop())
             self._file.sync()
@@ -273,7 +273,7 @@ class BagWriter:
         self._open, self._stamp = False, None
         try:
             self._finish_file()
-            self._thread.end()
+            self._chunks.end()
             text = yaml_text({"rosbag2_bagfile_information": self._metadata(self._files).information()})
             (self.folder / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
             self._finished += [self.folder / METADATA_FILE, self.folder]
@@ -347,10 +347,10 @@ class BagWriter:
     def _end_chunk(self, *, wait: bool) -> None:
         """Let the open chunk be written; ``wait`` until it is: then the file may be asked for its size, or written."""
         if self._chunk.index:
-            self._thread.hand(partial(self._mcap.add_chunk, self._chunk))
+            self._chunks.hand(partial(self._mcap.add_chunk, self._chunk))
             self._chunk = ChunkBuilder()
-        if wait or self._thread.failed:
-            self._thread.settle()
+        if wait or self._chunks.failed:
+            self._chunks.settle()
 
     def _metadata(self, files: list[FileSummary]) -> BagMetadata:
         """Describe the whole recording, or its last file alone."""
@@ -384,7 +384,7 @@ class BagWriter:
 
     def _failed(self, error: OSError) -> RecordingError:
         self._open, self._stamp = False, None
-        self._thread.end()
+        self._chunks.end()
         with contextlib.suppress(OSError):
             self._file.close()
         kept = "what was recorded so far is kept, `automax bag repair` makes a whole recording of it"
