@@ -7,7 +7,6 @@ process loses the open chunk and one under way, order and bytes are those of one
 from __future__ import annotations
 
 import threading
-import weakref
 from collections import deque
 from collections.abc import Callable
 from queue import SimpleQueue
@@ -33,6 +32,10 @@ class ChunkThread:
         self._taken, self._done = threading.Lock(), threading.Lock()
         """Free when the job was taken over, and when it is done."""
         self._failed: list[Exception] = []
+
+    def __del__(self) -> None:
+        """Let the thread end."""
+        self._calls.put(False)
 
     def hand(self, job: _Job) -> None:
         """Let a job be carried out once the one before is; a quick job may be done when this returns.
@@ -76,7 +79,6 @@ class ChunkThread:
         arguments = self._calls, self._jobs, self._taken, self._done, self._failed
         self._worker = threading.Thread(target=_work, args=arguments, name="recording", daemon=True)
         self._worker.start()
-        weakref.finalize(self, self._calls.put, False)
 
 
 def _work(
