@@ -5,6 +5,10 @@ Prints, fails on none.
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -26,7 +30,9 @@ from automax_ros.sweep.sweeping import run_sweep
 from automax_ros.wire.stream import RackStream
 
 CONFIG = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
-SECONDS = 60
+SECONDS, LONG_SECONDS = 60, 300
+PLAIN = "--plain"
+"""The argument with which this runs itself for the figures of plain Python."""
 REPEATS = 3
 SWEEP_RUNS, SWEEP_SECONDS, MORE = 30, 2, 40
 
@@ -77,11 +83,44 @@ def taken(work: Callable[[], object]) -> float:
     return time.perf_counter() - began
 
 
+def recorded_and_not(config: RackConfig, seconds: float) -> tuple[float, float]:
+    """Return the wall times of a run with recording and of one without, s: each the best of several, in turn."""
+    with tempfile.TemporaryDirectory() as temporary:
+        pairs = [
+            (run(config, Path(temporary) / f"bag{number}", seconds), run(config, None, seconds))
+            for number in range(REPEATS)
+        ]
+    return min(pair[0] for pair in pairs), min(pair[1] for pair in pairs)
+
+
+def forms(config: RackConfig) -> None:
+    """Print what a long recording costs in the form that runs here, and in plain Python in a process of its own."""
+    plain = json.loads(
+        subprocess.run(
+            [sys.executable, __file__, PLAIN],
+            env={**os.environ, "AUTOMAX_COMPILED": "off"},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+    )
+    here = recorded_and_not(config, LONG_SECONDS)
+    for word, (recorded, bare) in (("as installed", here), ("plain Python", plain)):
+        print(
+            f"{LONG_SECONDS} s, {word:12} {LONG_SECONDS / recorded:7.0f} x real time with recording, "
+            f"{LONG_SECONDS / bare:5.0f} without; {recorded / bare:.1f} times as long"
+        )
+    print(f"as installed over plain Python, with recording: {plain[0] / here[0]:.2f} times as fast; wanted: 1000 x")
+
+
 def main() -> None:
     """Print the figures."""
     config = load(CONFIG).config
     if config is None:
         raise SystemExit(f"{CONFIG} has errors: automax check {CONFIG}")
+    if PLAIN in sys.argv[1:]:
+        print(json.dumps(recorded_and_not(config, LONG_SECONDS)))
+        return
     began = time.perf_counter()
     rate = scans_per_second(Rack(config))
     print(f"example rack: {rate:.0f} scans per second, compiled in {time.perf_counter() - began:.2f} s")
@@ -97,6 +136,7 @@ def main() -> None:
     print(f"modeled execution  {SECONDS / modeled:7.0f} x real time, {scan_us:6.1f} us per scan; ", end="")
     print(f"{modeled / plain:.2f} times as long as ideal; wanted: at most 3")
     print(f"bag: {size / 1e6:.2f} MB, {size / SECONDS / rate:.0f} bytes per scan")
+    forms(config)
     sweeps(config)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
 
 import lz4.frame
 import zstandard
@@ -38,10 +38,10 @@ RECORD_HEAD = struct.Struct("<BQ")
 """Opcode and length of every record."""
 MESSAGE_FIELDS = struct.Struct("<HIQQ")
 """Channel, sequence, log time and publish time: what a message begins with."""
-_pack_message = struct.Struct("<BQHIQQ").pack
-_FIELDS = MESSAGE_FIELDS.size
-_FRAME = _FIELDS + RECORD_HEAD.size
-_MESSAGE_CODE = int(Opcode.MESSAGE)
+_pack_message: Final = struct.Struct("<BQHIQQ").pack
+_FIELDS: Final = MESSAGE_FIELDS.size
+_FRAME: Final = _FIELDS + RECORD_HEAD.size
+_MESSAGE_CODE: Final = int(Opcode.MESSAGE)
 """A plain number: packing a member of an enumeration takes longer than all the rest."""
 _INDEX_HEAD = struct.Struct("<BQHI")
 _INDEX_BYTES = 16

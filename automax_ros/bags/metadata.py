@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import yaml
+
+from automax_ros.wire.qos import QosProfile
 
 VERSION = 9
 ROS_DISTRO = "jazzy"
@@ -93,6 +96,12 @@ class BagMetadata:
 def data_file_name(number: int) -> str:
     """Return the name of a data file by its number from 0."""
     return f"scans_{number}.mcap"
+
+
+@cache
+def qos_text(qos: QosProfile) -> str:
+    """Return the ``offered_qos_profiles`` of a channel with one profile."""
+    return yaml_text([qos.as_yaml_data()])
 
 
 def yaml_text(data: object) -> str:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
+from typing import Final
 
 from mcap.records import Attachment, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
@@ -23,14 +24,22 @@ from automax_ros.bags.chunk_thread import ChunkThread
 from automax_ros.bags.data_file import DataFile, sync_path
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.mcap_output import ChunkBuilder, McapOutput
-from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary, data_file_name, yaml_text
+from automax_ros.bags.metadata import (
+    METADATA_FILE,
+    BagMetadata,
+    FileSummary,
+    TopicSummary,
+    data_file_name,
+    qos_text,
+    yaml_text,
+)
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.definitions import message_types, schema_text
 from automax_ros.wire.qos import QosProfile
 
-CHUNK_BYTES = 1 << 20
+CHUNK_BYTES: Final = 1 << 20
 """A chunk ends before the next instant when it holds more bytes than this, uncompressed."""
-LONGEST_CHUNK_BYTES = 24 << 20
+LONGEST_CHUNK_BYTES: Final = 24 << 20
 """A chunk of more bytes than this ends even inside an instant, so that every reader takes it."""
 CHUNK_NS = NS_PER_S // 2
 """A chunk ends with each of these times of the messages, ns (decision: one is open and one is being written, so a
@@ -162,7 +171,7 @@ class BagWriter:
         if schema is None:
             schema = self._schemas[type_name] = len(self._schemas) + 1
             self._define(Schema(id=schema, data=schema_text(type_name).encode(), encoding="ros2msg", name=type_name))
-        metadata = {"offered_qos_profiles": yaml_text([qos.as_yaml_data()]), "topic_type_hash": kind.hash}
+        metadata = {"offered_qos_profiles": qos_text(qos), "topic_type_hash": kind.hash}
         number = len(self._channels) + 1
         self._define(ChannelRecord(id=number, topic=topic, message_encoding="cdr", metadata=metadata, schema_id=schema))
         channel = self._channels[topic] = Channel(number, topic, type_name, qos)
@@ -323,8 +332,10 @@ class BagWriter:
         """End the chunk before a message at another time than the one before, if its time is over or it is full."""
         if not self._open or not 0 <= stamp <= MAX_STAMP:
             raise self._bad_message(channel, stamp, payload)
-        self.require_synced()
-        time = max(stamp, self._last_time + 1)
+        if self._sync_error is not None:
+            raise self._failed(self._sync_error)
+        time = self._last_time + 1
+        time = max(time, stamp)
         if time >= self._chunk_end or self._chunk.size > CHUNK_BYTES:
             self._flush(wait=self._options.split_bytes > 0)
             period = self._options.chunk_ns
@@ -355,20 +366,13 @@ class BagWriter:
     def _metadata(self, files: list[FileSummary]) -> BagMetadata:
         """Describe the whole recording, or its last file alone."""
         before = self._counts_before if len(files) < len(self._files) else {}
-        return BagMetadata(
-            files=files,
-            topics=[
-                TopicSummary(
-                    item.topic,
-                    item.type_name,
-                    message_types()[item.type_name].hash,
-                    [item.qos.as_yaml_data()],
-                    item.message_count - before.get(item.topic, 0),
-                )
-                for item in self._channels.values()
-            ],
-            custom_data=self.custom_data,
-        )
+        counts = {item: item.message_count - before.get(item.topic, 0) for item in self._channels.values()}
+        kinds = message_types()
+        topics = [
+            TopicSummary(item.topic, item.type_name, kinds[item.type_name].hash, [item.qos.as_yaml_data()], count)
+            for item, count in counts.items()
+        ]
+        return BagMetadata(files, topics, self.custom_data)
 
     def _bad_message(self, channel: Channel, stamp: int, payload: bytes) -> RecordingError:
         if not self._open:

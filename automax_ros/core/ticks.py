@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Final
 
 from automax_ros.core.text import quoted
 from automax_ros.core.values import is_number
 
 NS_PER_US = 1_000
 NS_PER_MS = 1_000_000
-NS_PER_S = 1_000_000_000
+NS_PER_S: Final = 1_000_000_000
 
 TICK_STEP_NS = NS_PER_MS // 2
 MIN_TICK_NS = NS_PER_MS // 2

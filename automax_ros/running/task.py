@@ -52,8 +52,7 @@ class Task:
     ) -> None:
         """Install the task: its state is as at installation (2.4.5)."""
         self.memory = memory
-        self.writer = writer
-        self.slot, self.priority = slot, priority
+        self.writer, self.slot, self.priority = writer, slot, priority
         self.backplane = backplane
         self.events = Events() if events is None else events
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
@@ -134,7 +133,9 @@ class Task:
         if self.status is not _RUNNING:
             return None
         self.scan_number += 1
-        record = self._begin_record(now_ns, skipped, self._io) if self._recording else None
+        record, noting = None, self._noting
+        if noting is not None:
+            noting.record = record = ScanRecord(now_ns, self.scan_number, skipped)
         self.memory.now_ns = now_ns
         if self._scans is None:
             self.heed_forces()
@@ -176,8 +177,7 @@ class Task:
         if self.status is not Status.RUNNING:
             return None
         self.heed_forces()
-        if self._scans is not None:
-            self._put_down()
+        self._put_down()
         self._heard.begin()
         self._under_way = scan = ScanUnderWay(now_ns, skipped, self._state[:], None, self._heard)
         if self._arrays:
@@ -383,6 +383,7 @@ class Task:
     def _bind(self) -> None:
         """Bind what scans touch: memory itself, or for modeled scans what is noted meanwhile."""
         self._io, self._heard_io = self._make_io(self.memory, at_once), self._make_io(self._heard, self._heard.hear)
+        self._noting = self._io if isinstance(self._io, RecordingIo) else None
 
     def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
         return RecordingIo(self, memory, hear) if self._recording else TaskIo(self, memory, hear)
@@ -395,6 +396,5 @@ class Task:
         return io.record
 
     def _too_long(self, error: ScanTooLong) -> None:
-        io = self._io if self._under_way is None else self._heard_io
-        io.log(error.line, SCAN_TOO_LONG)
+        (self._io if self._under_way is None else self._heard_io).log(error.line, SCAN_TOO_LONG)
         self.status = Status.FAULTED

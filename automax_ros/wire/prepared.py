@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr import Message
@@ -18,15 +18,19 @@ from automax_ros.wire.definitions import TIME, Field, message_types
 from automax_ros.wire.messages import NAMES
 
 
-class Prepared(NamedTuple):
+class Prepared:
     """What packs messages that are like one but for some fields.
 
     ``pack`` takes the first of ``constants``, the numbers of the first group that varies, the second constant, those of
     the second group, and so on to the last constant. A time counts as two numbers: seconds and nanoseconds.
     """
 
-    pack: Callable[..., bytes]
-    constants: tuple[bytes, ...]
+    # Not a tuple with names: compiled code gets at the attributes of a class of its own at once.
+    __slots__ = ("constants", "pack")
+
+    def __init__(self, pack: Callable[..., bytes], constants: tuple[bytes, ...]) -> None:
+        self.pack = pack
+        self.constants = constants
 
 
 class _Builder:

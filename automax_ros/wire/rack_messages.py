@@ -14,7 +14,7 @@ from automax_ros.rack.observers import Operation as Done
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.ros_names import topic_names
 from automax_ros.rack.writers import PRESET_WRITER
-from automax_ros.running.task import ScanRecord, Task
+from automax_ros.running.task import Task
 from automax_ros.running.views import WriteGroup
 from automax_ros.wire.cdr import CdrError, encoder
 from automax_ros.wire.messages import (
@@ -141,10 +141,12 @@ class RackMessages:
         self._text_positions = [position for position, entry in enumerate(image) if isinstance(entry[2], str)]
         self._tasks = {task: TaskMessages(task) for task in rack.tasks}
 
-    def reinstalled(self, task: Task) -> None:
-        """Describe a task again if it executes another program than before."""
-        if task.compiled is not self._tasks[task].compiled:
-            self._tasks[task] = TaskMessages(task)
+    def of(self, task: Task) -> TaskMessages:
+        """Return what makes the messages of a task: another one if it executes another program than before."""
+        known = self._tasks[task]
+        if task.compiled is not known.compiled:
+            self._tasks[task] = known = TaskMessages(task)
+        return known
 
     def stamp(self, now_ns: int) -> int:
         """Return the stamp of an instant of rack time."""
@@ -205,10 +207,6 @@ class RackMessages:
         """
         return self._write_log.packed(groups, self.epoch_ns, self.run_id)
 
-    def scan_bytes(self, task: Task, record: ScanRecord, *, full: bool) -> bytes:
-        """Return the message of a scan; unless ``full``, only what was newly latched since the task's last message."""
-        return self._tasks[task].scan_bytes(record, self.epoch_ns + record.time_ns, full=full)
-
     def operation(self, operation: Done) -> Operation:
         """Return what was done to the rack."""
         return Operation(
@@ -220,7 +218,3 @@ class RackMessages:
             operation.reason,
             operation.detail,
         )
-
-    def state_bytes(self, task: Task, now_ns: int) -> bytes:
-        """Return the message of a snapshot of a task's state."""
-        return self._tasks[task].state_bytes(self.stamp(now_ns))

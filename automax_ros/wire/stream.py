@@ -23,6 +23,7 @@ from automax_ros.wire.cdr import Message, encode
 from automax_ros.wire.plant_stream import PlantStream
 from automax_ros.wire.qos import LATCHED, OPERATION, SCAN, VALUE
 from automax_ros.wire.rack_messages import RackMessages, topic_type_name, value_encoder
+from automax_ros.wire.task_messages import TaskMessages
 from automax_ros.wire.topics import Sink, Take, Takes, Topic
 
 SNAPSHOT_PERIOD_NS = 10 * NS_PER_S
@@ -47,7 +48,8 @@ class _ValueTopic:
 class _TaskStream:
     """What takes the scans of one task, its states, and of these a state after each scan."""
 
-    def __init__(self) -> None:
+    def __init__(self, messages: TaskMessages) -> None:
+        self.messages = messages
         self.scans: list[Take] = []
         self.states: list[Take] = []
         self.each_state: list[Take] = []
@@ -82,10 +84,10 @@ class RackStream:
         self._images: list[Take] = []
         self._writes: list[Take] = []
         self._operations: list[Take] = []
-        self._tasks = {task: _TaskStream() for task in rack.tasks}
+        self._tasks = {task: _TaskStream(self._messages.of(task)) for task in rack.tasks}
         self._next_image_ns = SNAPSHOT_PERIOD_NS
         self._begun = False
-        self._present = rack.memory.present
+        self._present, self._scheduler = rack.memory.present, rack.scheduler
 
     @property
     def has_begun(self) -> bool:
@@ -157,8 +159,8 @@ class RackStream:
         ``epoch_ns`` is the wall clock at rack time 0; simulated time has none.
         """
         self._messages.epoch_ns = epoch_ns
-        for task in self._tasks:
-            self._messages.reinstalled(task)
+        for task, stream in self._tasks.items():
+            stream.messages = self._messages.of(task)
         _send(self._messages.table(), self._tables, self._messages.stamp(self._rack.now_ns))
         self._send_image(self._rack.now_ns)
         self._send_values(self._values, self._rack.now_ns)
@@ -214,14 +216,15 @@ class RackStream:
     def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
         """Send a scan, its writes and the values that changed; every now and then a snapshot after them."""
         stream = self._tasks[task]
-        now = max(record.time_ns, self._rack.now_ns)  # a modeled scan is told when it has ended
+        now = max(record.time_ns, self._scheduler.now_ns)  # a modeled scan is told when it has ended
         full = now >= stream.next_full_ns and record.scan > 0
         own = 0 if not writes or writes[0].writer == task.writer else own_from(writes, task.writer)
         if own:
             self._send_log(writes[:own])
         if stream.scans:
-            payload = self._messages.scan_bytes(task, record, full=full)
-            stamp = self._messages.stamp(writes[own].time_ns) if own < len(writes) else self._messages.stamp(now)
+            epoch_ns = self._messages.epoch_ns
+            payload = stream.messages.scan_bytes(record, epoch_ns + record.time_ns, full=full)
+            stamp = epoch_ns + (writes[own].time_ns if own < len(writes) else now)
             for take in stream.scans:
                 take(stamp, payload)
         if writes:
@@ -251,7 +254,7 @@ class RackStream:
         _send(self._messages.operation(operation), self._operations)
         for task in self._rack.tasks:
             if operation.ok and operation.concerns(task.name):
-                self._messages.reinstalled(task)
+                self._tasks[task].messages = self._messages.of(task)
                 self._send_state(task, operation.at_ns)
 
     def _value_topics(self, space: str) -> dict[int, _ValueTopic]:
@@ -269,7 +272,8 @@ class RackStream:
         if takes is None:
             takes, stream.held = stream.states, task.held
         if takes:
-            payload, stamp = self._messages.state_bytes(task, now_ns), self._messages.stamp(now_ns)
+            stamp = self._messages.stamp(now_ns)
+            payload = stream.messages.state_bytes(stamp)
             for take in takes:
                 take(stamp, payload)
 

@@ -10,6 +10,7 @@ import struct
 from collections.abc import Sequence
 from itertools import compress
 from operator import ne
+from typing import Final
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Latched, Value
@@ -23,7 +24,7 @@ from automax_ros.wire.values import NO_VALUES, Values, as_values, values_of
 
 _new = tuple.__new__
 """Makes a message of a tuple of all its fields: the class itself takes three times as long, and a rack makes many."""
-_MOST = 0xFFFFFFFF
+_MOST: Final = 0xFFFFFFFF
 """The greatest uint32."""
 _HEAD = ("scan", "duration_ns", "skipped")
 _VALUES = (("latched.value",), ("read.value",), ("written.value",), ("committed.value",))
@@ -79,9 +80,9 @@ class TaskMessages:
         if quiet is None:
             message = self._scan(record, stamp, NO_VALUES, full=False)
             self._quiet = quiet = prepared(message, ("stamp",), _HEAD)
-        seconds, rest = divmod(stamp, NS_PER_S)
+        seconds, rest = stamp // NS_PER_S, stamp % NS_PER_S
         first, second, third = quiet.constants
-        duration, skipped = min(record.duration_ns, _MOST), min(record.skipped, _MOST)
+        duration, skipped = _fitting(record.duration_ns), _fitting(record.skipped)
         try:
             return quiet.pack(first, seconds, rest, second, record.scan, duration, skipped, third)
         except struct.error as error:
@@ -116,7 +117,7 @@ class TaskMessages:
         alike = self._alike_states
         if alike is None:
             self._alike_states = alike = prepared(self.state(stamp), ("stamp",), ("scan",), ("value",))
-        seconds, rest = divmod(stamp, NS_PER_S)
+        seconds, rest = stamp // NS_PER_S, stamp % NS_PER_S
         first, second, third, last = alike.constants
         try:
             return alike.pack(first, seconds, rest, second, self._task.scan_number, third, *values, last)
@@ -136,9 +137,9 @@ class TaskMessages:
             if not (message.latched.text or message.read.text or message.written.text or message.committed.text):
                 self._scans.learn(key, lambda: prepared(message, ("stamp",), _HEAD, *_VALUES))
             return self._encode_scan(message)
-        seconds, rest = divmod(stamp, NS_PER_S)
+        seconds, rest = stamp // NS_PER_S, stamp % NS_PER_S
         constants = pattern.constants
-        duration, skipped = min(record.duration_ns, _MOST), min(record.skipped, _MOST)
+        duration, skipped = _fitting(record.duration_ns), _fitting(record.skipped)
         try:
             return pattern.pack(
                 constants[0],
@@ -172,8 +173,8 @@ class TaskMessages:
             self._task.slot,
             self._task.name,
             record.scan,
-            min(record.duration_ns, _MOST),
-            min(record.skipped, _MOST),
+            _fitting(record.duration_ns),
+            _fitting(record.skipped),
             full,
             changed,
             values_of(record.reads),
@@ -182,6 +183,11 @@ class TaskMessages:
             [ScanError(line, code) for line, code in record.errors] if record.errors else (),
         )
         return _new(Scan, fields)
+
+
+def _fitting(number: int) -> int:
+    """Return a number as a uint32 holds it."""
+    return number if number <= _MOST else _MOST
 
 
 def accesses(entries: Sequence[tuple[int, int, Value]]) -> Entries:

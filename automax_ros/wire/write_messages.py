@@ -70,7 +70,7 @@ class WriteMessages:
                 self._patterns.learn(key, lambda: prepared(message, ("stamp",), ("sequence",), ("values.value",)))
             return self._encode(message)
         self.sequence += 1
-        seconds, rest = divmod(stamp, NS_PER_S)
+        seconds, rest = stamp // NS_PER_S, stamp % NS_PER_S
         first, second, third, last = pattern.constants
         try:
             return pattern.pack(first, seconds, rest, second, self.sequence, third, *values, last)
