@@ -17,7 +17,7 @@ from automax_ros.drive.events import ROUTINE, EventKind
 from automax_ros.drive.meter import EnergyMeter
 from automax_ros.drive.motor import Machine
 from automax_ros.drive.network import ARMATURE_SHORT, CROSS_FIRE, LINE_SHORT, Impedances, Network, Phases
-from automax_ros.drive.scr import BIT, RAIL_MASKS, numbers_of, rail_of
+from automax_ros.drive.scr import BIT, MASK, NUMBER, RAIL_MASKS, numbers_of
 from automax_ros.drive.search import next_ending, next_turn_on
 from automax_ros.drive.state import Stateful
 from automax_ros.drive.waves import Piece, RawPiece
@@ -290,7 +290,7 @@ class Conduction(Stateful):
 
     def _note_turn_on(self, on: int, now_ns: float, t: float) -> None:
         bridge = self.bridge
-        for number in numbers_of(on):
+        for number in numbers_of(on) if on & (on - 1) else (NUMBER[on.bit_length() - 1],):
             bit = BIT[number]
             self._newest[bit >> 1 & 1] = number
             bridge.on_ns[bit] = now_ns
@@ -300,10 +300,13 @@ class Conduction(Stateful):
                 self._emit(EventKind.COMMUTATION_FAILURE, t, number)
 
     def _note_failed_commutation(self, out: int, left: int, t: float) -> None:
-        for number in numbers_of(out & 0xFFF):
-            rail = rail_of(number)
-            if self._newest[rail] == number and left & RAIL_MASKS[rail]:
-                self._emit(EventKind.COMMUTATION_FAILURE, t, number)
+        one, two = self._newest
+        failed_p = one and MASK[one] & out and left & RAIL_MASKS[0]
+        failed_m = two and MASK[two] & out and left & RAIL_MASKS[1]
+        if failed_p or failed_m:
+            for number in sorted((one if failed_p else 0, two if failed_m else 0)):
+                if number:
+                    self._emit(EventKind.COMMUTATION_FAILURE, t, number)
 
     def _note_switch(self, old: Network, net: Network, gone: int, t: float) -> None:
         for alarm, kind in _ALARMS:
