@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.cli.native import add_native_arguments, native_forms, tell_native
 from automax_ros.cli.numbers import option_number, whole_number
 from automax_ros.cli.output_files import require_different_files, require_picture_file
 from automax_ros.cli.places import add_where_arguments, where_of
@@ -34,6 +35,8 @@ from automax_ros.replay.stored_rack import SourceRefused
 _TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
 
 
+_NS_A_BYTE = 20_000
+"""How much time a byte of a recording stands for, about: 50 kB are a second of an example rack (decision)."""
 _MOST_COUNTS = 1e19
 """No two values of a variable lie further apart."""
 
@@ -60,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_window_arguments(parser)
     add_where_arguments(parser, "replay the files of a split recording")
+    add_native_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print the report for programs to read")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the first difference (needs matplotlib)")
     parser.add_argument(
@@ -104,6 +108,8 @@ def _replayed(replay: Replay, where: Where, arguments: argparse.Namespace) -> Re
         print_diagnostics(diagnostics, source, sys.stderr)
     with share_shown("replay") as show:
         report = replay_side_by_side(replay, where, show)
+    if arguments.verbose:
+        tell_native(replay.native)
     if arguments.json:
         print(json.dumps(report.as_json(), indent=2, allow_nan=False))
     else:
@@ -135,7 +141,14 @@ def _options(arguments: argparse.Namespace) -> ReplayOptions:
         window.start_ns,
         window.end_ns,
         arguments.max_differences,
+        native=native_forms(arguments, _expected_ns(arguments.bag)),
     )
+
+
+def _expected_ns(bag: Path) -> int:
+    """Return about how long a recording is, by its size; 0 for one that cannot be read."""
+    files = list(bag.glob("*.mcap")) if bag.is_dir() else [bag]
+    return sum(file.stat().st_size for file in files if file.is_file()) * _NS_A_BYTE
 
 
 def _task_files(texts: list[str]) -> dict[str, Path]:

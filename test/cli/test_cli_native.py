@@ -58,6 +58,8 @@ def test_recordings_are_the_same_to_the_byte(automax, rack, seconds, stimuli, na
     assert "in Python: native scans are off" in said
     found, said = recording(automax, config, "on", *options)
     assert found == expected
+    for mode in ("off", "on"):
+        assert automax("replay", f"bag_{mode}", "--native", "on").code == 0
     assert {line.partition(":")[0] for line in said.splitlines() if line.endswith(": native")} >= native
 
 
@@ -66,6 +68,15 @@ def test_modeled_time_has_no_native_scans(automax):
     options = ["--simulated", "--duration", "0.01", "--native", "on", "--verbose"]
     said = automax("run", "web_line/rack.yaml", *options).err
     assert "LINE: in Python: scans in modeled time are executed in steps\n" in said
+
+
+def test_replays_say_what_is_native(automax):
+    config = CONFIG / "section_drive" / "rack.yaml"
+    recording(automax, config, "off", "--duration", "1")
+    result = automax("replay", "bag_off", "--native", "on", "--verbose")
+    assert result.code == 0
+    assert "MOTOR: native\n" in result.err
+    assert result.out == automax("replay", "bag_off", "--native", "off").out
 
 
 def test_traces_are_the_same(automax):
