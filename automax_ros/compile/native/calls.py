@@ -45,6 +45,8 @@ def called(frame: Frame, function: object, node: ast.Call, known: Environment) -
     Raises:
         NotNative: it cannot be translated.
     """
+    if function is functions.data_value:
+        return _data_value(frame, node, known)
     arguments = [frame.value(argument, known) for argument in node.args]
     try:
         carry_out = _BUILTINS.get(function)
@@ -218,6 +220,17 @@ def _stored_real(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     # not a number becomes 0
     result = Range(Kind.REAL, min(0.0, stored[0]), max(0.0, stored[1]))
     return _delivered(frame, "stored_real", [bare(item.text)], [result, ANY_BOOL], can_end=False)
+
+
+def _data_value(frame: Frame, node: ast.Call, known: Environment) -> list[Typed]:
+    """Return READ of a DATA value: what each would give in a variable of the type is known."""
+    item, suffix, limit = node.args
+    data = frame.scope["data"]
+    if not (isinstance(item, ast.Subscript) and isinstance(suffix, ast.Constant) and isinstance(data, tuple)):
+        raise NotNative("READ")
+    length = limit.value if isinstance(limit, ast.Constant) and isinstance(limit.value, int) else 0
+    read = [functions.data_value(value, str(suffix.value), length) for value in data]
+    return [frame.constants([result[place] for result in read], item.slice, known) for place in (0, 1)]
 
 
 def _integer_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:

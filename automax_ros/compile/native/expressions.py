@@ -277,7 +277,9 @@ def _branch(item: Typed) -> str:
 
 def _subscript(frame: Context, node: ast.Subscript, known: Environment) -> Typed:
     if isinstance(node.value, ast.Tuple):
-        return frame.constants([item.value for item in node.value.elts if isinstance(item, ast.Constant)], node, known)
+        return frame.constants(
+            [item.value for item in node.value.elts if isinstance(item, ast.Constant)], node.slice, known
+        )
     if not isinstance(node.value, ast.Name):
         raise NotNative("an element of what has no name")
     return frame.element(node.value.id, node.slice, known)

@@ -24,6 +24,8 @@ class Array:
     size: int
 
 
+_PINNED_FROM, _PINNED = 2**33, 2**40
+"""A block's integer whose range goes on growing past the first is taken to stay within the second, and checked."""
 Member = Callable[["Frame", ast.Call, Environment], list[Typed]]
 """Translates a call of ``io``."""
 
@@ -164,6 +166,14 @@ class Frame:
         if array is None:
             raise NotNative(f"an element of {name}")
         return Typed(f"{array.place}[{bare(self.place_in(array.size, index, known))}]", known[name])
+
+    def pinned(self, name: str, known: Range) -> Range:
+        """Return what a field of the state may hold, when its range goes on growing: a block's integer ends somewhere."""
+        if name not in self.fields and name not in self.arrays:
+            return known
+        if known.kind is Kind.INT and max(-known.low, known.high) > _PINNED_FROM:
+            return self.declared.setdefault(name, Range(Kind.INT, -_PINNED, _PINNED))
+        return known
 
     def place_in(self, size: int, index: ast.expr, known: Environment) -> str:
         """Return an index that surely lies inside."""

@@ -182,7 +182,7 @@ class Body:
             assert again is not None
             if all(top[name].holds(again[name]) for name in again) and len(again) == len(top):
                 break
-            top = {name: top[name].widened(item) for name, item in again.items()}
+            top = {name: frame.pinned(name, top[name].widened(item)) for name, item in again.items()}
         frame.loops[id(statement)] = top
         return joined(leaves, loop.broken)
 

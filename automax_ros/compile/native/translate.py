@@ -31,8 +31,6 @@ _RETURN = re.compile("return ([^;]*);")
 MOST_ROUNDS = 60
 """Translations of a scan, each for a wider range of states, before a task counts as one whose integers have no bounds;
 a state takes a few."""
-_PINNED_FROM, _PINNED = 2**33, 2**40
-"""A block's integer whose range goes on growing past the first is taken to stay within the second, and checked."""
 _VARIABLES = (Role.LOCAL, Role.TUNABLE)
 
 
@@ -115,9 +113,7 @@ class _Translation:
         """Return what a field may hold, as far as it was found until now; a block's integers have an end somewhere."""
         if field.role in _VARIABLES or known.kind is None:
             raise NotNative(f"{field.name} may be left with a value beyond its type")
-        if known.kind is Kind.INT and max(-known.low, known.high) > _PINNED_FROM:
-            known = self._frame.declared[name] = Range(Kind.INT, -_PINNED, _PINNED)
-        return known
+        return self._frame.pinned(name, known)
 
     def _text(self) -> str:
         frame = self._frame

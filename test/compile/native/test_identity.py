@@ -8,11 +8,17 @@ import shutil
 import pytest
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
+from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Block, Platform
+from automax_ros.compile.compiler import CompiledTask, compile_program
 from automax_ros.compile.native import NativeCache, native_form
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.language.checks.checker import check
 
+from .. import programs
 from ..block_model import TICKS, Programmed
-from ..support import compiled_of
+from ..programs import tasks
+from ..support import TICK, compiled_of, views_of
 from ..test_blocks_in_task import BLOCKS, ON_A_RACK, declarations, with_its_structure
 from .identity import assert_same
 
@@ -60,7 +66,7 @@ def check_blocks(blocks: list[Block], each: int, number: int, stretches: int, ca
 @pytest.mark.parametrize("on_a_rack", [True, False], ids=["on a rack", "on a UDC"])
 def test_every_block_is_the_same_in_c(on_a_rack: bool, tmp_path) -> None:
     blocks = [block for block in BLOCKS if (block in ON_A_RACK) is on_a_rack]
-    check_blocks(blocks, 3, 1, 25, NativeCache(tmp_path / "cache"))
+    check_blocks(blocks, 2, 1, 15, NativeCache(tmp_path / "cache"))
 
 
 @pytest.mark.soak
@@ -68,3 +74,46 @@ def test_every_block_is_the_same_in_c(on_a_rack: bool, tmp_path) -> None:
 def test_every_block_is_the_same_in_c_however_it_is_programmed(block: Block, tmp_path) -> None:
     for number in range(4):
         check_blocks([block], 60, 100 + number, 60, NativeCache(tmp_path / "cache"))
+
+
+WITH_STRINGS = ("$", "PRINT", "VAL(", "LEN%", "ASC%", '"')
+
+
+def numeric_task(text: str) -> CompiledTask | None:
+    """The task without the string variables that none of its statements uses; None of one that has others."""
+    for declared in ("S$, P$:5, ", "KS$, ", ', "TEXT"'):
+        text = text.replace(declared, "")
+    if any(word in text for word in WITH_STRINGS):
+        return None
+    program = check(SourceText("task.blk", text), name="TASK", catalogue=CATALOGUE, tick_ns=TICK).program
+    if program is None:
+        return None
+    return compile_program(program, {spec.name: view for view, spec in enumerate(views_of(program))})
+
+
+@pytest.fixture
+def without_strings(monkeypatch) -> None:
+    """Random tasks of which a part has no strings."""
+    every = programs.simple_statements
+    plain = every().filter(lambda text: not any(word in text for word in WITH_STRINGS))
+    monkeypatch.setattr(programs, "simple_statements", lambda: plain)
+
+
+def check_tasks(count: int, least: int, number: int, cache: NativeCache) -> None:
+    found = [task for task in map(numeric_task, drawn(tasks(), count, number)) if task is not None]
+    assert len(found) >= least
+    for place, compiled in enumerate(found):
+        native = native_form(compiled, cache)
+        assert_same(native, 6, 6, forced=place % 3 == 0, seed=place)
+
+
+@pytest.mark.usefixtures("without_strings")
+def test_random_tasks_are_the_same_in_c(tmp_path) -> None:
+    check_tasks(16, 6, 3, NativeCache(tmp_path / "cache"))
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.usefixtures("without_strings")
+def test_many_random_tasks_are_the_same_in_c(tmp_path) -> None:
+    check_tasks(1500, 600, 4, NativeCache(tmp_path / "cache"))
