@@ -25,7 +25,8 @@ class Array:
 
 
 _PINNED_FROM, _PINNED = 2**33, 2**40
-"""A block's integer whose range goes on growing past the first is taken to stay within the second, and checked."""
+"""A block's integer whose range goes on growing past the first is taken to stay within the second (decision): no block
+of the manual keeps more than 32 bits. The code checks it, and ends the scan with an error where it does not hold."""
 Member = Callable[["Frame", ast.Call, Environment], list[Typed]]
 """Translates a call of ``io``."""
 
@@ -168,7 +169,7 @@ class Frame:
         return Typed(f"{array.place}[{bare(self.place_in(array.size, index, known))}]", known[name])
 
     def pinned(self, name: str, known: Range) -> Range:
-        """Return what a field of the state may hold, when its range goes on growing: a block's integer ends somewhere."""
+        """Return what a field may hold whose range goes on growing: a block's integer ends somewhere."""
         if name not in self.fields and name not in self.arrays:
             return known
         if known.kind is Kind.INT and max(-known.low, known.high) > _PINNED_FROM:
