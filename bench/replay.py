@@ -8,16 +8,22 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from automax_ros.bags.recorder import Recorder
+from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.pieces import Where
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.replay import side_by_side
 from automax_ros.replay.engine import Replay, ReplayOptions
+from automax_ros.replay.side_by_side import replay_side_by_side
 from automax_ros.wire.stream import RackStream
 
 EXAMPLE = Path(__file__).parent.parent / "config" / "section_drive"
 SECONDS = 60
+SPLIT_SECONDS = 300
+FILES = 8
 REPEATS = 3
 WANTED = 20
 TASKS = 5
@@ -57,18 +63,24 @@ def plant(rack: Rack, step: int) -> None:
         rack.write(f"TACH{number}%", (step * 7 + number * 300 - 40) % 3000)
 
 
-def record(config: RackConfig, bag: Path, moves: Callable[[Rack, int], None] | None) -> float:
+def record(
+    config: RackConfig,
+    bag: Path,
+    moves: Callable[[Rack, int], None] | None,
+    seconds: int = SECONDS,
+    options: RecordingOptions | None = None,
+) -> float:
     """Record a run; return the scans per second of rack time."""
     rack = Rack(config)
     stream = RackStream(rack, rack.fingerprint)
-    recorder = Recorder(rack, stream, bag)
+    recorder = Recorder(rack, stream, bag, options)
     stream.begin()
     rack.start()
-    steps = SECONDS * 20
+    steps = seconds * 20
     for step in range(steps):
         if moves is not None:
             moves(rack, step)
-        rack.run(SECONDS / steps)
+        rack.run(seconds / steps)
     stream.end()
     recorder.close()
     return scans_per_second(rack)
@@ -93,6 +105,21 @@ def print_both(what: str, bag: Path, rate: float, name: str, text: str) -> None:
     print_replay(f"{what}, one gain edited", bag, rate, {name: SourceText(f"{name}.BLK", edited)})
 
 
+def print_side_by_side(bag: Path) -> None:
+    """One job against two, each with its start: processes begun, tasks compiled."""
+    replay = Replay(bag, {}, ReplayOptions())
+    best = {}
+    for jobs in (1, 2):
+        best[jobs] = float("inf")
+        for _ in range(REPEATS):
+            began = time.perf_counter()
+            report = replay_side_by_side(replay, Where(jobs))
+            best[jobs] = min(best[jobs], time.perf_counter() - began)
+            assert report.identical
+    ratio = best[1] / best[2]
+    print(f"{f'five regulators, {SPLIT_SECONDS} s in files':34}{ratio:6.2f} times one job with two jobs, wanted 1.8")
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -100,3 +127,7 @@ if __name__ == "__main__":
         print_both("example rack", folder / "example", rate, "SPEED", (EXAMPLE / "SPEED.BLK").read_text())
         rate = record(five_regulators(folder), folder / "five", plant)
         print_both("five regulators, 5.5 ms", folder / "five", rate, "SPEED0", (folder / "SPEED0.BLK").read_text())
+        side_by_side.LEAST_PART_BYTES = 1  # each file is a part
+        options = RecordingOptions(split_ns=SPLIT_SECONDS * NS_PER_S // FILES)
+        record(config_of(folder / "rack.yaml"), folder / "split", plant, SPLIT_SECONDS, options)
+        print_side_by_side(folder / "split")

@@ -19,9 +19,8 @@ from automax_ros.replay.part import Part, PartResult, begun, is_unsure, packed, 
 from automax_ros.replay.report import ReplayReport
 from automax_ros.replay.totals import Totals, added_up
 
-LEAST_PART_BYTES = 2 << 20
-"""Files are put together to parts of at least this size in the recording (decision: a smaller one costs more than it
-saves)."""
+LEAST_PART_BYTES = 8 << 20
+"""Files are put together to parts of at least this size (decision: a process takes about a second to begin)."""
 Progress = Callable[[float], None]
 
 
