@@ -30,6 +30,8 @@ A task of 2,000 lines, 800,000 characters, takes 5 s and not 15, and scans as qu
 LIMIT_S = 120.0
 """Time that the compiler has for one text, s (decision): a task of 2,000 lines takes a few."""
 _USUAL = ("cc", "gcc", "clang")
+_RUNNING: set[subprocess.Popen[str]] = set()
+"""The compilers that are under way, on any thread."""
 _MESSAGE = 400
 """Characters of what the compiler says that are passed on."""
 
@@ -94,6 +96,12 @@ def build(text: str, compiler: Compiler, options: Sequence[str] = (), limit_s: f
         return made.read_bytes()
 
 
+def end_running() -> None:
+    """End the compilers that run on other threads: whoever has asked for them waits no more."""
+    for process in list(_RUNNING):
+        _kill(process)
+
+
 def python_options() -> tuple[str, ...]:
     """Return the options for a text that includes ``Python.h``; this interpreter's binary interface is among them.
 
@@ -129,20 +137,28 @@ def _run(command: Sequence[str], environment: dict[str, str], text: str, limit_s
         )
     except OSError as error:
         raise NotNative(f"{command[0]} cannot be run: {error.strerror or error}") from error
+    _RUNNING.add(process)
     try:
         said, complaints = process.communicate(text, limit_s)
     except BaseException as error:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
+        _kill(process)
         process.communicate()
         if isinstance(error, subprocess.TimeoutExpired):
             raise NotNative(f"{command[0]} has not ended within {limit_s:g} s") from error
         raise
+    finally:
+        _RUNNING.discard(process)
     if process.returncode:
         lines = complaints.strip().splitlines() or [f"exit code {process.returncode}"]
         told = next((line for line in lines if "error" in line), lines[0])
         raise NotNative(f"{command[0]} fails: {told[:_MESSAGE]}")
     return said
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 def _stamp(path: str) -> tuple[int, int]:

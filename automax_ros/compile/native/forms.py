@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native.build import LIMIT_S
+from automax_ros.compile.native.build import LIMIT_S, end_running
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.source import NotNative
 
@@ -75,8 +75,15 @@ class NativeForms:
             return {name: NativeOutcome(task, why=self.why_off) for name, task in tasks.items()}
         from concurrent.futures import ThreadPoolExecutor
 
-        with ThreadPoolExecutor(min(len(tasks), os.cpu_count() or 1)) as pool:
-            return dict(zip(tasks, pool.map(self.form, tasks.values()), strict=True))
+        pool = ThreadPoolExecutor(min(len(tasks), os.cpu_count() or 1))
+        try:
+            outcomes = dict(zip(tasks, pool.map(self.form, tasks.values()), strict=True))
+        except BaseException:  # Ctrl-C, say: the compilers would go on for as long as they take
+            pool.shutdown(wait=False, cancel_futures=True)
+            end_running()
+            raise
+        pool.shutdown()
+        return outcomes
 
     def form(self, compiled: CompiledTask) -> NativeOutcome:
         """Return a task as it is to run: as it is given where it is not native."""
