@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds or refreshes .venv: dependencies, this package (editable), the compiled messages. Called by `make setup`.
+# Builds or refreshes .venv: dependencies, this package (editable), its messages and hot modules. Called by `make setup`.
 #   tools/setup_environment.sh [PYTHON]     PYTHON: interpreter for .venv; without it an existing .venv is kept
 # Quick when nothing changed: .venv/setup.stamp holds a hash of all that the environment depends on, written last.
 set -euo pipefail
@@ -42,6 +42,11 @@ fingerprint() {
     } | sha256sum
 }
 
+# The hot modules as machine code: built anew when their sources have changed, left out where plain Python is wanted.
+compile_ahead() {
+    [ "${AUTOMAX_COMPILED-}" = off ] || "$venv/bin/python" tools/build_compiled.py
+}
+
 # Two makes at once: the second waits, then finds everything done.
 if command -v flock >/dev/null; then
     exec 9<.
@@ -56,6 +61,7 @@ if [ -n "$wanted" ]; then
 fi
 current=$(fingerprint)
 if [ -e "$stamp" ] && [ "$(cat "$stamp")" = "$current" ] && [ -x "$venv/bin/automax" ]; then
+    compile_ahead
     exit 0
 fi
 # An environment that is whole but out of date, or that an interrupted setup left, is carried on with. One whose Python is
@@ -73,3 +79,4 @@ echo "installing dependencies into .venv (about a minute the first time) ..."
 # Programs start in half the time, also where Python is told not to write what it has compiled.
 "$venv/bin/python" -m compileall -q -j 0 automax_ros
 echo "$current" >"$stamp"
+compile_ahead

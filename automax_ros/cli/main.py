@@ -161,8 +161,6 @@ def parsers(
     """Return the parser of the whole command line and those of its subcommands; ``modules`` know their arguments."""
     import argparse
 
-    from automax_ros import __version__
-
     class WideHelp(argparse.HelpFormatter):
         """Leaves room for the longest subcommand: argparse forgets that they are indented twice."""
 
@@ -170,10 +168,17 @@ def parsers(
             super().add_argument(action)
             self._action_max_length = max(self._action_max_length, max(map(len, SUBCOMMANDS)) + 4)
 
+    class ShowVersion(argparse.Action):
+        """Prints the version and what runs, which takes reading sources: only where it was asked for."""
+
+        def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+            print("\n".join(version_lines()))
+            parser.exit()
+
     parser = argparse.ArgumentParser(
         prog="automax", description="A Reliance Electric AutoMax rack, emulated.", formatter_class=WideHelp
     )
-    parser.add_argument("--version", action="version", version=f"automax {__version__}")
+    parser.add_argument("--version", action=ShowVersion, nargs=0, help="show version and whether compiled modules run")
     subcommands = parser.add_subparsers(title="subcommands", metavar="SUBCOMMAND")
     found: dict[str, argparse.ArgumentParser] = {}
     for name, text in SUBCOMMANDS.items():
@@ -187,6 +192,14 @@ def parsers(
         if own is not None:
             own.add_arguments(found[name])
     return parser, found
+
+
+def version_lines() -> list[str]:
+    """Return the version, and whether modules that were compiled ahead of time run or plain Python."""
+    import automax_ros
+    from automax_ros.core.compiled import describe
+
+    return [f"automax {automax_ros.__version__}", *describe(automax_ros.__path__[0])]
 
 
 def module_of(name: str) -> ModuleType:

@@ -32,7 +32,11 @@ def started(
 
 
 def test_version(automax):
-    assert automax("--version") == (0, f"automax {automax_ros.__version__}\n", "")
+    code, out, err = automax("--version")
+    first, *what_runs = out.splitlines()
+    assert (code, first, err) == (0, f"automax {automax_ros.__version__}", "")
+    assert what_runs
+    assert all(line.startswith(("compiled: ", "plain Python: ")) for line in what_runs)
 
 
 def test_help_has_one_line_for_every_subcommand(automax):
