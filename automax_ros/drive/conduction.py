@@ -20,6 +20,7 @@ from automax_ros.drive.network import ARMATURE_SHORT, CROSS_FIRE, LINE_SHORT, Im
 from automax_ros.drive.scr import BIT, MASK, NUMBER, RAIL_MASKS, numbers_of
 from automax_ros.drive.search import next_ending, next_turn_on
 from automax_ros.drive.state import Stateful
+from automax_ros.drive.totals import add_up
 from automax_ros.drive.waves import Piece, RawPiece
 from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC, settle
 
@@ -151,14 +152,14 @@ class Conduction(Stateful):
         self._charge += charge
         self._volt_s += self._emf * total
         if len(self._pieces) > PIECES_KEPT:
-            self._square += sum(Piece(*piece).square() for piece in self._pieces)
+            self._square += add_up([Piece(*piece).square() for piece in self._pieces])
             self._pieces.clear()
         machine = self.machine
         if machine.turns:
             machine.advance(total, charge, change_a)
         if self.energy is not None:
             angle = self.line.angle(stop_ns) if self._net.modes else 0.0
-            squares = sum(phase**2 for phase in self._phases(self._net, self.current_a, sin(angle), cos(angle)))
+            squares = add_up([phase**2 for phase in self._phases(self._net, self.current_a, sin(angle), cos(angle))])
             self.energy.stored_j = 0.5 * (self._z.l * self.current_a**2 + self._z.ls * squares)
 
     def _switch(self, out: int, on: int, start_ns: int, t: float, sine: float, cosine: float) -> Network:
@@ -229,13 +230,13 @@ class Conduction(Stateful):
                 c, d = line.unit_wave(x)
                 volts[x] = line.amplitude_v * (c * cosine + d * sine) - net.offsets[x]
             for x in group:
-                push[x] = volts[x] - sum(volts.values()) / len(group)
+                push[x] = volts[x] - add_up(list(volts.values())) / len(group)
                 over[x] = phases[x] - net.share[x] * self.current_a
         soonest, gone = inf, 0
         for mask, _, _, share, _, *weights, _ in net.guards:
-            slope = sum(weight * volt for weight, volt in zip(weights, push, strict=True))
+            slope = add_up([weight * volt for weight, volt in zip(weights, push, strict=True)])
             if slope < -1e-9:
-                value = share * self.current_a + sum(w * part for w, part in zip(weights, over, strict=True))
+                value = share * self.current_a + add_up([w * part for w, part in zip(weights, over, strict=True)])
                 when = max(value, 0.0) / -slope
                 if when < soonest:
                     soonest, gone = when, mask

@@ -66,18 +66,26 @@ class ConstantAlpha(Stateful):
 
     def advance(self, until_ns: int) -> None:
         """Let time pass to an instant (ns), firing on the way."""
+        while (on_ns := self._next_ns()) < until_ns:
+            self.circuit.advance(on_ns)
+            self._fire(on_ns)
+        self.circuit.advance(until_ns)
+
+    def post(self, until_ns: int) -> None:
+        """Post the gates until an instant (ns) without letting time pass: for a circuit whose coupling does that."""
+        while (on_ns := self._next_ns()) < until_ns:
+            self._fire(on_ns)
+
+    def _next_ns(self) -> int:
+        """Return the next firing, looked for again each time while it lies ahead: alpha and the line may have moved."""
         circuit, line = self.circuit, self.circuit.line
-        while True:
-            # Looked for again each time while it lies ahead: alpha and the line may have moved.
-            number = self._order[self._position]
-            on_ns = line.instant_of(natural_angle(number, line) + self.alpha_rad, self._natural_ns - _MARGIN_NS)
-            on_ns = max(on_ns, circuit.now_ns)
-            if on_ns >= until_ns:
-                break
-            circuit.advance(on_ns)
-            off_ns = on_ns + max(1, round(self.pulse_rad / line.omega * 1e9))
-            circuit.fire(on_ns, off_ns, number, self._order[self._position - 1])
-            self._position = (self._position + 1) % 6
-            following = natural_angle(self._order[self._position], line)
-            self._natural_ns = line.instant_of(following, self._natural_ns + round(0.5 * SIXTH / line.omega * 1e9))
-        circuit.advance(until_ns)
+        natural = natural_angle(self._order[self._position], line)
+        return max(line.instant_of(natural + self.alpha_rad, self._natural_ns - _MARGIN_NS), circuit.now_ns)
+
+    def _fire(self, on_ns: int) -> None:
+        line = self.circuit.line
+        off_ns = on_ns + max(1, round(self.pulse_rad / line.omega * 1e9))
+        self.circuit.fire(on_ns, off_ns, self._order[self._position], self._order[self._position - 1])
+        self._position = (self._position + 1) % 6
+        following = natural_angle(self._order[self._position], line)
+        self._natural_ns = line.instant_of(following, self._natural_ns + round(0.5 * SIXTH / line.omega * 1e9))

@@ -7,6 +7,7 @@ from math import inf, sqrt
 from typing import TYPE_CHECKING, Final
 
 from automax_ros.drive.state import Stateful
+from automax_ros.drive.totals import add_up
 from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave, bound
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class Sample:
     @property
     def square_a2s(self) -> float:
         """Integral of the square of the armature current, A2 s; computed when asked for."""
-        return self._square + sum(Piece(*piece).square() for piece in self._pieces)
+        return self._square + add_up([Piece(*piece).square() for piece in self._pieces])
 
 
 @dataclass

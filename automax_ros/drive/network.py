@@ -20,6 +20,7 @@ from typing import Final
 
 from automax_ros.drive.ac_line import AcLine
 from automax_ros.drive.scr import FORWARD_MASK, REVERSE_MASK, M, P
+from automax_ros.drive.totals import add_up
 from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC, Wiring, closed_legs, is_line_short, leg_currents
 
 TURN_ON_V: Final = 1e-5
@@ -105,7 +106,7 @@ class Network:
         offsets, share = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         self.rail_offset = 0.0
         if both:
-            self.rail_offset = sum(drops[2 * x + 1] - drops[2 * x] for x in both) / len(both)
+            self.rail_offset = add_up([drops[2 * x + 1] - drops[2 * x] for x in both]) / len(both)
             groups = [[x for x in present if x in at_p or x in at_m]]
             for x in range(3):
                 if x in both:
@@ -174,8 +175,8 @@ class Network:
         """Return the factors of cos and sin of the mean source voltage of phases, and their mean offset."""
         waves = [line.unit_wave(x) for x in group]
         scale = line.amplitude_v / len(group)
-        mean_offset = sum(self.offsets[x] for x in group) / len(group)
-        return scale * sum(wave[0] for wave in waves), scale * sum(wave[1] for wave in waves), mean_offset
+        mean_offset = add_up([self.offsets[x] for x in group]) / len(group)
+        return scale * add_up([wave[0] for wave in waves]), scale * add_up([wave[1] for wave in waves]), mean_offset
 
     def _set_potentials(
         self, legs: dict[int, int], drops: dict[int, float], wiring: Wiring, line: AcLine, z: Impedances
@@ -248,11 +249,11 @@ class Network:
     def _guard(self, armature: float, a: float, b: float, c: float) -> _Current:
         """Return the factors of a sum of the armature current and the phase currents with weights."""
         weights = (a, b, c)
-        share = armature + sum(w * part for w, part in zip(weights, self.share, strict=True))
+        share = armature + add_up([w * part for w, part in zip(weights, self.share, strict=True)])
         if not self.active:
             share = 0.0
         cosine, sine, constant = (
-            sum(w * part for w, part in zip(weights, parts, strict=True))
+            add_up([w * part for w, part in zip(weights, parts, strict=True)])
             for parts in (self.phase_c, self.phase_d, self.phase_k)
         )
         if not self.modes:

@@ -154,20 +154,10 @@ def test_stiff_motors_do_what_one_of_both_inertias_does():
         while shaft.first.now_ns < target:
             # Posts the first drive's gates, then lets both pass time.
             following = min(target, shaft.first.now_ns + shaft.slice_ns)
-            post(firing, following)
+            firing.post(following)
             shaft.advance(following)
     assert shaft.first.machine.speed_rad_s == pytest.approx(alone.machine.speed_rad_s, rel=1e-3)
     assert alone.machine.speed_rad_s > 50
-
-
-def post(firing, until_ns):
-    """Post the gates of a firing without letting time pass: what a drive's controller does."""
-    circuit = firing.circuit
-    advance, circuit.advance = circuit.advance, lambda _: None
-    try:
-        firing.advance(until_ns)
-    finally:
-        circuit.advance = advance
 
 
 def test_an_elastic_coupling_swings_at_its_frequency():

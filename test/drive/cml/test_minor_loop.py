@@ -135,7 +135,8 @@ def test_taking_over_does_not_change_types():
 def everything(thing):
     """All attributes of a loop and its parts, by type and name, as deep as they go."""
     found = {}
-    for name, value in vars(thing).items():
+    names = vars(thing) if hasattr(thing, "__dict__") else type(thing).__mypyc_attrs__
+    for name, value in ((name, getattr(thing, name)) for name in names):
         if isinstance(value, Stateful):
             found |= everything(value)
         elif not isinstance(value, tuple) or not any(isinstance(item, Stateful) for item in value):

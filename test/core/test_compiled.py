@@ -1,0 +1,110 @@
+"""Modules compiled ahead of time: used while their sources are those that were compiled, and told about."""
+
+import os
+import subprocess
+import sys
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+import pytest
+
+import automax_ros
+from automax_ros.core import compiled
+
+PACKAGE = Path(automax_ros.__path__[0])
+HEAD = "\t".join(("automax_ros compiled", compiled.VERSION, EXTENSION_SUFFIXES[0]))
+TEXTS = {"drive/motor.py": b"MOTOR = 1\n", "core/types.py": b"TYPE = 1\n"}
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package of two files, of which one was compiled and the other gave it its types."""
+    for name, text in TEXTS.items():
+        path = tmp_path / "automax_ros" / name
+        path.parent.mkdir(parents=True)
+        path.write_bytes(text)
+    return tmp_path / "automax_ros"
+
+
+def index(folder, head=HEAD):
+    folder.mkdir(exist_ok=True)
+    lines = [head, "group\tdrive", "library\tautomax_drive__mypyc\tdrive-1/library.so"]
+    lines.append("module\tautomax_ros.drive.motor\tdrive-1/shims.so")
+    lines += [f"source\t{name}\t{compiled.source_digest(text)}" for name, text in TEXTS.items()]
+    (folder / compiled.INDEX).write_text("\n".join(lines) + "\n")
+    return compiled.read_index(str(folder))
+
+
+def finder(package):
+    return compiled.CompiledFinder(index(package.parent / compiled.FOLDER), str(package))
+
+
+def test_module_and_its_library_come_from_the_folder(package):
+    found = finder(package)
+    folder = package.parent / compiled.FOLDER / "drive-1"
+    assert found.find_spec("automax_ros.drive.motor").origin == str(folder / "shims.so")
+    assert found.find_spec("automax_drive__mypyc").origin == str(folder / "library.so")
+
+
+@pytest.mark.parametrize("name", ["automax_ros", "automax_ros.drive", "automax_ros.drive.plant", "numpy", "os"])
+def test_other_modules_are_left_to_python(package, name):
+    assert finder(package).find_spec(name) is None
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("text", [None, b"", b"MOTOR = 2\n"])
+def test_a_source_that_changed_is_what_runs(package, name, text):
+    if text is None:
+        (package / name).unlink()
+    else:
+        (package / name).write_bytes(text)
+    found = finder(package)
+    assert found.find_spec("automax_ros.drive.motor") is None
+    assert found.find_spec("automax_drive__mypyc") is None
+    assert found.groups[0].stale.startswith(name)
+
+
+def test_time_of_a_file_does_not_count(package):
+    for name in TEXTS:
+        os.utime(package / name, (1, 1))
+    assert finder(package).find_spec("automax_ros.drive.motor")
+
+
+@pytest.mark.parametrize("head", ["", "automax_ros compiled\t0\t.so", HEAD.replace(EXTENSION_SUFFIXES[0], ".cp0.so")])
+def test_what_another_interpreter_or_version_has_built_is_passed_over(package, head):
+    assert index(package.parent / compiled.FOLDER, head) == []
+
+
+def test_a_damaged_index_is_none(tmp_path):
+    assert compiled.read_index(str(tmp_path)) == []
+    (tmp_path / compiled.INDEX).write_bytes(b"\xff\xfe\x00")
+    assert compiled.read_index(str(tmp_path)) == []
+
+
+def run(program, switch):
+    environment = {**os.environ, compiled.VARIABLE: switch}
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment, cwd=PACKAGE.parent
+    )
+    return done.stdout
+
+
+def test_switched_off_everything_is_python():
+    program = "from automax_ros.drive import motor; print(type(motor.Motor.emf).__name__, motor.__file__)"
+    kind, file = run(program, "off").split()
+    assert (kind, Path(file)) == ("function", PACKAGE / "drive" / "motor.py")
+
+
+def test_what_runs_is_told(monkeypatch):
+    monkeypatch.setenv(compiled.VARIABLE, "off")
+    assert compiled.describe(str(PACKAGE)) == ["plain Python: AUTOMAX_COMPILED=off"]
+
+
+def test_looking_at_help_reads_no_source():
+    """What starts without a compiled module does not pay for the check."""
+    program = (
+        "import sys; from automax_ros.cli.main import main; main(['--help'])\n"
+        "from automax_ros.core.compiled import CompiledFinder\n"
+        "print([group.stale for found in sys.meta_path if isinstance(found, CompiledFinder) for group in found.groups])"
+    )
+    assert set(run(program, "").splitlines()[-1]) <= set("[None, ]")
