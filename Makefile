@@ -11,6 +11,9 @@ CONFIG ?= config/dc_drive/rack.yaml
 # A file of tests is one worker's; more than four would only hold up the tests of live racks.
 PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile
 
+# What runs a second time in plain Python; the whole suite runs with the modules that were compiled ahead of time.
+PLAIN := test/drive/cml test/drive/test_state.py test/drive/test_plant.py test/drive/test_motor.py test/running
+
 # .venv brings its own ROS 2. A sourced distribution or another environment must not mix its libraries in.
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport LD_LIBRARY_PATH
@@ -33,6 +36,7 @@ test: setup
 	$(BIN)/ruff check . || status=$$?; \
 	$(BIN)/ruff format --check . || status=$$?; \
 	$(BIN)/mypy automax_ros tools || status=$$?; \
+	AUTOMAX_COMPILED=off $(BIN)/python -m pytest -q $(PLAIN) -m "not soak" $(PARALLEL) || status=$$?; \
 	$(BIN)/python -m pytest -q test -m "not soak" $(PARALLEL) || status=$$?; \
 	exit $$status
 

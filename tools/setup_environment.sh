@@ -44,7 +44,8 @@ fingerprint() {
 
 # The hot modules as machine code: built anew when their sources have changed, left out where plain Python is wanted.
 compile_ahead() {
-    [ "${AUTOMAX_COMPILED-}" = off ] || "$venv/bin/python" tools/build_compiled.py
+    [ "${AUTOMAX_COMPILED-}" = off ] || "$venv/bin/python" tools/build_compiled.py ||
+        echo "the modules could not be compiled ahead of time: plain Python runs instead"
 }
 
 # Two makes at once: the second waits, then finds everything done.
