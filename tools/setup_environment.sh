@@ -42,7 +42,7 @@ fingerprint() {
     } | sha256sum
 }
 
-# The hot modules as machine code: built anew when their sources have changed, left out where plain Python is wanted.
+# The hot modules as machine code: built again when their sources have changed, left out where plain Python is wanted.
 compile_ahead() {
     [ "${AUTOMAX_COMPILED-}" = off ] || "$venv/bin/python" tools/build_compiled.py ||
         echo "the modules could not be compiled ahead of time: plain Python runs instead"
