@@ -190,13 +190,15 @@ class McapOutput:
         length = self._write(record_bytes(packed))
         offset = start + length
         offsets: dict[int, int] = {}
-        indexes = bytearray()
+        indexes: list[bytes] = []
+        length_of_indexes = 0
         for channel, entries in chunk.index.items():
-            offsets[channel] = offset + len(indexes)
+            offsets[channel] = offset + length_of_indexes
             size = len(entries) * 8
-            indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size)
-            indexes += struct.pack(f"<{len(entries)}Q", *entries)
-        self._write(bytes(indexes))
+            indexes.append(_INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size))
+            indexes.append(struct.pack(f"<{len(entries)}Q", *entries))
+            length_of_indexes += _INDEX_HEAD.size + size
+        self._write(b"".join(indexes))
         self._count(chunk)
         self.statistics.chunk_count += 1
         ChunkIndex(
@@ -205,7 +207,7 @@ class McapOutput:
             chunk_start_offset=start,
             chunk_length=length,
             message_index_offsets=offsets,
-            message_index_length=len(indexes),
+            message_index_length=length_of_indexes,
             compression=packed.compression,
             compressed_size=len(packed.data),
             uncompressed_size=packed.uncompressed_size,
