@@ -115,11 +115,11 @@ class _Fork(Exception):
 
 
 class Recorder:
-    """Writes down what one run of a function does after the last decision that was made for it."""
+    """Writes down what one run of a function does after the last answer that it was given."""
 
-    def __init__(self, prefix: str, decisions: Sequence[bool] = ()) -> None:
+    def __init__(self, prefix: str, answers: Sequence[bool] = ()) -> None:
         """Take what begins the names of results, and which way to go at each test."""
-        self._prefix, self._decisions = prefix, decisions
+        self._prefix, self._answers = prefix, answers
         self._made, self._asked = 0, 0
         self.statements: list[ast.stmt] = []
 
@@ -132,11 +132,11 @@ class Recorder:
 
     def decided(self, test: ast.expr) -> bool:
         """Return which way to go at a test."""
-        if self._asked == len(self._decisions):
+        if self._asked == len(self._answers):
             raise _Fork(test)
         self._asked += 1
         self.statements = []
-        return self._decisions[self._asked - 1]
+        return self._answers[self._asked - 1]
 
 
 def node_of(value: object) -> ast.expr:
@@ -174,17 +174,17 @@ def traced(
     carried_out = _with_traced_functions(function, {})
     paths = 0
 
-    def way(decisions: tuple[bool, ...]) -> list[ast.stmt]:
+    def way(answers: tuple[bool, ...]) -> list[ast.stmt]:
         nonlocal paths
         paths += 1
         if paths > MOST_PATHS:
             raise NotNative("coefficients that depend on too many tests")
-        recorder = Recorder(prefix, decisions)
+        recorder = Recorder(prefix, answers)
         given = {key: Traced(recorder, item) if isinstance(item, ast.expr) else item for key, item in numbers.items()}
         try:
             found = carried_out(*before, given)
         except _Fork as fork:
-            return [*recorder.statements, build.when(fork.test, way((*decisions, True)), way((*decisions, False)))]
+            return [*recorder.statements, build.when(fork.test, way((*answers, True)), way((*answers, False)))]
         found = tuple(found[key] for key in keys) if keys else found
         values = found if isinstance(found, tuple) else (found,)
         sets = [build.assign(name, node_of(value)) for name, value in zip(results, values, strict=True)]
