@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
-from automax_ros.cli.native import add_native_arguments, native_forms, tell_native
+from automax_ros.cli.native import add_native_arguments, native_forms
 from automax_ros.cli.numbers import option_number, whole_number
 from automax_ros.cli.output_files import require_different_files, require_picture_file
 from automax_ros.cli.places import add_where_arguments, where_of
@@ -109,7 +109,7 @@ def _replayed(replay: Replay, where: Where, arguments: argparse.Namespace) -> Re
     with share_shown("replay") as show:
         report = replay_side_by_side(replay, where, show)
     if arguments.verbose:
-        tell_native(replay.native)
+        sys.stderr.writelines(f"{text}\n" for text in replay.native)
     if arguments.json:
         print(json.dumps(report.as_json(), indent=2, allow_nan=False))
     else:

@@ -18,7 +18,7 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.run_facts import RunFacts, run_facts
 from automax_ros.bags.span import require_scans
-from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeOutcome
+from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S
@@ -98,6 +98,7 @@ class Replay:
         """
         self.options = options
         self.bag, self.new = bag, new
+        self.native_elsewhere: tuple[str, ...] = ()
         self.reader = BagReader(bag)
         self.rack, self.facts = stored or _stored(self.reader)
         self.rack.require_tasks(options.only or ())
@@ -107,9 +108,10 @@ class Replay:
         self._forms = ColumnForms(config.variables, backplane_of(config), options.native)
 
     @property
-    def native(self) -> list[NativeOutcome]:
-        """What became of the tasks that were executed by columns: native ones, and why others are not."""
-        return self._forms.outcomes
+    def native(self) -> list[str]:
+        """What became of the tasks that were executed by columns, here and elsewhere: native, or why they are not."""
+        own = (outcome.text for outcome in self._forms.outcomes)
+        return list(dict.fromkeys((*self.native_elsewhere, *own)))
 
     @property
     def warnings(self) -> list[tuple[SourceText, list[Diagnostic]]]:

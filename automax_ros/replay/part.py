@@ -29,6 +29,7 @@ class PartResult:
     ``entry`` and ``exit`` are what is carried at its first scan and at that one, ``totals`` what was counted between.
     ``went_on``: tasks whose first scan is not their start; ``scanned``: those that have scanned. ``unsure``: it may
     not be what follows on the part before, whatever that is. ``ended``: the range of the replay ends in it.
+    ``native`` is what ``Replay.native`` tells of it.
     ``doubtful``: were this the end, an edited task might have ended otherwise than the recorded one.
     """
 
@@ -41,6 +42,7 @@ class PartResult:
     unsure: bool
     ended: bool
     doubtful: bool
+    native: tuple[str, ...]
 
     @property
     def clean(self) -> bool:
@@ -81,6 +83,7 @@ def replay_part(what: bytes, part: Part) -> PartResult:
         part.first > 0 and (is_unsure(run) or not base.clean),
         not goes_on,
         bool(run.ends_in_doubt()),
+        tuple(replay.native),
     )
 
 

@@ -19,7 +19,7 @@ from automax_ros.replay.part import Part, PartResult, begun, is_unsure, packed, 
 from automax_ros.replay.report import ReplayReport
 from automax_ros.replay.totals import Totals, added_up
 
-LEAST_PART_BYTES = 8 << 20
+LEAST_PART_BYTES = 16 << 20
 """Files are put together to parts of at least this size (decision: a process takes about a second to begin)."""
 Progress = Callable[[float], None]
 
@@ -117,6 +117,8 @@ class _SideBySide:
         what = packed(self._replay)
         pieces = [Piece(self._name(number), replay_part, (what, part)) for number, part in enumerate(self._parts)]
         run_pieces(pieces, where, self._take, self._is_over)
+        results = [result for number in range(len(pieces)) if (result := self._result(number)) is not None]
+        self._replay.native_elsewhere = tuple(text for result in results for text in result.native)
         proven = self._proven()
         if proven.failed is not None:
             self._require_worker(pieces[proven.failed])
