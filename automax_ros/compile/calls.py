@@ -9,15 +9,14 @@ from __future__ import annotations
 import ast
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from automax_ros.blocks.coefficients import evaluate, evaluate_noting
+from automax_ros.blocks.coefficients import evaluate
 from automax_ros.blocks.declaration import (
     CALL_FACTS,
     COEFFICIENT_LIMITED,
     Block,
-    Coefficients,
     Form,
     Input,
     Output,
@@ -26,11 +25,13 @@ from automax_ros.blocks.declaration import (
 )
 from automax_ros.blocks.shift import STRUCTURE_STATES
 from automax_ros.compile import build
+from automax_ros.compile.coefficient_function import CoefficientFunction, kept_names
 from automax_ros.compile.emitter import Emitter
 from automax_ros.compile.expressions import lower_element, lower_index
 from automax_ros.compile.folding import TableReader, value_of
 from automax_ros.compile.inline import Binding, Inlined, inline, names_in
 from automax_ros.compile.layout import Role, StateField
+from automax_ros.compile.native.coefficients import quick_form
 from automax_ros.compile.pynames import forced_name, latched_name, structure_prefix, variable_name
 from automax_ros.compile.simplify import log_in_place
 from automax_ros.compile.stores import write_at
@@ -106,11 +107,6 @@ class BlockInstance:
         ]
         for name, kind, initial in kinds:
             yield name, StateField(f"{self.label}.{name}", kind, Role.BLOCK, initial)
-
-
-def kept_names(declared: Coefficients) -> list[str]:
-    """Return the names of the states that hold the last values that met the relation of coefficients."""
-    return [] if declared.relation is None else [f"kept_{name.lower()}" for name in declared.relation.parameters]
 
 
 def instance_of(bound: BoundCall, prefix: str, occurrence: int, period_ns: int) -> BlockInstance:
@@ -339,7 +335,9 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, values: dict[s
     now = [emitter.keep(_real_value(emitter, bound.arguments[name])) for name in instance.evaluated]
     seen = [f"{prefix}seen_{name.lower()}" for name in instance.evaluated]
     function = f"{prefix}coefficients"
-    emitter.extra_globals[function] = CoefficientFunction(bound.block, period_s, literals, instance.evaluated)
+    emitter.extra_globals[function] = CoefficientFunction(
+        bound.block, period_s, literals, instance.evaluated, quick_form
+    )
     was, kept = f"{prefix}was_limited", [prefix + name for name in kept_names(declared)]
     targets = [*(prefix + name for name in declared.names), *kept, f"{prefix}limited"]
     changed = [build.compare(build.name(old), "<>", new) for old, new in zip(seen, now, strict=True)]
@@ -353,22 +351,3 @@ def _bind_coefficients(emitter: Emitter, instance: BlockInstance, values: dict[s
     ]
     emitter.emit(build.when(changed[0] if len(changed) == 1 else build.either(*changed), recompute))
     values.update((name, build.name(prefix + name)) for name in declared.names)
-
-
-@dataclass(frozen=True)
-class CoefficientFunction:
-    """Computes a block's coefficients from evaluated parameters and what was kept of the last time.
-
-    It returns the coefficients, what to keep, and what is limited as bits of a number.
-    """
-
-    block: Block
-    period_s: float
-    literals: Mapping[str, float]
-    evaluated: tuple[str, ...]
-
-    def __call__(self, *values: float) -> tuple[float, ...]:
-        """Return coefficients, what to keep, bits."""
-        given = {**self.literals, **dict(zip(self.evaluated, values, strict=False))}
-        results, keep, limited = evaluate_noting(self.block, self.period_s, given, values[len(self.evaluated) :])
-        return (*results, *keep, limited)

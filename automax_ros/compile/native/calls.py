@@ -15,8 +15,8 @@ from functools import cache
 from types import FunctionType
 
 from automax_ros.compile import functions
-from automax_ros.compile.calls import CoefficientFunction
-from automax_ros.compile.native.coefficients import coefficient_tree
+from automax_ros.compile.coefficient_function import CoefficientFunction
+from automax_ros.compile.native.coefficients import FORMULAS, coefficient_tree, raised
 from automax_ros.compile.native.context import Environment
 from automax_ros.compile.native.expressions import extreme
 from automax_ros.compile.native.frame import Frame
@@ -56,7 +56,7 @@ def called(frame: Frame, function: object, node: ast.Call, known: Environment) -
         return carry_out(frame, arguments)
     if isinstance(function, CoefficientFunction):
         arguments = [as_real(item) for item in arguments]
-        return _translated(frame, frame.unit.tree(function, coefficient_tree), _FORMULAS, arguments)
+        return _translated(frame, frame.unit.tree(function, coefficient_tree), FORMULAS, arguments)
     if not isinstance(function, FunctionType):
         raise NotNative(f"a call of {function!r}")
     missing = function.__code__.co_argcount - len(arguments)
@@ -245,19 +245,11 @@ def _real_power(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     return _delivered(frame, "real_power", texts, results, can_end=False)
 
 
-def raised(base: float, exponent: float) -> float:
-    """Return a power as Python has it, for the formulas of coefficients."""
-    power: float = base**exponent
-    return power
-
-
 def _raised(frame: Frame, arguments: list[Typed]) -> list[Typed]:
     base, exponent = (bare(as_real(item).text) for item in arguments)
     return [Typed(f"raised({base}, {exponent}, {frame.ended()})", ANY_REAL)]
 
 
-_FORMULAS: dict[str, object] = {"math": math, "stored_real": stored_real, "raised": raised}
-"""What the formulas of coefficients call."""
 _BUILTINS: dict[object, Carry] = {
     abs: _absolute,
     float: _real,

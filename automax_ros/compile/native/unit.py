@@ -6,7 +6,7 @@ import ast
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from automax_ros.compile.calls import CoefficientFunction
+from automax_ros.compile.coefficient_function import CoefficientFunction
 from automax_ros.compile.native.ranges import Range
 from automax_ros.compile.native.typed import Typed, c_type
 
