@@ -1,0 +1,189 @@
+"""Native scans: a scan of the program of 40 blocks in each form, coefficients that change, and how long it takes to make.
+
+Printed beside Python's own time in the same run; the manual's times are those of the 7010 (section 53).
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from _harness import scan_ns, task_of
+from blocks import PROGRAM, PROGRAM_BLOCKS
+
+from automax_ros.compile.compiler import CompiledTask
+from automax_ros.compile.native import NativeCache, NativeTask, NotNative, native_form, translate
+from automax_ros.compile.native.build import FLAGS
+from automax_ros.core.types import DataType, type_of_name
+from automax_ros.running.task import Task
+
+COLUMN = 20_000
+"""Scans of one call by columns."""
+REPEATS = 25
+PID = (
+    "10 COMMON REF%, FDBK%, OUT%\n11 LOCAL GAIN [CURRENT=1.5, HIGH=10.0, LOW=0.1]\n20 CALL SCAN_LOOP(TICKS=4)\n"
+    "30 CALL PID(KP=GAIN, KI=2.0, KD=0.1, LOOP_TIME=0.022, INPUT=REF%, FEEDBACK=FDBK%, OUTPUT=OUT%)\n90 END\n"
+)
+PID_7010_US = 124.0
+BASE_LINES = 50
+"""Lines of one of the blocks that the long task is made of."""
+
+
+def column_ns(native: NativeTask, changes: dict[str, Callable[[int], int]], count: int = COLUMN) -> float:
+    """Return the time of one scan in a native loop over columns, ns: the best of some."""
+    compiled = native.compiled
+    columns = []
+    for name in compiled.latched:
+        kind = np.float64 if type_of_name(name) is DataType.REAL else np.int64
+        vary = changes.get(name, lambda _: 1 if name.endswith("@") else 0)
+        columns.append(np.array([vary(number) for number in range(count)], kind))
+    best = float("inf")
+    for _ in range(REPEATS):
+        state = compiled.layout.fresh()
+        began = time.perf_counter_ns()
+        done = native.columns(state, columns, count).done
+        best = min(best, (time.perf_counter_ns() - began) / count)
+        assert done == count
+    return best
+
+
+def called_ns(task: Task, compiled: CompiledTask) -> float:
+    """Return the time of one scan that a task executes in the form that it is given."""
+    task.install(compiled)
+    task.run()
+    memory = task.memory
+    views = [memory.view(name) for name in ("LINE_SP%", "FDBK%", "COUNT%", "START@", "READY@")]
+    for view, value in ((views[0], 3000), (views[3], True), (views[4], True)):
+        memory.write_now(view, value, 1)
+
+    def vary(number: int) -> None:
+        memory.write_now(views[1], number & 2047, 1)
+        memory.write_now(views[2], number * 7 & 4095, 1)
+
+    return scan_ns(task, vary)
+
+
+def next_ns(form: Callable[..., object], compiled: CompiledTask) -> float:
+    """Return the time of ``next`` alone, with memory that costs nothing: what latched is always one tuple."""
+
+    class Still:
+        latched = tuple(type_of_name(name).zero for name in compiled.latched)
+
+        def latch(self) -> tuple[object, ...]:
+            return self.latched
+
+        def commit(self, changes: object) -> None:
+            """Drop them."""
+
+        def log(self, line: int, code: int) -> None:
+            """Drop it."""
+
+    scans = form(compiled.layout.fresh(), Still())
+    best = float("inf")
+    for _ in range(REPEATS):
+        began = time.perf_counter_ns()
+        for _ in range(2000):
+            next(scans)  # type: ignore[call-overload]
+        best = min(best, (time.perf_counter_ns() - began) / 2000)
+    return best
+
+
+def built_s(text: str, *options: str) -> float:
+    """Return how long the compiler takes for a text, s."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = ["gcc", *FLAGS, *options, "-x", "c", "-", "-o", str(Path(folder, "made.so")), "-lm"]
+        began = time.perf_counter()
+        subprocess.run(command, input=text, text=True, check=True, capture_output=True)
+        return time.perf_counter() - began
+
+
+def long_text(lines: int) -> str:
+    """Return a task of that many lines: blocks and statements of each kind, over and over."""
+    kinds = [
+        "CALL SCALE(INPUT=A%, INPUT_MAX=4095, INPUT_MIN=0, OUTPUT_IMAX=4000, OUTPUT_IMIN=0, OUTPUT=B%)",
+        "CALL LAG(INPUT=B%, WLG=5.0, OUTPUT=C%)",
+        "CALL RAMP(INPUT=C%, ACCEL_RATE=40, DECEL_RATE=40, OUTPUT=D%)",
+        "A% = B% + C% * 3 / 7",
+        "CALL PROP_INT(INPUT=D%, KP=0.8, WLD=1.5, OUTPUT=E%)",
+        "IF X@ OR A% > 5 THEN R = R * 0.5 + E%",
+        "CALL AND(INPUT1=X@, INPUT2=Y@, OUTPUT1=X@)",
+        "CALL SUMMER(INPUT1=A%, INPUT2=-E%, OUTPUT=F%)",
+    ]
+    kinds = [kind.replace("INPUT2=-E%", "INPUT2=E%") for kind in kinds]
+    body = [f"{100 + 10 * number} {kinds[number % len(kinds)]}" for number in range(lines)]
+    head = "10 LOCAL A%, B%, C%, D%, E%, F%, R, X@, Y@\n20 CALL SCAN_LOOP(TICKS=40)\n"
+    return head + "\n".join(body) + f"\n{200 + 10 * lines} END\n"
+
+
+def report_making(name: str, text: str) -> None:
+    """Print how long translation and compiler take for a task."""
+    compiled = task_of(text)[0].compiled
+    began = time.perf_counter()
+    source = translate(compiled)
+    taken = time.perf_counter() - began
+    one, two = built_s(source.text, "-O1"), built_s(source.text)
+    print(f"{name:24}{taken:>10.2f} s{one:>10.2f} s{two:>10.2f} s{len(source.text) / 1000:>9.0f} kB")
+
+
+def main() -> None:
+    """Print all figures."""
+    task, _ = task_of(PROGRAM)
+    cache = NativeCache()
+    try:
+        native = native_form(task.compiled, cache)
+    except NotNative as reason:
+        print(f"no native scans here: {reason}")
+        return
+    python, in_c = task.compiled, replace(task.compiled, scans=native.scans)
+    rows = (
+        ("a task's scan, in Python", called_ns(task, python)),
+        ("a task's scan, native", called_ns(task, in_c)),
+        ("called, memory free, Python", next_ns(python.scans, python)),
+        ("called, memory free, native", next_ns(native.scans, python)),
+    )
+    print(f"program of {PROGRAM_BLOCKS} blocks{'ns a scan':>24}{'ratio':>9}")
+    for name, taken in rows:
+        print(f"{name:34}{taken:>10.0f}{rows[0][1] / taken:>9.1f}")
+    changes = {"LINE_SP%": lambda _: 3000, "FDBK%": lambda n: n & 2047, "COUNT%": lambda n: n * 7 & 4095}
+    loop = column_ns(native, changes)
+    print(f"{'native loop over columns':34}{loop:>10.1f}{rows[0][1] / loop:>9.1f}   wanted: 60 ns")
+    report_changing(cache)
+    print(f"\n{'made':24}{'translated':>12}{'gcc -O1':>12}{'gcc -O2':>12}{'text':>12}")
+    report_making(f"{PROGRAM_BLOCKS} blocks", PROGRAM)
+    report_making("2,000 lines", long_text(2000))
+
+
+def report_changing(cache: NativeCache) -> None:
+    """Print the time of a scan in which a PID's KP changes every time."""
+    task, memory = task_of(PID)
+    gain = task.compiled.layout.index("GAIN")
+    reference = memory.view("REF%")
+
+    def vary(number: int) -> None:
+        memory.write_now(reference, number & 4095, 1)
+
+    text = PID.replace("11 LOCAL GAIN [CURRENT=1.5, HIGH=10.0, LOW=0.1]\n", "11 LOCAL GAIN, K%\n").replace(
+        "30 CALL", "25 K% = K% + 1\n26 IF K% > 1000 THEN K% = 1\n27 GAIN = K% * 0.001 + 0.5\n30 CALL"
+    )
+    assert gain >= 0
+    task, memory = task_of(text)
+    taken = {}
+    for name, compiled in (
+        ("Python", task.compiled),
+        ("native", replace(task.compiled, scans=native_form(task.compiled, cache).scans)),
+    ):
+        task.install(compiled)
+        task.run()
+        taken[name] = scan_ns(task, vary)
+    print(f"\n{'PID, KP new in every scan':34}{'ns':>10}{'of 7010':>9}   the whole scan; wanted: 100")
+    for name, ns in taken.items():
+        print(f"{name:34}{ns:>10.0f}{PID_7010_US * 1000 / ns:>9.0f}")
+
+
+if __name__ == "__main__":
+    main()
