@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from automax_ros.compile.native.forms import NativeForms, NativeMode, NativeOutcome
     from automax_ros.compile.native.source import NativeSource, NotNative
     from automax_ros.compile.native.task import NativeTask, native_form
-    from automax_ros.compile.native.translate import translate
+    from automax_ros.compile.native.translation import translate
 
 __all__ = [
     "BesideLatch",
@@ -28,4 +28,4 @@ __all__ = [
     "translate",
 ]
 
-__getattr__ = face(__name__, "source", "executed", "cache", "task", "forms", "translate")
+__getattr__ = face(__name__, "source", "executed", "cache", "task", "forms", "translation")

@@ -17,7 +17,7 @@ from automax_ros.compile.native.columns import Columns
 from automax_ros.compile.native.executed import BesideLatch, Column, Executed
 from automax_ros.compile.native.slots import StateSlots, kind_of
 from automax_ros.compile.native.source import NativeSource, NotNative
-from automax_ros.compile.native.translate import translate
+from automax_ros.compile.native.translation import translate
 from automax_ros.compile.scan_io import ScanIo, ScanTooLong, StateValues
 
 _HOST = "automax_host"
