@@ -7,6 +7,7 @@ so that a loop inside another is not looked through from the beginning each time
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,9 @@ from automax_ros.compile.native.ranges import Range
 from automax_ros.compile.native.source import NotNative
 from automax_ros.compile.native.typed import Typed, bare, c_type, whole_text
 
+_PASSING = re.compile(r"(b\d+_\w+|t\d+|over|dropped)$")
+"""Locals of one block or statement."""
+
 
 class Body:
     """Translates the statements of one function; ``ends`` are the loops around a statement, the inmost last."""
@@ -24,15 +28,19 @@ class Body:
         """Take the function."""
         self.frame = frame
         self._loops: list[_Loop] = []
+        self._depth = 0
 
     def execute(self, statements: list[ast.stmt], known: Environment | None) -> Environment | None:
         """Emit statements; return what is known after them, None where nothing comes there."""
         before, self.frame.touched = self.frame.touched, set()
+        self._depth += 1
         known = self._execute(statements, known)
+        self._depth -= 1
         self.frame.touched |= before
         return known
 
     def _execute(self, statements: list[ast.stmt], known: Environment | None) -> Environment | None:
+        passed: set[str] = set()
         lines = [*(getattr(statement, "lineno", 0) for statement in statements), 0]
         for place, statement in enumerate(statements):
             if known is None:
@@ -44,8 +52,19 @@ class Body:
                     raise
                 raise NotNative(error.reason, lines[place]) from None
             if known is not None and lines[place] and lines[place] != lines[place + 1]:
-                known = self._held_to_types(known)
+                known = self._without_passing(self._held_to_types(known))
+                passed |= self.frame.touched
+                self.frame.touched.clear()
+        self.frame.touched |= passed
         return known
+
+    def _without_passing(self, known: Environment) -> Environment:
+        """Return what is known without the names that nothing reads after a BASIC line of straight code."""
+        fields = self.frame.fields
+        if self._depth > 1:
+            return known
+        gone = {name for name in self.frame.touched if name not in fields and _PASSING.match(name)}
+        return {name: item for name, item in known.items() if name not in gone} if gone else known
 
     def _held_to_types(self, known: Environment) -> Environment:
         """Emit, at the end of a BASIC line, that the scan ends where a variable is beyond what it can be.

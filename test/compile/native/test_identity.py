@@ -109,7 +109,7 @@ def check_tasks(count: int, least: int, number: int, cache: NativeCache) -> None
 
 @pytest.mark.usefixtures("without_strings")
 def test_random_tasks_are_the_same_in_c(tmp_path) -> None:
-    check_tasks(16, 6, 3, NativeCache(tmp_path / "cache"))
+    check_tasks(26, 10, 3, NativeCache(tmp_path / "cache"))
 
 
 @pytest.mark.soak
