@@ -13,14 +13,15 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from automax_ros.bags.chunk_table import ChunkTable, WholeChunk
+from automax_ros.bags.chunk_table import MOST_MESSAGES, ChunkTable, WholeChunk
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.opening import size_of
 from automax_ros.bags.reader import BagMessage, BagReader, ChannelReader, DataSource, FileOrder
 
-BLOCK_BYTES = 8 << 20
-"""A block ends with the chunk that makes it larger than this, in bytes unpacked (decision)."""
+BLOCK_BYTES = 32 << 20
+"""A block ends with the chunk that makes it larger than this, in bytes unpacked, or gives it more messages than a chunk
+may have (decision)."""
 _CHANNELS = 1 << 16
 
 
@@ -91,7 +92,7 @@ class _BlockFile:
         self.last_log: int | None = None
         self._chunks: list[bytes] = []
         self._tables: list[ChunkTable] = []
-        self._bytes = 0
+        self._bytes = self._messages = 0
 
     @property
     def position(self) -> int:
@@ -105,7 +106,7 @@ class _BlockFile:
                 table = self._table(record) if isinstance(record, WholeChunk) else None
                 if isinstance(record, WholeChunk) and table is not None:
                     self._keep(record, table)
-                    if self._bytes < BLOCK_BYTES:
+                    if self._bytes < BLOCK_BYTES and self._messages < MOST_MESSAGES:
                         continue
                 yield from self._kept()
                 if table is None:
@@ -168,6 +169,7 @@ class _BlockFile:
         self._chunks.append(chunk.data)
         self._tables.append(table)
         self._bytes += len(chunk.data)
+        self._messages += len(table.places)
 
     def _kept(self) -> Iterator[MessageBlock]:
         """Return the chunks kept so far as one block, and forget them."""
@@ -178,7 +180,7 @@ class _BlockFile:
         starts = np.concatenate([table.starts + begin for table, begin in zip(self._tables, begins, strict=False)])
         lengths = np.concatenate([table.lengths for table in self._tables])
         data = np.frombuffer(b"".join(self._chunks), np.uint8)
-        self._chunks, self._tables, self._bytes = [], [], 0
+        self._chunks, self._tables, self._bytes, self._messages = [], [], 0, 0
         numbers = heads["channel"].astype(np.int64)
         kinds = self._kinds[numbers]
         wanted = np.flatnonzero(kinds >= 0)
@@ -196,7 +198,7 @@ class _BlockFile:
 
     def _one_by_one(self, record: WholeChunk | RawMessage) -> Iterator[BagMessage]:
         """Return messages that stand in no block."""
-        records = self._file.chunk_messages(record.data) if isinstance(record, WholeChunk) else iter([record])
+        records = self._file.chunk_messages(record) if isinstance(record, WholeChunk) else iter([record])
         for raw in records:
             if not self._begun:
                 self._order.begin(self._file.path, raw.log_time)

@@ -31,6 +31,8 @@ _HEAD = np.dtype(
 _HEAD_SIZE = RECORD_HEAD.size + MESSAGE_FIELDS.size
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
 _MOST_DEFINITIONS = 10_000
+MOST_MESSAGES = 400_000
+"""A chunk with more messages than this is read one by one (decision: a bound on memory for untrusted recordings)."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +58,10 @@ class ChunkTable:
 
 
 class WholeChunk:
-    """The unpacked bytes of a chunk, and the indexes that follow it in the file."""
+    """The unpacked bytes of a chunk, which ends at a ``place`` of the file, and the indexes that follow it there."""
 
-    def __init__(self, data: bytes) -> None:
-        self.data = data
+    def __init__(self, data: bytes, place: int = 0) -> None:
+        self.data, self.place = data, place
         self._indexes: list[bytes] | None = []
         self._left = len(data) // _HEAD_SIZE * _ENTRY.itemsize
         """How many bytes entries can have at most."""
@@ -78,7 +80,7 @@ class WholeChunk:
 
     def table(self) -> ChunkTable | None:
         """Return where the messages stand; None where the indexes do not tell it for every byte of the chunk."""
-        if not self._indexes:
+        if not self._indexes or sum(map(len, self._indexes)) > MOST_MESSAGES * _ENTRY.itemsize:
             return None
         parts = [np.frombuffer(content, _ENTRY, offset=_INDEX_HEAD.size)["place"] for content in self._indexes]
         told = np.sort(np.concatenate(parts))

@@ -30,6 +30,8 @@ _FIRST_PRIVATE_OPCODE = 0x80
 """From here on opcodes belong to others; readers pass over what they do not know."""
 TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
 
+_END = -1
+"""Stands for the end of the data where an opcode is expected."""
 _Record = TypeVar("_Record")
 
 
@@ -57,6 +59,7 @@ class McapFile:
         self.schemas: dict[int, Schema] = {}
         self._definition_bytes = 0
         self._position = 0
+        self._place: int | None = None
         self._crc = 0
         self._unpacker = Unpacker(path, 0)
         self.chunks_read = 0
@@ -77,7 +80,8 @@ class McapFile:
         for opcode, content in self._parts():
             if opcode == Opcode.CHUNK:
                 if messages:
-                    yield from self.chunk_messages(self._unpacked(self._parsed(Chunk.read, content)))
+                    data = self._unpacked(self._parsed(Chunk.read, content))
+                    yield from self.chunk_messages(WholeChunk(data, self._position))
             elif opcode == Opcode.MESSAGE:
                 if messages:
                     yield self._message(content)
@@ -98,10 +102,14 @@ class McapFile:
         parts = self._parts()
         while True:
             try:
-                opcode, content = next(parts, (0, b""))
+                opcode, content = next(parts, (_END, b""))
                 chunk = None
                 if opcode == Opcode.CHUNK:
-                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content)))
+                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content)), self._position)
+                elif opcode == Opcode.ATTACHMENT:
+                    self._parsed(Attachment.read, content)
+                elif opcode == Opcode.METADATA:
+                    self._parsed(Metadata.read, content)
             except BagError:
                 if pending is not None:
                     yield pending
@@ -113,18 +121,19 @@ class McapFile:
             if pending is not None:
                 yield pending
             pending = chunk
-            if not opcode:
+            if opcode == _END:
                 return
             if opcode == Opcode.MESSAGE:
                 yield self._message(content)
 
-    def chunk_messages(self, data: bytes) -> Iterator[RawMessage]:
+    def chunk_messages(self, chunk: WholeChunk) -> Iterator[RawMessage]:
         """Return the messages of an unpacked chunk, and take over what it defines.
 
         Raises:
             BagError: it is damaged or beyond the limits.
         """
-        position = 0
+        data, position = chunk.data, 0
+        self._place = chunk.place
         while position < len(data):
             start = position + RECORD_HEAD.size
             if start > len(data):
@@ -139,6 +148,7 @@ class McapFile:
                 self.define(opcode, data[start:position])
             elif opcode < _FIRST_PRIVATE_OPCODE:
                 raise self._damaged(f"a record of kind {opcode} inside a chunk")
+        self._place = None
 
     def _parts(self) -> Iterator[tuple[int, bytes]]:
         """Return opcode and content of each record of the data; checks what stands around them, takes definitions."""
@@ -262,4 +272,5 @@ class McapFile:
         return BagError("AMX6814", self.path, message)
 
     def _damaged(self, message: str) -> BagError:
-        return BagError("AMX6813", self.path, f"{message} (before byte {self._position})", DAMAGED_HINT)
+        place = self._position if self._place is None else self._place
+        return BagError("AMX6813", self.path, f"{message} (before byte {place})", DAMAGED_HINT)

@@ -44,9 +44,21 @@ class Entries:
         first, last = int(offsets[0]), int(offsets[-1])
         return Entries(offsets - first, self.views[first:last], self.elements[first:last], self.values[first:last])
 
+    def of(self, rows: Ints) -> Entries:
+        """Return the entries of some messages."""
+        offsets, places = chosen(self.offsets, rows)
+        return Entries(offsets, self.views[places], self.elements[places], self.values[places])
+
     def row_of(self, entry: int) -> int:
         """Return the message of one entry."""
         return int(np.searchsorted(self.offsets, entry, side="right")) - 1
+
+
+def chosen(offsets: Ints, rows: Ints) -> tuple[Ints, Ints]:
+    """Return for some of the rows of a ragged list their own offsets, and the places of what they hold."""
+    counts = offsets[rows + 1] - offsets[rows]
+    own = np.concatenate((np.zeros(1, np.int64), np.cumsum(counts)))
+    return own, np.repeat(offsets[rows] - own[:-1], counts) + np.arange(int(own[-1]))
 
 
 class EntriesBuilder:

@@ -1,4 +1,4 @@
-"""The scans of one task in a block of a recording, as columns."""
+"""The scans of the tasks in a block of a recording, as columns."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from automax_ros.bags.blocks import MessageBlock
 from automax_ros.bags.errors import BagError
-from automax_ros.replay.columns.entries import Entries, EntriesBuilder, ValueRules
+from automax_ros.replay.columns.entries import Entries, EntriesBuilder, ValueRules, chosen
 from automax_ros.running.task import EVENT_TIMEOUT, OVERLAP
 from automax_ros.wire.cdr_columns import Array, Bytes, Ints, MessageColumns, decode_columns
 from automax_ros.wire.messages import NAMES, Scan
@@ -36,10 +36,15 @@ class ScanErrors:
         first, last = int(offsets[0]), int(offsets[-1])
         return ScanErrors(offsets - first, self.lines[first:last], self.codes[first:last])
 
+    def of(self, rows: Ints) -> ScanErrors:
+        """Return the errors of some scans."""
+        offsets, places = chosen(self.offsets, rows)
+        return ScanErrors(offsets, self.lines[places], self.codes[places])
+
 
 @dataclass(frozen=True)
 class ScanColumns:
-    """Scans of one task in the order of the file; ``places`` are those of their messages in the block.
+    """Scans in the order of the file; ``places`` are those of their messages in the block.
 
     ``odd`` are those that have to be taken one by one: malformed, not fitting the variables of the rack, with strings
     or with what came from elsewhere than common memory, or telling of a fault by time.
@@ -76,6 +81,22 @@ class ScanColumns:
             self.odd[begin:end],
         )
 
+    def of(self, rows: Ints) -> ScanColumns:
+        """Return some of the scans."""
+        return ScanColumns(
+            self.places[rows],
+            self.stamps[rows],
+            self.scans[rows],
+            self.durations[rows],
+            self.full[rows],
+            self.latched.of(rows),
+            self.read.of(rows),
+            self.written.of(rows),
+            self.committed.of(rows),
+            self.errors.of(rows),
+            self.odd[rows],
+        )
+
 
 def scans_by_task(
     block: MessageBlock, places: Ints, tasks: Sequence[str], rules: ValueRules
@@ -84,15 +105,14 @@ def scans_by_task(
 
     Returns too which of the places hold no scan of these tasks, as far as can be told.
     """
-    found: dict[str, ScanColumns] = {}
     names = _Names(block, places)
+    chosen_rows = {task: np.flatnonzero(names.of(task)) for task in tasks}
     left = np.ones(len(places), bool)
-    for task in tasks:
-        chosen = names.of(task)
-        left &= ~chosen
-        if chosen.any():
-            found[task] = _Builder(block, places[chosen]).made(rules)
-    return found, places[left]
+    for rows in chosen_rows.values():
+        left[rows] = False
+    # Scans of all tasks are decoded together: those of the same sizes are more so.
+    together = _Builder(block, places).made(rules)
+    return {task: together.of(rows) for task, rows in chosen_rows.items() if len(rows)}, places[left]
 
 
 class _Names:
@@ -118,7 +138,7 @@ class _Names:
 
 
 class _Builder:
-    """Builds the columns of one task from messages of the same sizes, and of others one by one."""
+    """Builds columns from messages of the same sizes, and of others one by one."""
 
     def __init__(self, block: MessageBlock, places: Ints) -> None:
         self.places = places
@@ -132,7 +152,9 @@ class _Builder:
         for group in groups:
             self._add(group)
         for row in odd.tolist():
-            self._add_one(block, row)
+            if not self._add_one(block, row):
+                self._bad[row:] = True  # a replay ends at the first malformed message
+                break
 
     def made(self, rules: ValueRules) -> ScanColumns:
         """Return the columns."""
@@ -160,16 +182,16 @@ class _Builder:
             builder.add(group, name)
         self._add_errors(rows, fields["errors.line"], fields["errors.code"])
 
-    def _add_one(self, block: MessageBlock, row: int) -> None:
+    def _add_one(self, block: MessageBlock, row: int) -> bool:
+        """Take one message; return FALSE if it is malformed."""
         try:
             scan = block.message(int(self.places[row])).message
         except BagError:
-            self._bad[row] = True
-            return
+            return False
         assert isinstance(scan, Scan)
         if scan.scan > np.iinfo(np.int64).max:
             self._bad[row] = True
-            return
+            return True
         for name, numbers in self._numbers.items():
             numbers[row] = getattr(scan, name)
         self._full[row] = scan.full
@@ -177,6 +199,7 @@ class _Builder:
             builder.add_one(row, getattr(scan, name))
         lines, codes = ([getattr(error, name) for error in scan.errors] for name in ("line", "code"))
         self._add_errors(np.array([row]), np.array([lines], np.int64), np.array([codes], np.int64))
+        return True
 
     def _add_errors(self, rows: Ints, lines: Array, codes: Array) -> None:
         if lines.shape[1]:

@@ -65,7 +65,9 @@ def write_columns(block: MessageBlock, places: Ints, run_id: int, rules: ValueRu
         builder.add(group, "values")
     for row in odd.tolist():
         write = _decoded(block, int(places[row]))
-        if write is not None and write.sequence < _LIMIT:
+        if write is None:
+            break  # a replay ends at the first malformed message
+        if write.sequence < _LIMIT:
             sequences[row], kinds[row], good[row] = write.sequence, write.kind, write.run_id == run_id
             builder.add_one(row, write.values)
     entries = builder.made()
