@@ -6,7 +6,8 @@ which stand in another order than that of sending.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import struct
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ BLOCK_BYTES = 32 << 20
 """A block ends with the chunk that makes it larger than this, in bytes unpacked, or gives it more messages than a chunk
 may have (decision)."""
 _CHANNELS = 1 << 16
+_TWO_NUMBERS = struct.Struct("<HH")
+"""What a schema or channel begins with: its own number, and in a channel that of its schema."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,7 @@ class _BlockFile:
         self._types = frozenset(types)
         self._kind_of = {name: kind for kind, name in enumerate(types)}
         self._kinds = np.full(_CHANNELS, -1, np.int64)
+        self._known: set[int] = set()
         self._begun = False
         self.last_log: int | None = None
         self._chunks: list[bytes] = []
@@ -133,35 +137,53 @@ class _BlockFile:
         unknown = [
             (number, int(table.places[first]))
             for number, first in zip(numbers.tolist(), firsts.tolist(), strict=True)
-            if number not in self._source.channels
+            if number not in self._known
         ]
         if not unknown and not table.definitions:
             return True
-        begins: dict[tuple[int, int], int] = {}
-        for place, opcode, content in table.definitions:
+        if not self._stand_before(unknown, table.definitions):
+            return False
+        for _, opcode, content in table.definitions:
             try:
                 self._file.define(opcode, content)
             except BagError:
                 return False
-            begins.setdefault((opcode, int.from_bytes(content[:2], "little")), place)
-        return all(self._is_readable(number, first, begins) for number, first in unknown)
+        return all(self._is_readable(number) for number, _ in unknown)
 
-    def _is_readable(self, number: int, first: int, begins: Mapping[tuple[int, int], int]) -> bool:
-        """Make the reader of a channel, if it can be read and was defined before the place of its first message."""
-        channel = self._file.channels.get(number)
-        if channel is None:
-            return False
-        keys = (int(Opcode.CHANNEL), number), (int(Opcode.SCHEMA), channel.schema_id)
-        if any(begins.get(key, -1) > first for key in keys):
-            return False
-        schema = self._file.schemas.get(channel.schema_id)
-        wanted = schema is not None and schema.name in self._types
-        try:
-            made = ChannelReader(self._source.path, channel, schema, wanted)
-        except BagError:
-            return False
-        self._source.channels[number] = made
-        if wanted:
+    def _stand_before(self, unknown: list[tuple[int, int]], definitions: Sequence[tuple[int, int, bytes]]) -> bool:
+        """Return whether channels and their schemas are known or stand before the places of the first messages."""
+        begins: dict[tuple[int, int], int] = {}
+        schemas = {number: channel.schema_id for number, channel in self._file.channels.items()}
+        for place, opcode, content in definitions:
+            if len(content) < _TWO_NUMBERS.size:
+                return False
+            number, schema = _TWO_NUMBERS.unpack_from(content)
+            begins.setdefault((opcode, number), place)
+            if opcode == Opcode.CHANNEL:
+                schemas.setdefault(number, schema)
+        for number, first in unknown:
+            if number not in schemas:
+                return False
+            channel_begins = -1 if number in self._file.channels else begins[int(Opcode.CHANNEL), number]
+            known = schemas[number] in self._file.schemas
+            schema_begins = -1 if known else begins.get((int(Opcode.SCHEMA), schemas[number]), -1)
+            if max(channel_begins, schema_begins) > first:
+                return False
+        return True
+
+    def _is_readable(self, number: int) -> bool:
+        """Make the reader of a channel, if it can be read."""
+        made = self._source.channels.get(number)
+        if made is None:
+            channel = self._file.channels[number]
+            schema = self._file.schemas.get(channel.schema_id)
+            wanted = schema is not None and schema.name in self._types
+            try:
+                made = self._source.channels[number] = ChannelReader(self._source.path, channel, schema, wanted)
+            except BagError:
+                return False
+        self._known.add(number)
+        if made.wanted:
             self._kinds[number] = self._kind_of[made.type_name]
         return True
 
