@@ -8,12 +8,8 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-<<<<<<< HEAD
 from automax_ros.bags.recorder import Recorder, RecordingOptions
-=======
-from automax_ros.bags.recorder import Recorder
 from automax_ros.compile.native.forms import NativeForms, NativeMode
->>>>>>> 815cff4 (Find the channels of a chunk that follows one read by itself; say what a replay by columns is, and measure it)
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.pieces import Where
