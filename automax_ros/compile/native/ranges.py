@@ -82,7 +82,7 @@ ANY_REAL = Range(Kind.REAL, -INFINITE, INFINITE)
 ANY_BOOL = Range(Kind.BOOL, 0, 1)
 UNBOUNDED = Range(Kind.INT, -INFINITE, INFINITE)
 
-_INTEGER_STEPS: tuple[float, ...] = (0, 1, 32768, 2**31, 2**33, 2**40, 2**53, 2**62, 2**100, INFINITE)
+_INTEGER_STEPS: tuple[float, ...] = (0, 1, 32768, 2**31 - 1, 2**31, 2**33, 2**40, 2**53, 2**62, 2**100, INFINITE)
 _REAL_STEPS: tuple[float, ...] = (
     0.0, 1.0, 8191.0, 16383.0, 32767.0, 32768.0, 65536.0, 2.0**31, 2.0**40, 2.0**53, REAL_LIMIT, 1e30, 1e100, INFINITE,
 )  # fmt: skip
