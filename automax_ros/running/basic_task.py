@@ -111,8 +111,6 @@ class BasicTask(Task):
     instant of its START EVERY.
     """
 
-    _io: BasicIo
-    _heard_io: BasicIo
     wish: Wish
     every: tuple[int, int, int] | None
 
@@ -201,7 +199,7 @@ class BasicTask(Task):
         self.scan_number += 1
         self._begins(now_ns)
         record = self._begin_record(now_ns, skipped, self._io) if self._recording else None
-        self._over(self.compiled.burst(self.state, self._io), now_ns)
+        self._over(self.compiled.burst(self.state, cast(BasicIo, self._io)), now_ns)
         return record
 
     def start_every(self, period_ns: int, now_ns: int) -> None:

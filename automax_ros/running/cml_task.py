@@ -131,8 +131,6 @@ class CmlTask(Task):
     ``Inputs`` and view of the commons that a force does not change for the loop.
     """
 
-    _io: CmlIo
-    _heard_io: CmlIo
     cml: BoundCall
 
     def __init__(
