@@ -137,7 +137,8 @@ class ValueRules:
         """Return entries as their variables hold them: whole numbers have no negative zero."""
         if not len(entries.views):
             return entries
-        values = np.where(self.real[entries.views], entries.values, entries.values + 0.0)
+        views = np.minimum(entries.views, self.count - 1)
+        values = np.where(self.real[views], entries.values, entries.values + 0.0)
         return Entries(entries.offsets, entries.views, entries.elements, values)
 
 
