@@ -23,7 +23,7 @@ from automax_ros.wire.stream import RackStream
 
 EXAMPLE = Path(__file__).parent.parent / "config" / "section_drive"
 SECONDS = 60
-SPLIT_SECONDS = 300
+SPLIT_SECONDS = 7200
 FILES = 8
 REPEATS = 3
 WANTED = 500
