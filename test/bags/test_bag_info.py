@@ -162,7 +162,7 @@ def test_a_damaged_chunk_ends_the_count(tmp_path: Path) -> None:
     file = bag / "scans_0.mcap"
     second = summary(file).chunk_indexes[1]
     data = bytearray(file.read_bytes())
-    data[second.chunk_start_offset + second.chunk_length - 20] ^= 0x40
+    data[second.chunk_start_offset + second.chunk_length // 2] ^= 0x40  # a bit near the end may be of no consequence
     file.write_bytes(data)
     info = bag_info(bag)
     assert [problem.code for problem in info.problems] == ["AMX6813"]
