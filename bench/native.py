@@ -1,6 +1,6 @@
 """Native scans: the program of 40 blocks in each form, coefficients that change, and how long it takes to make them.
 
-Printed beside Python's own time in the same run; the manual's times are those of the 7010 (section 53).
+Printed next to Python's own time in the same run; the manual's times are those of the 7010 (section 53).
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def main() -> None:
         ("called, memory free, Python", next_ns(python.scans, python)),
         ("called, memory free, native", next_ns(native.scans, python)),
     )
-    print(f"program of {PROGRAM_BLOCKS} blocks{'ns a scan':>24}{'ratio':>9}")
+    print(f"program of {PROGRAM_BLOCKS} blocks{'ns per scan':>24}{'ratio':>9}")
     for name, taken in rows:
         print(f"{name:34}{taken:>10.0f}{rows[0][1] / taken:>9.1f}")
     changes = {"LINE_SP%": lambda _: 3000, "FDBK%": lambda n: n & 2047, "COUNT%": lambda n: n * 7 & 4095}

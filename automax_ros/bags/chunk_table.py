@@ -106,7 +106,7 @@ class WholeChunk:
         return ChunkTable(heads, places, tuple(item for item in definitions if item is not None))
 
     def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[tuple[int, int, bytes] | None]:
-        """Return the records between messages; None for one that is no schema and no channel."""
+        """Return the records between messages; None for one that is neither schema nor channel."""
         for begin, end in gaps:
             position = begin
             while position < end:

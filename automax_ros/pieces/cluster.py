@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import pickle
 import queue
-import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -50,7 +49,7 @@ def on_cluster(
                 try:
                     number = over.get(timeout=_POLL_S)
                 except queue.Empty:
-                    cluster.require_alive()
+                    cluster.require_alive(_POLL_S)
                     continue
                 result, fault = cluster.outcome(pieces[number], futures[number])
                 del futures[number]  # which lets the cluster forget it
@@ -95,8 +94,8 @@ class _Cluster:
         self._client, self._scheduler = client, scheduler
         self._run = uuid.uuid4().hex
         self._own = installation()
-        self._next_look = 0.0
-        self._seen = time.monotonic()
+        self._unlooked_s = _LOOK_S
+        self._without_workers_s = 0.0
 
     def require_same(self) -> None:
         """Make sure that each worker that is there has the installation that we have.
@@ -124,7 +123,7 @@ class _Cluster:
         try:
             found = future.result()
         except Exception as error:
-            self.require_alive()
+            self.require_alive(_LOOK_S)
             return None, _fault(piece, error)
         if isinstance(found, Answer):
             return found.result, found.fault
@@ -133,16 +132,16 @@ class _Cluster:
             raise self._unlike(found.worker, found.installed)
         return None, death_of(piece.name, f"its workers have died ({', '.join(found.deaths)})")
 
-    def require_alive(self) -> None:
-        """Make sure that there is a scheduler, and before long a worker.
+    def require_alive(self, waited_s: float = 0.0) -> None:
+        """Make sure that there is a scheduler, and before long a worker; ``waited_s`` (s) went by without an answer.
 
         Raises:
             ClusterFault: there is none.
         """
-        now = time.monotonic()
-        if now < self._next_look and self._client.status == "running":
+        self._unlooked_s += waited_s
+        if self._unlooked_s < _LOOK_S and self._client.status == "running":
             return
-        self._next_look = now + _LOOK_S
+        passed_s, self._unlooked_s = self._unlooked_s, 0.0
         try:
             workers = self._client.status == "running" and self._client.scheduler_info()["workers"]
         except Exception:
@@ -150,9 +149,8 @@ class _Cluster:
         if workers is False:
             hint = "see that it runs, and give the command again: nothing is kept of what was under way"
             raise ClusterFault("AMX6853", self._scheduler, "the Dask scheduler is lost", hint)
-        if workers:
-            self._seen = now
-        elif now - self._seen > WITHOUT_WORKERS_S:
+        self._without_workers_s = 0.0 if workers else self._without_workers_s + passed_s
+        if self._without_workers_s > WITHOUT_WORKERS_S:
             what = f"the Dask scheduler has had no worker for {WITHOUT_WORKERS_S} s"
             raise ClusterFault("AMX6853", self._scheduler, what, f"start some: `dask worker {self._scheduler}`")
 

@@ -34,7 +34,7 @@ _BYTE = np.dtype(np.uint8)
 
 @dataclass(frozen=True)
 class MessageColumns:
-    """Messages of the same sizes: ``rows`` tells which, ascending.
+    """Messages of the same sizes: ``rows`` are their numbers, ascending.
 
     ``fields`` has for each number or time (ns) a column, for a sequence a matrix with a row for each message, for a
     text the matrix of its bytes. The fields of a message inside have its name and a dot in front.

@@ -84,7 +84,7 @@ class Surroundings:
 
 
 def assert_same(native: NativeTask, stretches: int, scans: int, *, forced: bool = False, seed: int = 1) -> None:
-    """Both forms execute ``stretches`` of ``scans`` each; between them the variables of the task are set anew."""
+    """Both forms execute ``stretches`` of ``scans`` each; between them the variables of the task are set again."""
     compiled = native.compiled
     both = [Surroundings(compiled, seed), Surroundings(compiled, seed)]
     forms = [
