@@ -39,6 +39,10 @@ class ScanRecord:
         self.skipped = skipped
         self.duration_ns = 0
 
+    def __repr__(self) -> str:
+        """Return all of it as text."""
+        return f"ScanRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in sorted(ScanRecord.__slots__))})"
+
 
 Steps = Generator[int, int | None, ScanRecord | None]
 """A scan in steps: yields the ns of execution before each access to actual memory, and is sent the time it is then.

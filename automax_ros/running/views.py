@@ -85,6 +85,10 @@ class WriteGroup:
         """Time, writer and kind: neighbours that have them in common travel in one message."""
         return self.time_ns, self.writer, self.kind
 
+    def __repr__(self) -> str:
+        """Return the entries as text."""
+        return f"WriteGroup({', '.join(map(repr, self.entries()))})"
+
     def entries(self) -> Iterator[Write]:
         """Yield the entries one by one."""
         for number, (view, value) in enumerate(self.changes, self.sequence):

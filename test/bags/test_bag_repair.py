@@ -133,7 +133,7 @@ def test_wherever_it_is_cut_every_whole_chunk_comes_back(bag: Path, tmp_path: Pa
 
 def test_what_stands_of_the_last_chunk_is_saved(tmp_path: Path) -> None:
     """Without compression all whole instants of a cut chunk come back, and nothing of the cut one."""
-    bag = recorded(tmp_path, RecordingOptions(StorageOptions(compression="none")), 3.0)
+    bag = recorded(tmp_path, RecordingOptions(StorageOptions(compression="none", chunk_ns=NS_PER_S)), 3.0)
     begin, end, _ = chunk_places(bag / "scans_0.mcap")[2]
     broken = cut(bag, tmp_path / "broken", (begin + end) // 2)
     report = repair(broken)
@@ -214,7 +214,7 @@ def test_a_damaged_chunk_costs_itself_only(bag: Path, tmp_path: Path) -> None:
     places = chunk_places(bag / "scans_0.mcap")
     begin, end, _ = places[2]
     data = bytearray((bag / "scans_0.mcap").read_bytes())
-    data[(begin + end) // 2] ^= 0x10
+    data[(begin + end) // 2] ^= 0xFF
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "scans_0.mcap").write_bytes(data)
     report = repair(tmp_path / "bag")

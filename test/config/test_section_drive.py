@@ -14,7 +14,9 @@ from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.rack.ros_names import set_topic
 from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.running.scan_record import ScanRecord
 from automax_ros.running.task import Task
+from automax_ros.running.views import WriteGroup
 
 FOLDER = Path(__file__).parents[2] / "config" / "section_drive"
 README = (FOLDER / "README.md").read_text(encoding="utf-8")
@@ -398,11 +400,12 @@ class Log:
     def __init__(self) -> None:
         self.entries: list[object] = []
 
-    def scanned(self, task: Task, record: object, writes: list[object]) -> None:
-        self.entries += [task.name, repr(record), *writes]
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
+        self.entries += [task.name, repr(record)]
+        self.written(writes)
 
-    def written(self, writes: list[object]) -> None:
-        self.entries += writes
+    def written(self, writes: list[WriteGroup]) -> None:
+        self.entries += [entry for group in writes for entry in group.entries()]
 
     def operated(self, operation) -> None:
         self.entries.append(operation)

@@ -117,7 +117,7 @@ def test_restored_values_are_in_the_log_of_writes(folder):
 
     class Observer:
         def written(self, entries):
-            writes.extend(entries)
+            writes.extend(entry for group in entries for entry in group.entries())
 
         def scanned(self, *_):
             pass

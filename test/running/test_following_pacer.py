@@ -114,6 +114,10 @@ def test_run_ends_at_its_time_and_leaves_what_is_due_then(pacer, scans):
     assert pacer.now_ns == 20 * NS_PER_MS
 
 
+def told(writes):
+    return tuple(str(entry) for group in writes for entry in group.entries())
+
+
 class Log:
     """All scans of a rack with what they wrote."""
 
@@ -121,10 +125,10 @@ class Log:
         self.scans: list[object] = []
 
     def scanned(self, task, record, writes):
-        self.scans.append((task.name, record.scan, record.time_ns, record.skipped, tuple(map(str, writes))))
+        self.scans.append((task.name, record.scan, record.time_ns, record.skipped, told(writes)))
 
     def written(self, writes):
-        self.scans.append(tuple(map(str, writes)))
+        self.scans.append(told(writes))
 
     def tuned(self, *_):
         pass

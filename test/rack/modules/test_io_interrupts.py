@@ -67,7 +67,8 @@ class Watching:
         self.written(writes)
 
     def written(self, writes) -> None:
-        self.writes += [(item.time_ns, self._specs[item.view].name, item.value) for item in writes]
+        entries = (item for group in writes for item in group.entries())
+        self.writes += [(item.time_ns, self._specs[item.view].name, item.value) for item in entries]
 
     def tuned(self, task, now_ns) -> None: ...
 
@@ -393,7 +394,8 @@ def test_writes_that_waited_are_the_writers_own(tmp_path):
     plain = seen.written
 
     def note(writes) -> None:
-        told.extend((item.writer, item.kind) for item in writes if rack.memory.specs[item.view].name == "POSITION%")
+        entries = (item for group in writes for item in group.entries())
+        told.extend((item.writer, item.kind) for item in entries if rack.memory.specs[item.view].name == "POSITION%")
         plain(writes)
 
     seen.written = note

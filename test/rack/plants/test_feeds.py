@@ -57,7 +57,7 @@ class Log:
         self._of = lambda write: (write.time_ns, names[write.view], write.value, kinds[write.writer])
 
     def written(self, writes) -> None:
-        self.writes += [self._of(write) for write in writes]
+        self.writes += [self._of(entry) for group in writes for entry in group.entries()]
 
     def scanned(self, _task, _record, writes) -> None:
         self.written(writes)
