@@ -39,6 +39,14 @@ class ScanRecord:
         self.skipped = skipped
         self.duration_ns = 0
 
+    def __eq__(self, other: object) -> bool:
+        """Return whether another record says the same."""
+        if not isinstance(other, ScanRecord):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in ScanRecord.__slots__)
+
+    __hash__ = None  # type: ignore[assignment]  # it changes while the scan goes on
+
     def __repr__(self) -> str:
         """Return all of it as text."""
         return f"ScanRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in sorted(ScanRecord.__slots__))})"

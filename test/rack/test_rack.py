@@ -56,6 +56,11 @@ NUMBERED = """\
 """
 
 
+def each(groups):
+    """The entries of groups of writes."""
+    return [entry for group in groups for entry in group.entries()]
+
+
 class Notes:
     """An observer that writes down what it is told."""
 
@@ -63,10 +68,10 @@ class Notes:
         self.events = []
 
     def scanned(self, task, record, writes):
-        self.events.append(("scanned", task.name, record.scan, record.time_ns, list(writes)))
+        self.events.append(("scanned", task.name, record.scan, record.time_ns, each(writes)))
 
     def written(self, writes):
-        self.events.append(("written", list(writes)))
+        self.events.append(("written", each(writes)))
 
     def tuned(self, task, now_ns):
         self.events.append(("tuned", task.name, now_ns))
