@@ -47,7 +47,8 @@ class Common:
         rack.observe(self)
 
     def written(self, writes):
-        self.seen += [(item.time_ns, item.value, self._stimulation.is_common) for item in writes]
+        entries = (item for group in writes for item in group.entries())
+        self.seen += [(item.time_ns, item.value, self._stimulation.is_common) for item in entries]
 
     def scanned(self, task, record, writes):  # noqa: ARG002
         self.written(writes)
