@@ -64,6 +64,7 @@ class DriveInterrupts:
         self._scheduler, self._measure = scheduler, measure
         self._key = EventKey(EventClass.IO, slot, "interrupt")
         self._event: ScheduledEvent | None = None
+        self._event_ns = 0
         self._scan: ScheduledEvent | None = None
         self._scan_key = self._key
         self._due: PeriodicAction = _nothing
@@ -75,13 +76,13 @@ class DriveInterrupts:
     @property
     def next_ns(self) -> int | None:
         """When the next one comes, None while it is not armed."""
-        return None if self._event is None else self._scheduler.due_ns(self._event)
+        return None if self._event is None else self._event_ns
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
         """Interrupt at an instant, and from then on each interval; ``due`` has its place ``key`` among the scans."""
         self.disarm()
         self._scan_key, self._due, self.armed = key, due, True
-        self._post(first_ns)
+        self._post(first_ns, ScheduledEvent(self._key, self._happen))
 
     def disarm(self) -> None:
         """Interrupt no more."""
@@ -94,9 +95,13 @@ class DriveInterrupts:
     def follow(self, next_ns: int) -> None:
         """Let the next one come as long after the last as a command says, ns; now where that has passed."""
         self.interval_ns = max(1, next_ns)
-        if self._event is not None:
+        if self._event is None:
+            return
+        at_ns, now_ns = self.at_ns + self.interval_ns, self._scheduler.now_ns
+        at_ns = max(at_ns, now_ns)
+        if at_ns != self._event_ns:
             self._event.cancel()
-            self._post(max(self._scheduler.now_ns, self.at_ns + self.interval_ns))
+            self._post(at_ns, ScheduledEvent(self._key, self._happen))
 
     def state(self) -> dict[str, int]:
         """Return when the last one was, and the interval; who arms it keeps when the next one comes."""
@@ -106,20 +111,21 @@ class DriveInterrupts:
         """Take over a state."""
         self.at_ns, self.interval_ns = state["at_ns"], state["interval_ns"]
 
-    def _post(self, at_ns: int) -> None:
-        self._event = self._scheduler.post(at_ns, ScheduledEvent(self._key, self._happen))
+    def _post(self, at_ns: int, event: ScheduledEvent) -> None:
+        self._event, self._event_ns = self._scheduler.post(at_ns, event), at_ns
 
     def _happen(self, now_ns: int, _: int) -> None:
-        scheduler = self._scheduler
-        self._event, self.at_ns = None, now_ns
+        scheduler, event = self._scheduler, self._event
+        assert event is not None
+        self.at_ns = now_ns
         self.timing.note(scheduler.wall_ns - now_ns)
+        # Before the scan, since in modeled execution time passes in it: it ends before the next interrupt at the latest.
+        self._post(now_ns + self.interval_ns, event)
         self._measure(now_ns)
         if scheduler.advance_to(now_ns, self._scan_key):
             self._due(now_ns, 0)
         else:
             self._scan = scheduler.at(now_ns, self._scan_key, self._scan_now)
-        if self.armed and self._event is None:
-            self._post(now_ns + self.interval_ns)
 
     def _scan_now(self, now_ns: int) -> None:
         self._scan = None

@@ -40,6 +40,17 @@ def test_modeled_and_ideal_execution_turn_the_motor_alike(tmp_path):
     assert other == pytest.approx(one, rel=0.05)
 
 
+def test_interrupts_come_amid_a_long_scan_of_another_task(tmp_path):
+    """In modeled time a task that computes for longer than two interrupts are apart is suspended at each of them."""
+    loop = "110 FOR N% = 1 TO 600\n120 SUM! = SUM! + N%\n130 NEXT N%\n"
+    work = f"10 COMMON PERMIT@\n20 LOCAL N%, SUM!\n100 CALL SCAN_LOOP(TICKS=8)\n{loop}150 END\n"
+    rack = started(tmp_path, execution="modeled", work=work)
+    by_name = {item.name: item.statistics for item in rack.scheduled}
+    assert by_name["WORK"].longest_ns > 2 * 2_777_778
+    assert rack.task("CML").scan_number == pytest.approx(1.6 * 360, abs=2)
+    assert rack.task("CML").errors.count == rack.task("WORK").errors.count == 0
+
+
 def test_the_motor_coasts_when_its_task_stops_and_does_not_restart_by_itself(tmp_path):
     rack = started(tmp_path)
     rack.operations.stop("CML")
