@@ -7,7 +7,7 @@ that takes a fifth of the codec's time. What is seldom (texts, errors, full latc
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from itertools import compress
 from operator import ne
 from typing import Final
@@ -27,10 +27,16 @@ _new = tuple.__new__
 _MOST: Final = 0xFFFFFFFF
 """The greatest uint32."""
 _HEAD = ("scan", "duration_ns", "skipped")
-_VALUES = (("latched.value",), ("read.value",), ("written.value",), ("committed.value",))
-Entries = tuple[tuple[tuple[int, ...], ...], tuple[Value, ...]]
-"""What recurs of accesses to actual memory (views, elements), and their values."""
-NOTHING: Entries = ((), ())
+_VALUES = (("latched.value",), ("committed.value",))
+_ENTRIES = (
+    ("latched.variable",), ("latched.value",),
+    ("read.variable",), ("read.element",), ("read.value",),
+    ("written.variable",), ("written.element",), ("written.value",),
+    ("committed.variable",), ("committed.value",),
+)  # fmt: skip
+"""What varies where only the numbers of entries recur."""
+_Columns = tuple[tuple[int, ...], tuple[int, ...], tuple[Value, ...]]
+_NO_ENTRIES: _Columns = ((), (), ())
 
 
 class TaskMessages:
@@ -46,7 +52,7 @@ class TaskMessages:
         self._fields = [field.name for field in layout.fields]
         self._sizes = [field.size for field in layout.fields]
         self._latched: Latched | None = None
-        self._scans = Patterns()
+        self._scans, self._scans_by_length = Patterns(), Patterns()
         self._quiet: Prepared | None = None
         self._alike_states: Prepared | None = None
         self._encode_scan, self._encode_state = encoder(NAMES[Scan]), encoder(NAMES[TaskState])
@@ -73,9 +79,9 @@ class TaskMessages:
             return self._encode_scan(self.scan(record, stamp, full=full))
         self._latched = latched
         if record.reads or record.writes:
-            return self._in_pattern(record, stamp, before, accesses(record.reads), accesses(record.writes))
+            return self._in_length(record, stamp, before)
         if latched != before or record.commits:
-            return self._in_pattern(record, stamp, before, NOTHING, NOTHING)
+            return self._in_pattern(record, stamp, before)
         quiet = self._quiet
         if quiet is None:
             message = self._scan(record, stamp, NO_VALUES, full=False)
@@ -124,19 +130,15 @@ class TaskMessages:
         except struct.error as error:
             raise CdrError(f"state of task {self._task.name}: {error}") from error
 
-    def _in_pattern(self, record: ScanRecord, stamp: int, before: Latched, reads: Entries, writes: Entries) -> bytes:
-        """Return the bytes of a scan in which something has happened that scans before it may have had in common."""
+    def _in_pattern(self, record: ScanRecord, stamp: int, before: Latched) -> bytes:
+        """Return the bytes of a scan that has latched and committed what others have before it."""
         latched, commits = record.latched, record.commits
         differs: tuple[bool, ...] = () if latched == before else tuple(map(ne, latched, before))
         views, values = zip(*commits, strict=True) if commits else ((), ())
-        key = (differs, views, reads[0], writes[0])
+        key = (differs, views)
         pattern = self._scans.known.get(key)
         if pattern is None:
-            changed = _changed(self._views, latched, differs)
-            message = self._scan(record, stamp, changed, full=False)
-            if not (message.latched.text or message.read.text or message.written.text or message.committed.text):
-                self._scans.learn(key, lambda: prepared(message, ("stamp",), _HEAD, *_VALUES))
-            return self._encode_scan(message)
+            return self._learnt(key, self._scans, _VALUES, record, stamp, differs)
         seconds, rest = stamp // NS_PER_S, stamp % NS_PER_S
         constants = pattern.constants
         duration, skipped = _fitting(record.duration_ns), _fitting(record.skipped)
@@ -152,15 +154,76 @@ class TaskMessages:
                 constants[2],
                 *compress(latched, differs),
                 constants[3],
-                *reads[1],
-                constants[4],
-                *writes[1],
-                constants[5],
                 *values,
-                constants[6],
+                constants[4],
             )
         except struct.error as error:
             raise CdrError(f"scan of task {self._task.name}: {error}") from error
+
+    def _in_length(self, record: ScanRecord, stamp: int, before: Latched) -> bytes:
+        """Return the bytes of a scan that has read or written beside its latch: as many values as others before it."""
+        latched = record.latched
+        differs: tuple[bool, ...] = () if latched == before else tuple(map(ne, latched, before))
+        changed_views, changed = tuple(compress(self._views, differs)), tuple(compress(latched, differs))
+        read_views, read_elements, read = _columns(record.reads)
+        written_views, written_elements, written = _columns(record.writes)
+        views, values = zip(*record.commits, strict=True) if record.commits else ((), ())
+        key = (len(changed), len(read), len(written), len(values))
+        pattern = self._scans_by_length.known.get(key)
+        if pattern is None:
+            return self._learnt(key, self._scans_by_length, _ENTRIES, record, stamp, differs)
+        seconds, rest = stamp // NS_PER_S, stamp % NS_PER_S
+        constants = pattern.constants
+        duration, skipped = _fitting(record.duration_ns), _fitting(record.skipped)
+        try:
+            return pattern.pack(
+                constants[0],
+                seconds,
+                rest,
+                constants[1],
+                record.scan,
+                duration,
+                skipped,
+                constants[2],
+                *changed_views,
+                constants[3],
+                *changed,
+                constants[4],
+                *read_views,
+                constants[5],
+                *read_elements,
+                constants[6],
+                *read,
+                constants[7],
+                *written_views,
+                constants[8],
+                *written_elements,
+                constants[9],
+                *written,
+                constants[10],
+                *views,
+                constants[11],
+                *values,
+                constants[12],
+            )
+        except struct.error:
+            # A text, which stands elsewhere, or what does not fit: the codec tells.
+            return self._encode_scan(self._scan(record, stamp, _changed(self._views, latched, differs), full=False))
+
+    def _learnt(
+        self,
+        key: Hashable,
+        patterns: Patterns,
+        groups: Sequence[Sequence[str]],
+        record: ScanRecord,
+        stamp: int,
+        differs: Sequence[bool],
+    ) -> bytes:
+        """Return the bytes of a scan by the codec; if such scans recur, they are packed from now on."""
+        message = self._scan(record, stamp, _changed(self._views, record.latched, differs), full=False)
+        if not (message.latched.text or message.read.text or message.written.text or message.committed.text):
+            patterns.learn(key, lambda: prepared(message, ("stamp",), _HEAD, *groups))
+        return self._encode_scan(message)
 
     def _scan(self, record: ScanRecord, stamp: int, changed: Values, *, full: bool) -> Scan:
         """Return the message of a scan of which it is known what it tells of its latch."""
@@ -190,12 +253,12 @@ def _fitting(number: int) -> int:
     return number if number <= _MOST else _MOST
 
 
-def accesses(entries: Sequence[tuple[int, int, Value]]) -> Entries:
-    """Return accesses to actual memory as what recurs, views and elements, and their values."""
+def _columns(entries: Sequence[tuple[int, int, Value]]) -> _Columns:
+    """Return accesses to actual memory as views, elements and values."""
     if not entries:
-        return NOTHING
+        return _NO_ENTRIES
     views, elements, values = zip(*entries, strict=True)
-    return (views, elements), values
+    return views, elements, values
 
 
 def _changed(views: Sequence[int], latched: Latched, differs: Sequence[bool]) -> Values:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain, groupby
-from operator import attrgetter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S
@@ -17,7 +15,7 @@ from automax_ros.wire.patterns import Patterns
 from automax_ros.wire.prepared import prepared
 from automax_ros.wire.values import values_of
 
-_KEY = attrgetter("key")
+_VALUES = (("values.variable",), ("values.element",), ("values.value",))
 
 
 class WriteMessages:
@@ -54,10 +52,10 @@ class WriteMessages:
             stamp = epoch_ns + group.time_ns
             return [(stamp, self._one(group, stamp, run_id))]
         found = []
-        for (time_ns, writer, kind), members in groupby(groups, key=_KEY):
-            stamp = epoch_ns + time_ns
-            entries = chain.from_iterable(_triples(member) for member in members)
-            found.append((stamp, self._encode(self.message(stamp, run_id, writer, kind, entries))))
+        for part in _neighbours(groups):
+            stamp = epoch_ns + part[0].time_ns
+            payload = self._one(part[0], stamp, run_id) if len(part) == 1 else self._several(part, stamp, run_id)
+            found.append((stamp, payload))
         return found
 
     def _one(self, group: WriteGroup, stamp: int, run_id: int) -> bytes:
@@ -76,6 +74,61 @@ class WriteMessages:
             return pattern.pack(first, seconds, rest, second, self.sequence, third, *values, last)
         except struct.error as error:
             raise CdrError(f"a write to common memory: {error}") from error
+
+    def _several(self, groups: Sequence[WriteGroup], stamp: int, run_id: int) -> bytes:
+        """Return the bytes of several groups of one key: those of a pattern by how many values there are.
+
+        Which values they are varies too: a drive's loop writes another record of DIAG_DATA at each scan.
+        """
+        views: list[int] = []
+        elements: list[int] = []
+        values: list[Value] = []
+        for group in groups:
+            for view, value in group.changes:
+                views.append(view)
+                elements.append(group.element)
+                values.append(value)
+        first = groups[0]
+        key = (first.writer, first.kind, len(views), run_id)
+        pattern = self._patterns.known.get(key)
+        if pattern is not None:
+            seconds, rest = stamp // NS_PER_S, stamp % NS_PER_S
+            constants, number = pattern.constants, self.sequence + 1
+            try:
+                payload = pattern.pack(
+                    constants[0],
+                    seconds,
+                    rest,
+                    constants[1],
+                    number,
+                    constants[2],
+                    *views,
+                    constants[3],
+                    *elements,
+                    constants[4],
+                    *values,
+                    constants[5],
+                )
+            except struct.error:
+                pattern = None  # a text, or what does not fit: the codec tells
+            else:
+                self.sequence = number
+                return payload
+        entries = zip(views, elements, values, strict=True)
+        message = self.message(stamp, run_id, first.writer, first.kind, entries)
+        if not message.values.text:
+            self._patterns.learn(key, lambda: prepared(message, ("stamp",), ("sequence",), *_VALUES))
+        return self._encode(message)
+
+
+def _neighbours(groups: Sequence[WriteGroup]) -> Iterator[Sequence[WriteGroup]]:
+    """Yield the parts of which each group has the same time, writer and kind."""
+    begin, first = 0, groups[0]
+    for place, group in enumerate(groups):
+        if group.time_ns != first.time_ns or group.writer != first.writer or group.kind is not first.kind:
+            yield groups[begin:place]
+            begin, first = place, group
+    yield groups[begin:]
 
 
 def _triples(group: WriteGroup) -> Iterable[tuple[int, int, Value]]:
