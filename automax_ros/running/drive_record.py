@@ -17,6 +17,7 @@ COMMAND_VIEW = 0xFFEF
 """The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers per pulse."""
 MEASURED_NAMES = (*Measured._fields, "time s", "time ns")
 COMMAND_NAMES = tuple(name for name in Command._fields if name != "pulses")
+_PULSES = Command._fields.index("pulses")
 MOST_PULSES = 16
 """Most gate windows of one command that are told (decision: six SCRs, each as first and as second, are twelve)."""
 MEASURED_NUMBERS = len(MEASURED_NAMES)
@@ -29,6 +30,7 @@ _PULSE = len(Pulse._fields)
 _SECONDS, _REST = len(Measured._fields), len(Measured._fields) + 1
 _USUAL = tuple(int(Measured._field_defaults.get(name, 0)) for name in Measured._fields)
 _USUAL_COMMAND = tuple(int(Command._field_defaults.get(name, 0)) for name in COMMAND_NAMES)
+_FIRST_PULSE = len(COMMAND_NAMES)
 
 
 def noted_measured(measured: Measured) -> list[Noted]:
@@ -48,18 +50,16 @@ def noted_time(now_ns: int) -> list[Noted]:
 
 def noted_command(command: Command) -> list[Noted]:
     """Return what is noted of a command: its first number always."""
-    values = command_numbers(command)
-    usual = (*_USUAL_COMMAND, *([0] * (len(values) - len(_USUAL_COMMAND))))
     return [
         (COMMAND_VIEW, place, value)
-        for place, (value, often) in enumerate(zip(values, usual, strict=True))
-        if value != often or not place
+        for place, value in enumerate(command_numbers(command))
+        if value != (_USUAL_COMMAND[place] if place < _FIRST_PULSE else 0) or not place
     ]
 
 
 def command_numbers(command: Command) -> list[int]:
     """Return a command as whole numbers."""
-    numbers = [int(getattr(command, name)) for name in COMMAND_NAMES]
+    numbers = [int(number) for number in command[:_PULSES] + command[_PULSES + 1 :]]
     for pulse in command.pulses[:MOST_PULSES]:
         numbers += pulse
     return numbers
@@ -88,7 +88,7 @@ def command_of(noted: Iterable[Noted]) -> Command | None:
         name: type(Command._field_defaults.get(name, 0))(numbers.get(place, _USUAL_COMMAND[place]))
         for place, name in enumerate(COMMAND_NAMES)
     }
-    first = len(COMMAND_NAMES)
+    first = _FIRST_PULSE
     count = (max(numbers) - first) // _PULSE + 1 if max(numbers) >= first else 0
     pulses = (first + _PULSE * number for number in range(count))
     return Command(

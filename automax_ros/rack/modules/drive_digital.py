@@ -12,7 +12,7 @@ from automax_ros.rack.modules.digital_io import (
     FMCR_BIT,
     PERMISSIVE_BIT,
 )
-from automax_ros.running.backplane import Backplane, Bank
+from automax_ros.running.backplane import Backplane
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import Scheduler
 
@@ -30,30 +30,31 @@ class DriveDigital:
         """Begin without a module; ``writer`` is the id under which outputs are written."""
         self._memory, self._backplane, self._scheduler, self._writer = memory, backplane, scheduler, writer
         self.slot: int | None = None
+        self._view: int | None = None
 
-    @property
+    def serve(self, slot: int | None) -> None:
+        """Take the module in a slot, None for none."""
+        if slot != self.slot:
+            bank = None if slot is None else self._backplane.bank(slot)
+            self.slot = slot
+            self._view = bank.view if bank is not None and bank.registers > DRIVE_OUTPUTS else None
+
     def status(self) -> int:
-        """The bits of ``Measured.status`` that the inputs set, forced ones as they are forced."""
-        bank = self._bank
-        if bank is None:
+        """Return the bits of ``Measured.status`` that the inputs set, forced ones as they are forced."""
+        if self._view is None:
             return 0
-        word = int(self._memory.read_now(bank.view, DRIVE_INPUTS))
+        word = int(self._memory.read_now(self._view, DRIVE_INPUTS))
         permissive = PERMISSIVE if word >> PERMISSIVE_BIT & 1 else 0
         return permissive | (EXTERNAL_TRIP if word >> EXTERNAL_TRIP_BIT & 1 else 0)
 
     def show(self, relays: int, *, ok: bool) -> None:
         """Set the contactor relays (FMCR, RMCR) and drive OK; the module's other outputs stay."""
-        bank = self._bank
-        if bank is None:
+        view = self._view
+        if view is None:
             return
         memory = self._memory
-        word = int(memory.read_now(bank.view, DRIVE_OUTPUTS))
+        word = int(memory.read_now(view, DRIVE_OUTPUTS))
         wanted = word & ~_OWN | relays << FMCR_BIT | ok << DRIVE_OK_BIT
         if wanted != word:
             memory.now_ns = self._scheduler.now_ns
-            memory.write_now(bank.view, wanted, self._writer, DRIVE_OUTPUTS, WriteKind.OUTSIDE)
-
-    @property
-    def _bank(self) -> Bank | None:
-        bank = None if self.slot is None else self._backplane.bank(self.slot)
-        return bank if bank is not None and bank.registers > DRIVE_OUTPUTS else None
+            memory.write_now(view, wanted, self._writer, DRIVE_OUTPUTS, WriteKind.OUTSIDE)

@@ -119,7 +119,7 @@ class DriveInterrupts:
         assert event is not None
         self.at_ns = now_ns
         self.timing.note(scheduler.wall_ns - now_ns)
-        # Before the scan, since in modeled execution time passes in it: it ends before the next interrupt at the latest.
+        # Before the scan: time passes in a modeled one, and in what follows it, at most to the next interrupt.
         self._post(now_ns + self.interval_ns, event)
         self._measure(now_ns)
         if scheduler.advance_to(now_ns, self._scan_key):

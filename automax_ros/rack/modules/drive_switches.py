@@ -34,9 +34,8 @@ class FrontSwitches:
         self._test = "centre"
         self._release: ScheduledEvent | None = None
 
-    @property
     def status(self) -> int:
-        """The bits of ``Measured.status`` that they set."""
+        """Return the bits of ``Measured.status`` that they set."""
         return _TEST_BITS[self._test] | (RESET_SWITCH if self._release is not None else 0)
 
     def move(self, switch: str, position: str) -> None:

@@ -6,8 +6,7 @@ while a rack is stopped, and rest without its power.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 from automax_ros.core.kinds import WriterKind
@@ -27,20 +26,19 @@ _AFTER_MODULES = 16
 """Priority among the I/O of an instant: modules have those of their slots."""
 
 
-@dataclass(frozen=True)
 class _Feed:
     """A feed with the place in memory that it writes."""
 
-    config: FeedConfig
-    view: int
-    writer: int
-    signal: Callable[[DrivePlant], float]
+    __slots__ = ("_scale", "_signal", "element", "view", "writer")
+
+    def __init__(self, config: FeedConfig, view: int, writer: int) -> None:
+        self.view, self.element, self.writer = view, config.element, writer
+        self._scale, self._signal = config.scale, SIGNALS[config.signal]
 
     def value(self, plant: DrivePlant) -> Value:
         """Return what the instrument shows now."""
-        found = self.signal(plant)
-        scale = self.config.scale
-        return found if scale is None else scale.counts_of(found)[0]
+        found = self._signal(plant)
+        return found if self._scale is None else self._scale.counts_of(found)[0]
 
 
 class PlantFeeds:
@@ -59,7 +57,7 @@ class PlantFeeds:
         writers = {item.name: item.id for item in writers_of(config) if item.kind is WriterKind.PLANT}
         self._groups: dict[tuple[str, int], list[_Feed]] = {}
         for item in (feed for feed in config.feeds if feed.plant in plants):
-            feed = _Feed(item, memory.view(item.common), writers[item.plant], SIGNALS[item.signal])
+            feed = _Feed(item, memory.view(item.common), writers[item.plant])
             self._groups.setdefault((item.plant, item.every_ns), []).append(feed)
 
     def begin(self, operations: Operations, observers: Observers) -> None:
@@ -85,7 +83,7 @@ class PlantFeeds:
         memory = self._memory
         memory.now_ns = now_ns
         for feed in feeds:
-            view, element = feed.view, feed.config.element
+            view, element = feed.view, feed.element
             value = memory.accepted(view, feed.value(plant), element)
             if memory.read_now(view, element) != value:
                 self._inputs.write(view, element, value, feed.writer)
