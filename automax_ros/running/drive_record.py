@@ -17,7 +17,6 @@ COMMAND_VIEW = 0xFFEF
 """The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers per pulse."""
 MEASURED_NAMES = (*Measured._fields, "time s", "time ns")
 COMMAND_NAMES = tuple(name for name in Command._fields if name != "pulses")
-_PULSES = Command._fields.index("pulses")
 MOST_PULSES = 16
 """Most gate windows of one command that are told (decision: six SCRs, each as first and as second, are twelve)."""
 MEASURED_NUMBERS = len(MEASURED_NAMES)
@@ -59,7 +58,7 @@ def noted_command(command: Command) -> list[Noted]:
 
 def command_numbers(command: Command) -> list[int]:
     """Return a command as whole numbers."""
-    numbers = [int(number) for number in command[:_PULSES] + command[_PULSES + 1 :]]
+    numbers = [command.next_ns, command.relays, command.level, int(command.block), int(command.ok)]
     for pulse in command.pulses[:MOST_PULSES]:
         numbers += pulse
     return numbers
