@@ -116,7 +116,7 @@ class Notes:
         self.written(writes)
 
     def written(self, writes) -> None:
-        self.entries += [("write", *write[1:]) for write in writes]
+        self.entries += [("write", *write[1:]) for group in writes for write in group.entries()]
 
     def tuned(self, task, now_ns) -> None: ...
 
