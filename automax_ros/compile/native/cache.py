@@ -1,4 +1,4 @@
-"""The user's cache of native code: shared libraries by the hash of all that they are made of.
+"""The user's cache of native code: shared libraries and texts, by the hash of all that they are made of.
 
 Code that somebody else can write is never loaded: the folder, what lies above it and each file belong to the user (or,
 above the folder, to root) and nobody else can write them; symbolic links are not followed. A file ends with the SHA-256
@@ -26,7 +26,7 @@ MOST_BYTES = 256 << 20
 """Size that a cache may have; what was not used for longest goes first (decision)."""
 STALE_S = 3600
 """Age after which an unfinished file is taken for that of a process which was killed, s (decision)."""
-_ENDING, _UNFINISHED = ".so", ".unfinished"
+_LIBRARY, _TEXT, _UNFINISHED = ".so", ".text", ".unfinished"
 _DIGEST = 32
 """Bytes of SHA-256."""
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
@@ -60,23 +60,16 @@ class NativeCache:
         Raises:
             NotNative: somebody else can write what would be loaded.
         """
-        place = self._place()
-        with _opened(place) as folder:
-            try:
-                file = os.open(key + _ENDING, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK, dir_fd=folder)
-            except FileNotFoundError:
-                return None
-            except OSError as error:
-                raise NotNative(_unusable(place / (key + _ENDING), error.strerror or str(error))) from error
-            try:
-                _require_own(os.fstat(file), place / (key + _ENDING), stat.S_ISREG)
-                if not _is_whole(file):
-                    return None
-                with contextlib.suppress(OSError):
-                    os.utime(file)
-            finally:
-                os.close(file)
-        return place / (key + _ENDING)
+        place = self._place() / (key + _LIBRARY)
+        return None if _content(place) is None else place
+
+    def read(self, key: str) -> bytes | None:
+        """Return the text that is kept under a key, None where there is none or only a damaged one.
+
+        Raises:
+            NotNative: somebody else can write it.
+        """
+        return _content(self._place() / (key + _TEXT))
 
     def store(self, key: str, library: bytes) -> Path:
         """Keep a library; return where it lies.
@@ -84,14 +77,25 @@ class NativeCache:
         Raises:
             NotNative: it cannot be written there, or somebody else could write it.
         """
+        return self._store(key + _LIBRARY, library)
+
+    def keep(self, key: str, text: bytes) -> None:
+        """Keep a text.
+
+        Raises:
+            NotNative: it cannot be written there, or somebody else could write it.
+        """
+        self._store(key + _TEXT, text)
+
+    def _store(self, name: str, content: bytes) -> Path:
         place = self._place()
         with _opened(place) as folder:
             try:
-                self._write(folder, key, library + hashlib.sha256(library).digest())
-                self._make_room(folder, key + _ENDING)
+                self._write(folder, name, content + hashlib.sha256(content).digest())
+                self._make_room(folder, name)
             except OSError as error:
                 raise NotNative(_unusable(place, error.strerror or str(error))) from error
-        return place / (key + _ENDING)
+        return place / name
 
     def _place(self) -> Path:
         folder = user_folder() if self.folder is None else self.folder
@@ -104,36 +108,38 @@ class NativeCache:
         except OSError as error:
             raise NotNative(_unusable(folder, error.strerror or str(error))) from error
 
-    def _write(self, folder: int, key: str, content: bytes) -> None:
-        name = f"{key}.{secrets.token_hex(8)}{_UNFINISHED}"
-        file = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600, dir_fd=folder)
+    def _write(self, folder: int, name: str, content: bytes) -> None:
+        unfinished = f"{name}.{secrets.token_hex(8)}{_UNFINISHED}"
+        file = os.open(
+            unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600, dir_fd=folder
+        )
         try:
             with os.fdopen(file, "wb") as stream:
                 stream.write(content)
                 stream.flush()
                 os.fsync(stream.fileno())
-            os.rename(name, key + _ENDING, src_dir_fd=folder, dst_dir_fd=folder)
+            os.rename(unfinished, name, src_dir_fd=folder, dst_dir_fd=folder)
         except BaseException:
             with contextlib.suppress(OSError):
-                os.unlink(name, dir_fd=folder)
+                os.unlink(unfinished, dir_fd=folder)
             raise
 
     def _make_room(self, folder: int, kept: str) -> None:
-        """Remove what killed processes have left, then the oldest libraries until the others fit."""
+        """Remove what killed processes have left, then the oldest files until the others fit."""
         total, now = 0, os.stat(kept, dir_fd=folder).st_mtime
-        for _, size, name in sorted(_libraries(folder, now), reverse=True):
+        for _, size, name in sorted(_files(folder, now), reverse=True):
             total += size
             if total > self.most_bytes and name != kept:
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(name, dir_fd=folder)
 
 
-def _libraries(folder: int, now: float) -> Iterator[tuple[float, int, str]]:
-    """Yield time, size and name of each library; remove what is unfinished and old; ``now`` as files have it, s."""
+def _files(folder: int, now: float) -> Iterator[tuple[float, int, str]]:
+    """Yield time, size and name of each file; remove what is unfinished and old; ``now`` as files have it, s."""
     for name in os.listdir(folder):
         with contextlib.suppress(FileNotFoundError):
             known = os.stat(name, dir_fd=folder, follow_symlinks=False)
-            if name.endswith(_ENDING):
+            if name.endswith((_LIBRARY, _TEXT)):
                 yield known.st_mtime, known.st_size, name
             elif name.endswith(_UNFINISHED) and known.st_mtime < now - STALE_S:
                 os.unlink(name, dir_fd=folder)
@@ -177,10 +183,31 @@ def _require_safe_above(path: Path) -> None:
         raise NotNative(f"{path} can be written by other users: chmod go-w {path}, or set XDG_CACHE_HOME elsewhere")
 
 
-def _is_whole(file: int) -> bool:
+def _content(path: Path) -> bytes | None:
+    """Return what a file of the cache holds, None where it is not there or damaged; mark it as used."""
+    with _opened(path.parent) as folder:
+        try:
+            file = os.open(path.name, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK, dir_fd=folder)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise NotNative(_unusable(path, error.strerror or str(error))) from error
+        try:
+            _require_own(os.fstat(file), path, stat.S_ISREG)
+            content = _undamaged(file)
+            if content is not None:
+                with contextlib.suppress(OSError):
+                    os.utime(file)
+            return content
+        finally:
+            os.close(file)
+
+
+def _undamaged(file: int) -> bytes | None:
     with os.fdopen(os.dup(file), "rb") as stream:
-        content = stream.read()
-    return hashlib.sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]
+        stored = stream.read()
+    content = stored[:-_DIGEST]
+    return content if hashlib.sha256(content).digest() == stored[-_DIGEST:] else None
 
 
 def _unusable(path: Path, why: str) -> str:

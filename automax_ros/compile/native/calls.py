@@ -17,7 +17,7 @@ from types import FunctionType
 from automax_ros.compile import functions
 from automax_ros.compile.coefficient_function import CoefficientFunction
 from automax_ros.compile.native.coefficients import FORMULAS, coefficient_tree, raised
-from automax_ros.compile.native.context import Environment
+from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.expressions import extreme
 from automax_ros.compile.native.frame import Frame
 from automax_ros.compile.native.ranges import (
@@ -116,7 +116,7 @@ def _general(known: Range) -> Range:
 def _frame_of(frame: Frame, parsed: ast.FunctionDef, scope: Mapping[str, object], ranges: list[Range]) -> Frame:
     """Return a function translated for arguments of some ranges; those that it cannot be are those of the call."""
     made = Frame(frame.unit, scope, called)
-    known = dict(zip((argument.arg for argument in parsed.args.args), ranges, strict=True))
+    known = Environment(dict(zip((argument.arg for argument in parsed.args.args), ranges, strict=True)))
     for name, item in known.items():
         made.parameter(name, item)
     try:

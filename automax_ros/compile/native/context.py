@@ -6,25 +6,8 @@ import ast
 from collections.abc import Sequence
 from typing import Protocol
 
-from automax_ros.compile.native.ranges import Range
+from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.typed import Typed
-
-Environment = dict[str, Range]
-"""What is known of each name that has a value, at one place of a function."""
-
-
-def joined(first: Environment | None, second: Environment | None) -> Environment | None:
-    """Return what is known where two paths meet: a name that has no value on one of them has none; None: no path."""
-    if first is None or second is None:
-        return second if first is None else first
-    if first is second:
-        return first
-    met: Environment = {}
-    for name, known in first.items():
-        other = second.get(name)
-        if other is not None:  # most are the same object: a branch sets few names of the whole task
-            met[name] = known if other is known else known.joined(other)
-    return met
 
 
 class Context(Protocol):

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from automax_ros.compile.folding import value_of
-from automax_ros.compile.native.context import Context, Environment
+from automax_ros.compile.native.context import Context
+from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.ranges import (
     ANY_BOOL,
     ANY_REAL,

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 LINE_NS = 75
 """What a line of a task takes in a scan in Python, ns, about: a block does."""
-WORTHWHILE_NS = 2_000_000_000
-"""Time that scans must take in Python for native ones to be built or looked for, ns (decision).
-
-To translate and build a task takes from half a second to a few; loading alone, some hundredths.
+WORTHWHILE_NS, WORTHWHILE_LINE_NS = 2_000_000_000, 10_000_000
+"""Time that scans must take in Python for native ones to be built or looked for, ns, and what each line of the task
+adds to that (decision: twice what it takes at most to translate and build the task the first time, which is a second,
+and 5 ms a line; what is kept from another run takes some hundredths).
 """
 
 
@@ -103,8 +103,8 @@ class NativeForms:
         if self.expected_ns is None:
             return True
         period = compiled.program.period_ns
-        scans = self.expected_ns // period if period else 0
-        return scans * len(compiled.program.scan) * LINE_NS >= WORTHWHILE_NS
+        scans, lines = self.expected_ns // period if period else 0, len(compiled.program.scan)
+        return scans * lines * LINE_NS >= WORTHWHILE_NS + lines * WORTHWHILE_LINE_NS
 
 
 IN_PYTHON = NativeForms()

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from automax_ros.compile.native import expressions, refinement
-from automax_ros.compile.native.context import Environment
+from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.ranges import Kind, Range, span
 from automax_ros.compile.native.source import NotNative
 from automax_ros.compile.native.typed import WIDE, Typed, bare, c_type, literal, whole_text
@@ -113,7 +113,7 @@ class Frame:
         place = kinds.setdefault(known.kind, name if not kinds else f"{name}_as_{known.kind.name.lower()}")
         if known.is_wide:
             self._wide.add(place)
-        self.locals[place] = WIDE if place in self._wide else known.kind.value
+        self.locals[place] = WIDE if place in self._wide else known.kind.c_type
         return place
 
     def _place_of_field(self, name: str, known: Range) -> str:

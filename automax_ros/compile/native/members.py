@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 
-from automax_ros.compile.native.context import Environment
+from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.frame import Frame, Member
 from automax_ros.compile.native.ranges import ANY_BOOL, Kind, Range, of_type
 from automax_ros.compile.native.source import NotNative

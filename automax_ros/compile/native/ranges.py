@@ -15,13 +15,19 @@ from automax_ros.core.types import DataType
 
 
 class Kind(enum.Enum):
-    """What Python holds a value as; the value is the type in C."""
+    """What Python holds a value as; ``c_type`` is the type in C."""
 
     BOOL = "bool"
     INT = "int64_t"
     REAL = "double"
 
+    def __init__(self, c_type: str) -> None:
+        """Take the type in C."""
+        self.c_type = c_type
 
+
+_BOOL, _INT, _REAL = Kind
+"""Names of their own: an enumeration's member is slow to get, and a long task asks some million times."""
 INT64_MAX = 2**63 - 1
 EXACT_IN_DOUBLE = 2**53
 """Every whole number up to this is a double; beyond, C and Python compare an integer with a double differently."""
@@ -39,17 +45,17 @@ class Range:
     @property
     def is_whole(self) -> bool:
         """Whether Python computes with it as with an integer."""
-        return self.kind is Kind.INT or self.kind is Kind.BOOL
+        return self.kind is _INT or self.kind is _BOOL
 
     @property
     def is_wide(self) -> bool:
         """Whether an integer of it needs more than 64 bits."""
-        return self.kind is Kind.INT and (self.low < -INT64_MAX or self.high > INT64_MAX)
+        return self.kind is _INT and (self.low < -INT64_MAX or self.high > INT64_MAX)
 
     @property
     def is_exact(self) -> bool:
         """Whether each of its values is a double."""
-        return self.kind is Kind.REAL or (self.low >= -EXACT_IN_DOUBLE and self.high <= EXACT_IN_DOUBLE)
+        return self.kind is _REAL or (self.low >= -EXACT_IN_DOUBLE and self.high <= EXACT_IN_DOUBLE)
 
     @property
     def only(self) -> float | None:
@@ -96,7 +102,7 @@ def _beyond(steps: tuple[float, ...], bound: float) -> float:
 
 def exactly(value: float) -> Range:
     """Return the range of a literal."""
-    kind = Kind.BOOL if isinstance(value, bool) else Kind.INT if isinstance(value, int) else Kind.REAL
+    kind = _BOOL if isinstance(value, bool) else _INT if isinstance(value, int) else _REAL
     return ANY_REAL if math.isnan(value) else Range(kind, value, value)
 
 

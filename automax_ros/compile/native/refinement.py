@@ -6,7 +6,8 @@ import ast
 import math
 from dataclasses import replace
 
-from automax_ros.compile.native.context import Context, Environment, joined
+from automax_ros.compile.native.context import Context
+from automax_ros.compile.native.environment import Environment, joined
 from automax_ros.compile.native.ranges import INFINITE, Range
 
 _OPPOSITE: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -47,10 +48,10 @@ def _truth_of(name: str, known: Environment, *, truth: bool) -> Environment | No
     if present is None or not present.is_whole:
         return known
     if not truth:
-        return {**known, name: replace(present, low=0, high=0)} if present.low <= 0 <= present.high else None
+        return known.setting(name, replace(present, low=0, high=0)) if present.low <= 0 <= present.high else None
     low = 1 if present.low == 0 else present.low
     high = -1 if present.high == 0 else present.high
-    return {**known, name: replace(present, low=low, high=high)} if low <= high else None
+    return known.setting(name, replace(present, low=low, high=high)) if low <= high else None
 
 
 def _all_of(frame: Context, test: ast.BoolOp, known: Environment) -> Environment | None:
@@ -112,7 +113,7 @@ def _bounded(
         return None if present.is_whole and bound.is_whole else known
     if (low, high) == (present.low, present.high):
         return known
-    return {**known, name.id: replace(present, low=low, high=high)}
+    return known.setting(name.id, replace(present, low=low, high=high))
 
 
 def _limits(present: Range, relation: type[ast.cmpop], bound: Range) -> tuple[float, float]:

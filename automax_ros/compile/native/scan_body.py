@@ -6,7 +6,7 @@ import ast
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from automax_ros.compile.native.context import Environment
+from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.frame import Frame
 from automax_ros.compile.native.ranges import ANY_BOOL, Kind, Range
 from automax_ros.compile.native.source import NotNative
@@ -38,7 +38,7 @@ class ScanBody(Body):
         return super()._assign(statement, known)
 
     def _latch(self, names: list[str], known: Environment) -> Environment:
-        known = dict(known)
+        known = known.copy()
         for place, (name, item) in enumerate(zip(names, self._latched, strict=True)):
             slot = f"latched[{place}][k]"
             text = {Kind.INT: f"{slot}.i", Kind.BOOL: f"({slot}.i != 0)", Kind.REAL: f"{slot}.d"}[_kind(item)]
@@ -46,7 +46,7 @@ class ScanBody(Body):
         return known
 
     def _forces(self, names: list[str], known: Environment) -> Environment:
-        known = dict(known)
+        known = known.copy()
         for place, name in enumerate(names):
             self.frame.store(name, Typed(f"(forced[{place}] != 0)", ANY_BOOL), known)
         return known

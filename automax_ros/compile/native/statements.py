@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from automax_ros.compile.native.context import Environment, joined
+from automax_ros.compile.native.environment import Environment, joined
 from automax_ros.compile.native.frame import Frame
 from automax_ros.compile.native.ranges import Range
 from automax_ros.compile.native.source import NotNative
@@ -64,7 +64,7 @@ class Body:
         if self._depth > 1:
             return known
         gone = {name for name in self.frame.touched if name not in fields and _PASSING.match(name)}
-        return {name: item for name, item in known.items() if name not in gone} if gone else known
+        return known.without(gone) if gone else known
 
     def _held_to_types(self, known: Environment) -> Environment:
         """Emit, at the end of a BASIC line, that the scan ends where a variable is beyond what it can be.
@@ -84,7 +84,7 @@ class Body:
             tests += [f"{place} > {whole_text(int(declared.high))}"] * (present.high > declared.high)
             frame.emit(f"if ({' || '.join(tests)}) return AUTOMAX_FAULT;")
             low, high = max(present.low, declared.low), min(present.high, declared.high)
-            known = {**known, name: Range(declared.kind, low, high)}
+            known = known.setting(name, Range(declared.kind, low, high))
         return known
 
     def _one(self, statement: ast.stmt, known: Environment) -> Environment | None:
@@ -100,7 +100,7 @@ class Body:
         self.frame.asks_end = False
 
     def _assign(self, statement: ast.Assign, known: Environment) -> Environment:
-        known = dict(known)
+        known = known.copy()
         target = statement.targets[0]
         if isinstance(target, ast.Tuple):
             self._assign_all(target, statement.value, known)
@@ -150,7 +150,7 @@ class Body:
         target = statement.target
         if not isinstance(target, ast.Name):
             raise NotNative("a sum into what is not a name")
-        known = dict(known)
+        known = known.copy()
         node = ast.BinOp(ast.Name(target.id, ast.Load()), statement.op, statement.value)
         self.frame.store(target.id, self.frame.value(node, known), known)
         self.asked()
@@ -189,7 +189,7 @@ class Body:
 
     def _while(self, statement: ast.While, known: Environment) -> Environment | None:
         frame, kept = self.frame, self.frame.loops.get(id(statement))
-        top = known if kept is None else _joined(known, kept)
+        top = known if kept is None else known.joined(kept)
         begin = len(frame.lines)
         while True:
             loop = _Loop()
@@ -197,11 +197,19 @@ class Body:
             del frame.lines[begin:]
             leaves = self._turn(statement, top, loop)
             self._loops.pop()
-            again = joined(top, loop.continued)
-            assert again is not None
-            if all(top[name].holds(again[name]) for name in again) and len(again) == len(top):
+            again = top if loop.continued is None else top.joined(loop.continued)
+            grown = {
+                name: after
+                for name, before, after in top.differing(again)
+                if before is None or after is None or not before.holds(after)
+            }
+            if not grown:
                 break
-            top = {name: frame.pinned(name, top[name].widened(item)) for name, item in again.items()}
+            wider = again.copy()
+            for name, after in grown.items():
+                if after is not None:
+                    wider[name] = frame.pinned(name, top[name].widened(after))
+            top = wider
         frame.loops[id(statement)] = top
         return joined(leaves, loop.broken)
 
@@ -289,9 +297,3 @@ class _Loop:
     def __init__(self) -> None:
         self.broken: Environment | None = None
         self.continued: Environment | None = None
-
-
-def _joined(first: Environment, second: Environment) -> dict[str, Range]:
-    found = joined(first, second)
-    assert found is not None
-    return found

@@ -15,9 +15,9 @@ from automax_ros.compile.native.build import LIMIT_S, library, python_options
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.columns import Columns
 from automax_ros.compile.native.executed import BesideLatch, Column, Executed
+from automax_ros.compile.native.kept_translations import kept_translation
 from automax_ros.compile.native.slots import StateSlots, kind_of
 from automax_ros.compile.native.source import NativeSource, NotNative
-from automax_ros.compile.native.translation import translate
 from automax_ros.compile.scan_io import ScanIo, ScanTooLong, StateValues
 
 _HOST = "automax_host"
@@ -60,7 +60,7 @@ class NativeTask:
 def native_form(
     compiled: CompiledTask,
     cache: NativeCache,
-    translator: Callable[[CompiledTask], NativeSource] = translate,
+    translator: Callable[[CompiledTask], NativeSource] | None = None,
     limit_s: float = LIMIT_S,
 ) -> NativeTask:
     """Return the native form of a task, from the cache or built now. Any thread may ask for it.
@@ -69,9 +69,9 @@ def native_form(
         NotNative: the task cannot be native, or not here, and why.
     """
     try:
-        source = translator(compiled)
-        path = library(source.text, cache, limit_s=limit_s)
-        return NativeTask(compiled, source, path, host_module(cache, limit_s))
+        host = host_module(cache, limit_s)  # first, since it says in no time what is missing here
+        source = kept_translation(compiled, cache) if translator is None else translator(compiled)
+        return NativeTask(compiled, source, library(source.text, cache, limit_s=limit_s), host)
     except (OSError, ImportError) as error:
         raise NotNative(f"native code cannot be loaded: {error}; is the cache's folder mounted noexec?") from error
 

@@ -12,10 +12,11 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
+from automax_ros.compile.assembly import Form, collections_paused
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.layout import Layout, Role, StateField
 from automax_ros.compile.native.calls import called
-from automax_ros.compile.native.context import Environment
+from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.frame import Array, Frame
 from automax_ros.compile.native.members import members
 from automax_ros.compile.native.ranges import INFINITE, Kind, Range, exactly, of_type
@@ -40,6 +41,15 @@ def translate(compiled: CompiledTask) -> NativeSource:
     Raises:
         NotNative: the task is a BASIC task or a drive's, or has a statement that C cannot carry out to the same bits.
     """
+    return translated(compiled, scans_of(compiled))
+
+
+def scans_of(compiled: CompiledTask) -> Form:
+    """Return the form of a task's scans that is translated.
+
+    Raises:
+        NotNative: the task as a whole is none that can be.
+    """
     if compiled.program.is_basic:
         raise NotNative("a BASIC task")
     if compiled.program.cml is not None:
@@ -47,13 +57,27 @@ def translate(compiled: CompiledTask) -> NativeSource:
     texts = [field.name for field in compiled.layout.fields if field.type is DataType.STRING]
     if texts:
         raise NotNative(f"the string {texts[0]}")
-    return _Translation(compiled).source()
+    return compiled.form("scans_forced")
+
+
+def translated(compiled: CompiledTask, form: Form) -> NativeSource:
+    """Return the C of scans in the form that ``scans_of`` gives.
+
+    Raises:
+        NotNative: they have a statement that C cannot carry out to the same bits.
+    """
+    with collections_paused():
+        return _Translation(compiled, form).source()
+
+
+def fixed_parts() -> tuple[str, ...]:
+    """Return the texts that stand in the C of each task."""
+    return tuple(map(_part, ("abi.h", "operations.h", "host_calls.h", "columns.h")))
 
 
 class _Translation:
-    def __init__(self, compiled: CompiledTask) -> None:
+    def __init__(self, compiled: CompiledTask, form: Form) -> None:
         self._compiled, self._layout = compiled, compiled.layout
-        form = compiled.form("scans_forced")
         tuples, self._statements = scan_of(form.function)
         types = {view: type_of_name(name) for name, view in form.views.items()}
         self._names = state_names(form.function)
@@ -89,16 +113,16 @@ class _Translation:
     def _settled(self) -> Environment:
         """Translate until no scan leaves a state that was not thought of before it; return what a state can hold."""
         body = ScanBody(self._frame, self._latched, self._compiled.written)
-        known = {name: _at_first(field) for name, field in zip(self._names, self._layout.fields, strict=True)}
+        fields = dict(zip(self._names, self._layout.fields, strict=True))
+        known = Environment({name: _at_first(field) for name, field in fields.items()})
         for _ in range(MOST_ROUNDS):
             self._frame.begin_again()
-            after = body.execute(self._statements, dict(known)) or known
-            grown = [name for name in self._names if not known[name].holds(after[name])]
+            after = body.execute(self._statements, known) or known
+            grown = [name for name in fields if not known[name].holds(after[name])]
             if not grown and not self._frame.has_grown:
                 return known
-            for name, field in zip(self._names, self._layout.fields, strict=True):
-                if name in grown:
-                    known[name] = self._grown(name, field, known[name].widened(after[name]))
+            wider = {name: self._grown(name, fields[name], known[name].widened(after[name])) for name in grown}
+            known = Environment({**dict(known.items()), **wider})
         raise NotNative("a state that has no bounds")
 
     def _leaving(self) -> list[str]:
@@ -118,11 +142,10 @@ class _Translation:
     def _text(self) -> str:
         frame = self._frame
         declared = [f"    {kind} {place};" for place, kind in frame.locals.items()]
+        *before, after = fixed_parts()
         return "\n".join(
             [
-                _part("abi.h"),
-                _part("operations.h"),
-                _part("host_calls.h"),
+                *before,
                 f"/* The state of {self._compiled.program.name}, as its layout has it. */",
                 *_structure(self._names, self._layout),
                 "",
@@ -143,7 +166,7 @@ class _Translation:
                 *self._leaving(),
                 "}",
                 "",
-                _part("columns.h"),
+                after,
             ]
         )
 

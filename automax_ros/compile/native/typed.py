@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 
 from automax_ros.compile.native.ranges import INT64_MAX, Kind, Range, exactly
@@ -10,6 +11,7 @@ from automax_ros.compile.native.source import NotNative
 
 WIDE = "__int128"
 INT128_MAX = 2**127 - 1
+_PARENTHESES = re.compile("[()]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +79,7 @@ def c_type(known: Range) -> str:
     if known.kind is None:
         raise NotNative("a value that is an integer on one path and a REAL on another")
     if not known.is_wide:
-        return known.kind.value
+        return known.kind.c_type
     if known.low < -INT128_MAX or known.high > INT128_MAX:
         raise NotNative("an integer that cannot be shown to fit 128 bits")
     return WIDE
@@ -100,9 +102,11 @@ def bare(text: str) -> str:
     """Return an expression without the parentheses around all of it."""
     if not (text.startswith("(") and text.endswith(")")):
         return text
+    if text.find(")") == len(text) - 1:
+        return text[1:-1]
     depth = 0
-    for place, letter in enumerate(text):
-        depth += (letter == "(") - (letter == ")")
+    for found in _PARENTHESES.finditer(text):
+        depth += 1 if found[0] == "(" else -1
         if depth == 0:
-            return text[1:-1] if place == len(text) - 1 else text
+            return text[1:-1] if found.end() == len(text) else text
     return text

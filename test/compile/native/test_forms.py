@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.forms import IN_PYTHON, WORTHWHILE_NS, NativeForms, NativeMode
+from automax_ros.compile.native.forms import IN_PYTHON, WORTHWHILE_LINE_NS, WORTHWHILE_NS, NativeForms, NativeMode
 
 from ..support import compiled_of
 from .support import compiler_of
@@ -35,7 +35,7 @@ def test_on_makes_tasks_native_by_their_names(compiled, tmp_path):
 def test_auto_builds_what_pays(compiled, tmp_path):
     cache = NativeCache(tmp_path / "cache")
     lines = len(compiled.program.scan)
-    enough = (WORTHWHILE_NS // (75 * lines) + 1) * compiled.program.period_ns
+    enough = ((WORTHWHILE_NS + lines * WORTHWHILE_LINE_NS) // (75 * lines) + 1) * compiled.program.period_ns
     short = NativeForms(NativeMode.AUTO, enough // 2, cache).form(compiled)
     assert short.compiled is compiled
     assert short.why == "a run this short gains nothing by it (--native on)"
