@@ -70,10 +70,12 @@ def _translated(
     parameters = [argument.arg for argument in parsed.args.args]
     arguments = [_of_annotation(item, given) for given, item in zip(parsed.args.args, arguments, strict=True)]
     exact = _frame_of(frame, parsed, scope, [item.range for item in arguments])
-    general = _frame_of(frame, parsed, scope, [_general(item.range) for item in arguments])
     results = _results(exact)
-    kinds = [c_type(item) for item in _results(general)]
-    if kinds != [c_type(item) for item in results]:
+    try:
+        general = _frame_of(frame, parsed, scope, [_general(item.range) for item in arguments])
+    except NotNative:
+        general = exact
+    if [c_type(item) for item in _results(general)] != [c_type(item) for item in results]:
         general = exact
     name = _defined(general, parsed.name, parameters, [item.range for item in arguments])
     return _delivered(frame, name, [bare(item.text) for item in arguments], results, can_end=general.can_end)

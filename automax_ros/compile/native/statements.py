@@ -262,12 +262,15 @@ class Body:
 
     def _return(self, statement: ast.Return, known: Environment) -> None:
         value = statement.value
-        if isinstance(value, ast.IfExp) and isinstance(value.body, ast.Tuple):
+        if isinstance(value, ast.IfExp) and ast.Tuple in (type(value.body), type(value.orelse)):
             self._if(ast.If(value.test, [ast.Return(value.body)], [ast.Return(value.orelse)]), known)
             return
-        nodes = statement.value.elts if isinstance(statement.value, ast.Tuple) else [statement.value]
-        results = [self.frame.value(node, known) for node in nodes if node is not None]
-        self._deliver(results)
+        if isinstance(value, ast.Call):
+            first, *others = self.frame.call(value, known)
+            self._deliver([self._kept(first) if others else first, *others])  # the call sets the others
+            return
+        nodes = value.elts if isinstance(value, ast.Tuple) else [value]
+        self._deliver([self.frame.value(node, known) for node in nodes if node is not None])
 
     def _deliver(self, results: list[Typed]) -> None:
         for number, item in enumerate(results[1:], 1):
