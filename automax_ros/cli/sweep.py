@@ -19,6 +19,7 @@ from typing import TypeVar
 from automax_ros.bags.errors import BagError
 from automax_ros.cli.native import add_native_arguments, native_forms, tell_native
 from automax_ros.cli.numbers import whole_number
+from automax_ros.cli.places import add_where_arguments, where_of
 from automax_ros.cli.progress import ProgressBar
 from automax_ros.cli.rack_arguments import config_of, print_refused
 from automax_ros.cli.rack_file import add_outside_argument
@@ -87,8 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="new folder for runs.csv, runs.npz, sweep.json, sweep.png",
     )
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run, of which there must be only one")
-    parser.add_argument("--jobs", type=whole_number, metavar="N", help="processes (default: one for each core)")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="let a Dask cluster do the runs (docs/sweep.md)")
+    add_where_arguments(parser, "do the runs")
     parser.add_argument("--json", action="store_true", help="print all runs for programs to read")
     add_native_arguments(parser)
     add_outside_argument(parser)
@@ -126,7 +126,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
     """Return what is to be done, None where the rack has errors; all values are looked at."""
-    where = _where(arguments)
+    where = where_of(arguments)
     config = config_of(arguments.config, allow_outside=arguments.allow_outside)
     if config is None:
         return None
@@ -141,7 +141,7 @@ def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
         measures = (*measures, best)
     stimuli = arguments.stimuli and Stimuli.of(arguments.stimuli, allow_outside=arguments.allow_outside)
     quantities = tuple(item.quantity for item in varied)
-    if len(points) < _FEW and arguments.jobs is None and where.scheduler is None:
+    if len(points) < _FEW and where == Where(None):
         where = Where(1)
     native = native_forms(arguments, arguments.duration * len(points) // where.processes)
     plan = Plan(Blueprint.of(rack, native), quantities, measures, arguments.duration, stimuli)
@@ -154,13 +154,13 @@ def _sweep(arguments: argparse.Namespace) -> _Sweep | None:
 
 def _carry_out(sweep: _Sweep, arguments: argparse.Namespace, stop: StopRequest) -> int:
     plan, points, wanted = sweep.plan, sweep.points, sweep.wanted
-    if arguments.record is not None:
-        if len(points) != 1:
-            raise UsageError(f"--record: there are {count_of(len(points), 'run')}", "give each --vary one value")
-        rows = [record_run(plan, points[0], arguments.record)]
-    else:
-        with prepared(arguments.output):
+    if arguments.record is not None and len(points) != 1:
+        raise UsageError(f"--record: there are {count_of(len(points), 'run')}", "give each --vary one value")
+    with prepared(arguments.output):
+        if arguments.record is None:
             rows = _rows(sweep, stop)
+        else:
+            rows = record_run(plan, points[0], arguments.record, lambda: stop.requested)
     output = Output(plan, wanted, rows, len(points))
     if arguments.output is not None:
         output.write(arguments.output)
@@ -189,15 +189,6 @@ def _rows(sweep: _Sweep, stop: StopRequest) -> list[Row]:
         except CutShort:
             pass
     return [found[number] for number in sorted(found)]
-
-
-def _where(arguments: argparse.Namespace) -> Where:
-    if arguments.scheduler is not None and arguments.jobs is not None:
-        raise UsageError("--jobs is of this machine, --scheduler of a cluster", "leave one of them out")
-    try:
-        return Where(arguments.jobs, arguments.scheduler)
-    except ValueError as error:
-        raise UsageError(f"--jobs: {error}") from None
 
 
 def _varied(rack: Rack, texts: list[str]) -> list[Varied]:

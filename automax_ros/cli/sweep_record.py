@@ -13,8 +13,10 @@ from automax_ros.sweep.sweeping import Row
 from automax_ros.wire.stream import RackStream
 
 
-def record_run(plan: Plan, point: Point, folder: Path) -> Row:
+def record_run(plan: Plan, point: Point, folder: Path, should_stop: Callable[[], bool]) -> list[Row]:
     """Run a point, record it into a new folder, and return its row, which is that of the run without recording.
+
+    There is no row where ``should_stop`` has ended the run; what is recorded by then is a whole recording.
 
     Raises:
         BagError: it cannot be recorded.
@@ -27,8 +29,11 @@ def record_run(plan: Plan, point: Point, folder: Path) -> Row:
         def end() -> None:
             stream.end()
             recorder.close()
+            if recorder.failure is not None:
+                raise recorder.failure
 
         stream.begin()
         return end
 
-    return Row(1, point, run_point(plan, point, attend))
+    outcome = run_point(plan, point, attend, should_stop)
+    return [] if should_stop() else [Row(1, point, outcome)]

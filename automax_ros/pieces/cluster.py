@@ -23,6 +23,8 @@ CONNECT_S = 10
 """How long a scheduler may take to answer, s (decision)."""
 WITHOUT_WORKERS_S = 300
 """How long a cluster may be without any worker, s (decision): some begin workers only when there is work."""
+_BEGINNINGS = 3
+"""How often a client is begun (decision): Dask gives its thread 10 s to begin, and fails by a bare AssertionError."""
 _POLL_S = 0.1
 _LOOK_S = 2.0
 _INSTALL = "install it with `pip install 'automax_ros[cluster]'`"
@@ -71,12 +73,7 @@ def _connected(scheduler: str) -> Iterator[_Cluster]:
     for logger in loggers.values():
         logger.setLevel(logging.CRITICAL + 1)
     try:
-        try:
-            client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TypeError, ImportError) as error:
-            what = f"no Dask scheduler answers: {error}"
-            hint = "give the address that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
-            raise ClusterFault("AMX6852", scheduler, what, hint) from error
+        client = _client(Client, scheduler)
         try:
             yield _Cluster(client, scheduler)
         finally:
@@ -85,6 +82,25 @@ def _connected(scheduler: str) -> Iterator[_Cluster]:
     finally:
         for name, logger in loggers.items():
             logger.setLevel(levels[name])
+
+
+def _client(kind: Callable[..., Any], scheduler: str) -> Any:
+    """Return a client of a scheduler.
+
+    Raises:
+        ClusterFault: it does not answer, or this machine is too busy to ask it.
+    """
+    for _ in range(_BEGINNINGS):
+        try:
+            return kind(scheduler, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TypeError, ImportError) as error:
+            what = f"no Dask scheduler answers: {error}"
+            hint = "give the address that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
+            raise ClusterFault("AMX6852", scheduler, what, hint) from error
+        except AssertionError:
+            continue
+    what = "the Dask scheduler was not asked: this machine is too busy for Dask to begin a thread within 10 s"
+    raise ClusterFault("AMX6852", scheduler, what, "give the command again when less is going on here")
 
 
 class _Cluster:

@@ -76,6 +76,7 @@ def grid(varied: Sequence[Varied]) -> list[Point]:
     Raises:
         Fault: there are too many, or a quantity has no values of its own.
     """
+    _check_quantities(varied)
     for item in varied:
         if not item.values:
             label = item.quantity.label
@@ -91,8 +92,9 @@ def sample(varied: Sequence[Varied], count: int, seed: int) -> list[Point]:
     there may be fewer than ``count``.
 
     Raises:
-        Fault: too many are wanted, or scipy is missing.
+        Fault: too many quantities or points are wanted, or scipy is missing.
     """
+    _check_quantities(varied)
     _check_count(count)
     try:
         import numpy as np
@@ -100,8 +102,14 @@ def sample(varied: Sequence[Varied], count: int, seed: int) -> list[Point]:
     except ImportError as error:
         raise Fault("--sample needs scipy", "pip install 'automax_ros[sweep]'") from error
     shares = qmc.LatinHypercube(d=len(varied), rng=np.random.default_rng(seed)).random(count)
+    shares = np.minimum(shares, np.nextafter(1.0, 0.0))  # scipy's lie above 0, and may be 1
     points = (tuple(item.at(share) for item, share in zip(varied, row, strict=True)) for row in shares.tolist())
     return list(dict.fromkeys(points))
+
+
+def _check_quantities(varied: Sequence[Varied]) -> None:
+    if len(varied) > MOST_QUANTITIES:
+        raise Fault(f"{len(varied)} quantities: a sweep has at most {MOST_QUANTITIES}", "leave some as they are")
 
 
 def _check_count(count: int) -> None:

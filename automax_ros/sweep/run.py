@@ -82,14 +82,20 @@ def run_points(plan: Plan, points: Sequence[Point]) -> list[Outcome]:
     return [run_point(plan, point) for point in points]
 
 
-def run_point(plan: Plan, point: Point, attend: Callable[[Rack], Callable[[], None]] | None = None) -> Outcome:
+def run_point(
+    plan: Plan,
+    point: Point,
+    attend: Callable[[Rack], Callable[[], None]] | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Outcome:
     """Run one point; whatever goes wrong becomes the outcome's fault, so that it ends no other run (decision).
 
     A run that a fault stops has no measures but ``errors`` and ``stopped`` (decision): STOP ALL clears what they would
-    be of. ``attend`` is given the rack before it starts and returns what is called at its end.
+    be of. ``attend`` is given the rack before it starts and returns what is called at its end. When ``should_stop``
+    says so, the run ends there, and its outcome is none.
     """
     try:
-        return _run(plan, plan.beginning(point), attend)
+        return _run(plan, plan.beginning(point), attend, should_stop)
     except BagError:
         raise
     except Fault as fault:
@@ -99,7 +105,12 @@ def run_point(plan: Plan, point: Point, attend: Callable[[Rack], Callable[[], No
     return Outcome((None,) * len(plan.measures), printable(why))
 
 
-def _run(plan: Plan, beginning: Beginning, attend: Callable[[Rack], Callable[[], None]] | None) -> Outcome:
+def _run(
+    plan: Plan,
+    beginning: Beginning,
+    attend: Callable[[Rack], Callable[[], None]] | None,
+    should_stop: Callable[[], bool],
+) -> Outcome:
     rack = plan.blueprint.rack(beginning.plants)
     stimulation = _stimulation(rack, plan.stimuli)
     for item in beginning.tunings:
@@ -109,7 +120,7 @@ def _run(plan: Plan, beginning: Beginning, attend: Callable[[Rack], Callable[[],
         rack.start(beginning.settings)
         watch = Watch(rack, plan.measures, plan.duration_ns)
         stimulation.begin()
-        _pass(rack, plan, stimulation)
+        _pass(rack, plan, stimulation, should_stop)
     finally:
         if end is not None:
             end()
@@ -121,9 +132,9 @@ def _run(plan: Plan, beginning: Beginning, attend: Callable[[Rack], Callable[[],
     return Outcome(tuple(values.get(item) for item in plan.measures), fault or refused)
 
 
-def _pass(rack: Rack, plan: Plan, stimulation: Stimulation) -> None:
+def _pass(rack: Rack, plan: Plan, stimulation: Stimulation, should_stop: Callable[[], bool]) -> None:
     """Let the time pass: as `automax run` does, to the end where stimuli may put the rack into RUN again."""
-    while rack.now_ns < plan.duration_ns:
+    while rack.now_ns < plan.duration_ns and not should_stop():
         if rack.stop_reason is not None and (plan.stimuli is None or stimulation.is_over):
             cause = rack.operations.stopped
             if cause is None or cause.is_fault:

@@ -87,10 +87,9 @@ class _Matrix:
         if (flat == flat[0]).all():
             yield int(flat[0]), following
             return
-        numbers, sizes = np.unique(flat, return_counts=True)
-        for number, size in zip(numbers.tolist(), sizes.tolist(), strict=True):
-            if size >= FEWEST:
-                yield number, following.only(flat == number)
+        for rows in _alike(flat):
+            if len(rows) >= FEWEST:
+                yield int(flat[rows[0]]), following.only(rows)
 
 
 _Read = Callable[[_Matrix], Iterator[_Matrix]]
@@ -115,7 +114,7 @@ def decode_columns(type_name: str, data: Bytes, starts: Ints, lengths: Ints) -> 
     return found, np.flatnonzero(odd)
 
 
-def _alike(keys: Ints) -> Iterator[Ints]:
+def _alike(keys: Array) -> Iterator[Ints]:
     """Return which items have the same key, ascending."""
     order = np.argsort(keys, kind="stable")
     ordered = keys[order]

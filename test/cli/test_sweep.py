@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from sweep.helpers import LOOP, RACK
 
+from automax_ros.bags.errors import RecordingError
+from automax_ros.bags.writer import BagWriter
 from automax_ros.rack.rack import Rack
 
 from .support import Automax, Result
@@ -124,6 +126,46 @@ def test_a_recorded_run_has_the_same_measures_and_replays(sweep, automax):
     assert (result.code, result.err.splitlines()[0]) == (2, "automax sweep: error: --record: there are 2 runs")
 
 
+def test_a_recorded_run_has_its_tables_too(sweep, tmp_path):
+    assert sweep("--vary", "LOOP.KP=1.3", "--record", "bag", "--output", "out").code == 0
+    (row,) = rows_of(tmp_path / "out")
+    assert row["LOOP.KP"] == "1.3"
+    assert sweep("--vary", "LOOP.KP=1.3", "--record", "other", "--output", "out").code == 2
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.usefixtures("signals")
+def test_ctrl_c_ends_a_run_that_is_recorded(sweep, automax, monkeypatch: pytest.MonkeyPatch):
+    start = Rack.start
+
+    def interrupted(self: Rack, settings=()) -> None:
+        start(self, settings)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Rack, "start", interrupted)
+        result = sweep("--vary", "LOOP.KP=1.3", "--record", "bag", "--duration", "1000000")
+    assert result.code == 128 + signal.SIGINT
+    assert "ended after 0 of 1 run" in result.err
+    assert automax("bag", "info", "bag").code == 0
+
+
+def test_a_disk_that_is_full_is_told(sweep, monkeypatch: pytest.MonkeyPatch):
+    def refuse(*_: object) -> None:
+        raise RecordingError("AMX6801", "bag", "cannot be written: No space left on device")
+
+    monkeypatch.setattr(BagWriter, "write", refuse)
+    result = sweep("--vary", "LOOP.KP=1.3", "--record", "bag")
+    assert result.code == 2
+    assert "No space left on device" in result.err
+
+
+def test_jobs_are_a_number_that_a_machine_bears(sweep):
+    for number in ("0", "1025", "x"):
+        result = sweep("--jobs", number)
+        assert (result.code, f"{number} is not a" in result.err or "not a whole number" in result.err) == (2, True)
+
+
 def test_a_recorded_run_with_another_plant_replays(automax):
     one = ("--vary", "MOTOR.inertia=1.5", "--vary", "MOTOR.load.torque_nm=120", "--vary", "SPEED_SP%=900")
     measures = ("--measure", "final(RPM) max(CUR_REF%)", "--duration", "1.5", "--json")
@@ -159,8 +201,8 @@ def test_without_anything_that_varies_the_rack_runs_as_it_is(sweep, tmp_path):
         (("--sample", "5"), "--sample: nothing varies"),
         (("--vary", "LOOP.KP=1:2", "--sample", "0"), "--sample takes 1 or more, --seed 0 or more"),
         (("--seed", "5"), "--seed belongs to --sample"),
-        (("--jobs", "0"), "--jobs: 0 jobs: at least 1"),
-        (("--jobs", "2", "--scheduler", "tcp://x:1"), "--jobs is of this machine, --scheduler of a cluster"),
+        (("--jobs", "2", "--scheduler", "tcp://x:1"), "--jobs and --scheduler exclude each other"),
+        (("--scheduler", " "), "--scheduler needs an address"),
         (("--best", "rms(ERR%)"), "--best: 'rms(ERR%)' is not min MEASURE or max MEASURE"),
         (("--best", "min rsm(ERR%)"), "--best: there is no measure 'rsm'"),
         (("--measure", "rms(REFF%)"), "--measure: the rack has no common variable 'REFF%'"),

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-pytest.importorskip("distributed", reason="needs automax_ros[cluster]")
+distributed = pytest.importorskip("distributed", reason="needs automax_ros[cluster]")
 
 from automax_ros.pieces import ClusterFault, Piece, Where, run_pieces
 from pieces import works
@@ -141,6 +141,25 @@ def test_a_scheduler_that_does_not_answer_is_said_to_be(address, monkeypatch):
         run_pieces(squares(3), Where(scheduler=address))
     assert caught.value.code == "AMX6852"
     assert caught.value.place == address
+
+
+@pytest.mark.parametrize("often", [1, 99])
+def test_a_machine_that_is_too_busy_for_dask_to_begin_gets_another_chance(two_workers, monkeypatch, often):
+    """So Dask fails where its thread takes more than 10 s to begin."""
+    client, begun = distributed.Client, []
+
+    def late(*arguments, **named):
+        begun.append(1)
+        assert len(begun) > often
+        return client(*arguments, **named)
+
+    monkeypatch.setattr(distributed, "Client", late)
+    if often == 1:
+        assert run_pieces(squares(3), Where(scheduler=two_workers.address)) == run_pieces(squares(3), Where(1))
+        return
+    with pytest.raises(ClusterFault, match="this machine is too busy for Dask") as caught:
+        run_pieces(squares(3), Where(scheduler=two_workers.address))
+    assert caught.value.code == "AMX6852"
 
 
 def test_a_cluster_without_workers_is_waited_for_but_not_for_ever(tmp_path, monkeypatch):

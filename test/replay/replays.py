@@ -137,8 +137,12 @@ def rewritten(
     folder: Path,
     change: Callable[[Any], Any] = lambda message: message,
     attachments: Callable[[str, bytes], bytes | None] = lambda _, data: data,
+    payload: Callable[[Any, bytes], bytes] = lambda _, data: data,
 ) -> Path:
-    """A copy of a recording in which messages are changed, or left out where ``change`` returns None."""
+    """A copy of a recording in which messages are changed, or left out where ``change`` returns None.
+
+    ``payload`` changes their bytes.
+    """
     reader = BagReader(bag)
     with BagWriter(folder, custom_data=reader.custom_data) as writer:
         for item in reader.attachments():
@@ -150,5 +154,5 @@ def rewritten(
             if message is not None:
                 qos = LATCHED if entry.topic.endswith(("variables", "snapshot")) else SCAN
                 channel = writer.channel(entry.topic, NAMES[type(message)], qos)
-                writer.write(channel, entry.stamp, encode(message))
+                writer.write(channel, entry.stamp, payload(message, encode(message)))
     return folder

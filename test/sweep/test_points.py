@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.numbers import stored_real
@@ -127,3 +128,19 @@ def test_a_grid_needs_numbers_of_values_and_is_not_endless(rack: Rack, monkeypat
         grid(varied)
     with pytest.raises(Fault, match="100 runs: a sweep has at most 99"):
         sample(varied, 100, 1)
+
+
+def test_not_too_many_quantities_vary(rack: Rack, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(points, "MOST_QUANTITIES", 2)
+    varied = [read_varied(rack, text) for text in ("REF%=1,2", "LOOP.STEPS=3", "SLOW=1,2")]
+    assert len(grid(varied[:2])) == len(sample(varied[:2], 2, 1)) == 2
+    for refused in (lambda: grid(varied), lambda: sample(varied, 10, 1)):
+        with pytest.raises(Fault, match="3 quantities: a sweep has at most 2"):
+            refused()
+
+
+def test_a_share_of_one_is_the_last_value(rack: Rack, monkeypatch: pytest.MonkeyPatch):
+    """scipy's shares are (n - u) / n with u from 0: the greatest may be 1."""
+    monkeypatch.setattr(qmc.LatinHypercube, "random", lambda _, count: np.ones((count, 3)))
+    varied = [read_varied(rack, text) for text in ("LOOP.KP=0.1:2.1", "REF%=0:9999", "SLOW=1,2,3,4")]
+    assert sample(varied, 1, 1) == [(single("2.1"), 9999, 4.0)]

@@ -93,14 +93,23 @@ class EntriesBuilder:
         offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(self._counts)))
         total = int(offsets[-1])
         found = Entries(offsets, np.empty(total, np.int64), np.empty(total, np.int64), np.empty(total))
-        for rows, views, elements, values in self._parts:
-            begins = offsets[rows]
-            for place in range(views.shape[1]):
-                to = begins + place
-                found.views[to] = views[:, place]
-                found.elements[to] = elements[:, place]
-                found.values[to] = values[:, place]
+        for rows, *columns in self._parts:
+            put(offsets[rows], columns, (found.views, found.elements, found.values))
         return found
+
+
+def put(begins: Ints, columns: Sequence[Array], kept: Sequence[Array]) -> None:
+    """Put each row of some matrices where it begins, along their shorter side: messages may be few and long."""
+    count, width = columns[0].shape
+    if width <= count:
+        for place in range(width):
+            to = begins + place
+            for numbers, all_numbers in zip(columns, kept, strict=True):
+                all_numbers[to] = numbers[:, place]
+        return
+    for row, begin in enumerate(begins.tolist()):
+        for numbers, all_numbers in zip(columns, kept, strict=True):
+            all_numbers[begin : begin + width] = numbers[row]
 
 
 class ValueRules:
@@ -109,9 +118,10 @@ class ValueRules:
     def __init__(self, variables: Sequence[CommonVariable]) -> None:
         count = len(variables)
         self.count = count
-        self.real = np.array([item.type is DataType.REAL for item in variables], bool)
-        self._elements = np.array([item.elements for item in variables], np.int64)
-        ranges = [item.type.range if item.type is not DataType.STRING else (1, 0) for item in variables]
+        # The last item of each is that of variables which the rack does not have: no value fits it.
+        self.real = np.array([*(item.type is DataType.REAL for item in variables), False], bool)
+        self._elements = np.array([*(item.elements for item in variables), 0], np.int64)
+        ranges = [*(item.type.range if item.type is not DataType.STRING else (1, 0) for item in variables), (1, 0)]
         self._least = np.array([low for low, _ in ranges], np.float64)
         self._greatest = np.array([high for _, high in ranges], np.float64)
 
@@ -119,12 +129,10 @@ class ValueRules:
         """Return the messages that have a value that its variable cannot have, ascending."""
         if not len(entries.views):
             return np.zeros(0, np.int64)
-        known = entries.views < self.count
-        views = np.where(known, entries.views, 0)
+        views = np.minimum(entries.views, self.count)
         values = entries.values
         fits = (
-            known
-            & (entries.elements < self._elements[views])
+            (entries.elements < self._elements[views])
             & (self._least[views] <= values)
             & (values <= self._greatest[views])
             & (self.real[views] | (values == np.floor(values)))
@@ -137,7 +145,7 @@ class ValueRules:
         """Return entries as their variables hold them: whole numbers have no negative zero."""
         if not len(entries.views):
             return entries
-        views = np.minimum(entries.views, self.count - 1)
+        views = np.minimum(entries.views, self.count)
         values = np.where(self.real[views], entries.values, entries.values + 0.0)
         return Entries(entries.offsets, entries.views, entries.elements, values)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from automax_ros.bags.blocks import MessageBlock
 from automax_ros.bags.errors import BagError
-from automax_ros.replay.columns.entries import Entries, EntriesBuilder, ValueRules, chosen
+from automax_ros.replay.columns.entries import Entries, EntriesBuilder, ValueRules, chosen, put
 from automax_ros.running.task import EVENT_TIMEOUT, OVERLAP
 from automax_ros.wire.cdr_columns import Array, Bytes, Ints, MessageColumns, decode_columns
 from automax_ros.wire.messages import NAMES, Scan
@@ -103,7 +103,8 @@ def scans_by_task(
 ) -> tuple[dict[str, ScanColumns], Ints]:
     """Decode the scans at these places of a block, by the names of their tasks.
 
-    Returns too which of the places hold no scan of these tasks, as far as can be told.
+    Returns too which of the places hold no scan of these tasks, as far as can be told; the first malformed one is
+    among them, whoever it names.
     """
     names = _Names(block, places)
     chosen_rows = {task: np.flatnonzero(names.of(task)) for task in tasks}
@@ -111,7 +112,10 @@ def scans_by_task(
     for rows in chosen_rows.values():
         left[rows] = False
     # Scans of all tasks are decoded together: those of the same sizes are more so.
-    together = _Builder(block, places).made(rules)
+    builder = _Builder(block, places)
+    together = builder.made(rules)
+    if builder.malformed is not None:
+        left[builder.malformed] = True
     return {task: together.of(rows) for task, rows in chosen_rows.items() if len(rows)}, places[left]
 
 
@@ -148,12 +152,14 @@ class _Builder:
         self._errors: list[tuple[Ints, Array, Array]] = []
         self._error_counts = np.zeros(len(places), np.int64)
         self._bad = np.zeros(len(places), bool)
+        self.malformed: int | None = None
         groups, odd = decode_columns(SCAN, block.data, block.starts[places], block.lengths[places])
         for group in groups:
             self._add(group)
         for row in odd.tolist():
             if not self._add_one(block, row):
                 self._bad[row:] = True  # a replay ends at the first malformed message
+                self.malformed = row
                 break
 
     def made(self, rules: ValueRules) -> ScanColumns:
@@ -211,7 +217,5 @@ class _Builder:
         total = int(offsets[-1])
         found = ScanErrors(offsets, np.empty(total, np.int64), np.empty(total, np.int64))
         for rows, lines, codes in self._errors:
-            for place in range(lines.shape[1]):
-                found.lines[offsets[rows] + place] = lines[:, place]
-                found.codes[offsets[rows] + place] = codes[:, place]
+            put(offsets[rows], (lines, codes), (found.lines, found.codes))
         return found

@@ -142,5 +142,5 @@ class _BlockPart:
         return scans.part(first, last) if last > first else None
 
     def is_modeled(self, name: str) -> bool:
-        """Return whether scans of a task took time."""
-        return self._modeled.get(name, False)
+        """Return whether scans of a task took time; where there are none, they may do so in the block that follows."""
+        return self._modeled.get(name, True)

@@ -102,7 +102,7 @@ class TaskStretches:
         replay = self._replay
         if not self._commons.unforced_since(int(scans.stamps.min())):
             return 0
-        following = scans.scans == replay.last_scan + 1 + np.arange(len(scans))
+        following = scans.scans - np.arange(len(scans)) == replay.last_scan + 1
         if replay.edited:
             # An edited scan that writes before it reads may find its own value or another's.
             following &= (scans.read.counts == 0) | (scans.written.counts == 0)

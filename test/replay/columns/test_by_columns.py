@@ -12,14 +12,15 @@ from pathlib import Path
 import pytest
 
 from automax_ros.bags.errors import BagError
+from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.compile.native.forms import NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.replay.columns.stretch import TaskStretches
 from automax_ros.replay.engine import Replay, ReplayOptions
-from automax_ros.wire.messages import CommonWrite, Scan
+from automax_ros.wire.messages import CommonWrite, Scan, TaskState
 from automax_ros.wire.values import Values
 
-from ..replays import SPEED, recorded, rewritten
+from ..replays import SPEED, YAML, recorded, rewritten
 
 GOLDEN = Path(__file__).parents[3] / "bags" / "section_drive"
 CALM = """\
@@ -133,3 +134,83 @@ def test_a_changed_value_is_found_the_same_way(tmp_path: Path, seed: int):
     assert seen > which
     with contextlib.suppress(BagError):
         report(other)
+
+
+def cut_off(task: str, number: int):
+    """Cut off the bytes of one scan of a task."""
+
+    def cut(message, data: bytes) -> bytes:
+        is_meant = isinstance(message, Scan) and (message.task, message.scan) == (task, number)
+        return data[:60] if is_meant else data
+
+    return cut
+
+
+@pytest.mark.parametrize("only", [("SPEED",), ("WORK",), None])
+def test_a_malformed_scan_is_told_whatever_is_replayed(tmp_path: Path, only: tuple[str, ...] | None):
+    other = rewritten(recorded(tmp_path, WORK=CALM), tmp_path / "other", payload=cut_off("WORK", 100))
+    with pytest.raises(BagError, match="AMX6816"):
+        report(other, only=only)
+
+
+NOTHING = "10 LOCAL N%\n100 CALL SCAN_LOOP(TICKS=1)\n110 N% = N% + 1\n120 END\n"
+
+
+def test_values_of_a_rack_that_has_no_variables_are_refused(tmp_path: Path):
+    bag = recorded(tmp_path, None, yaml=YAML.partition("common:")[0], SPEED=NOTHING, WORK=NOTHING)
+    assert report(bag).identical
+
+    def change(message):
+        if not isinstance(message, Scan) or message.scan < 100:
+            return message
+        return message._replace(latched=Values((0,), (0,), (1.0,)))
+
+    with pytest.raises(BagError, match="there is no variable 0"):
+        report(rewritten(bag, tmp_path / "other", change))
+
+
+def test_a_state_after_the_last_scan_that_can_be_numbered_is_no_state_to_go_on_from(tmp_path: Path):
+    seen = 0
+
+    def change(message):
+        nonlocal seen
+        if isinstance(message, TaskState) and message.task == "WORK":
+            seen += 1
+            return message._replace(scan=(1 << 64) - 1) if seen == 2 else message
+        return message
+
+    bag = recorded(tmp_path, WORK=NOTHING, options=RecordingOptions(split_ns=500_000_000))
+    found = report(rewritten(bag, tmp_path / "other", change))
+    assert seen > 2
+    assert any("18446744073709551615 are missing" in note for task in found.tasks for note in task.notes)
+
+
+SLOW = """\
+10 COMMON SPARE%, FLAG@
+20 LOCAL N%, J%, I%
+100 CALL SCAN_LOOP(TICKS=200)
+120 N% = N% + 1
+130 SPARE% = N%
+140 FOR I% = 1 TO 400
+150 J% = J% * 2 / 3
+160 NEXT I%
+170 FLAG@ = I% < 0
+180 END
+"""
+FAST = """\
+10 COMMON OUT%
+100 CALL SCAN_LOOP(TICKS=1)
+110 CALL SUMMER(INPUT1=OUT%, INPUT2=1, OUTPUT=OUT%)
+120 END
+"""
+
+
+def test_an_edited_scan_reads_what_stood_there_before_the_recorded_one_has_written(tmp_path: Path):
+    """A modeled scan stands in the log where it ended: here each in the file after that with its first write."""
+    yaml = "rack: LINE1\nexecution: modeled\n" + YAML.partition("\n")[2].replace("tick_ms: 5.5", "tick_ms: 1.0")
+    options = RecordingOptions(split_ns=101_000_000)
+    bag = recorded(tmp_path, None, yaml=yaml, options=options, seconds=1.3, SPEED=FAST, WORK=SLOW)
+    other = SLOW.replace("120 N%", "110 J% = SPARE%\n115 LAST% = J%\n120 N%").replace("I% < 0", "LAST% > 2")
+    found = report(bag, {"WORK": SourceText("WORK.BLK", other.replace("I%\n100", "I%, LAST%\n100"))})
+    assert found.first is not None
+    assert found.first.scan == 4  # which reads what scan 3 wrote, not what it is about to write itself
