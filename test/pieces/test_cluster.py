@@ -5,7 +5,9 @@ import sys
 
 import pytest
 
-distributed = pytest.importorskip("distributed", reason="needs automax_ros[cluster]")
+pytest.importorskip("distributed", reason="needs automax_ros[cluster]")
+
+import distributed
 
 from automax_ros.pieces import ClusterFault, Piece, Where, run_pieces
 from pieces import works

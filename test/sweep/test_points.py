@@ -140,7 +140,7 @@ def test_not_too_many_quantities_vary(rack: Rack, monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_share_of_one_is_the_last_value(rack: Rack, monkeypatch: pytest.MonkeyPatch):
-    """scipy's shares are (n - u) / n with u from 0: the greatest may be 1."""
+    """The shares of scipy are (n - u) / n with u from 0: the greatest may be 1."""
     monkeypatch.setattr(qmc.LatinHypercube, "random", lambda _, count: np.ones((count, 3)))
     varied = [read_varied(rack, text) for text in ("LOOP.KP=0.1:2.1", "REF%=0:9999", "SLOW=1,2,3,4")]
     assert sample(varied, 1, 1) == [(single("2.1"), 9999, 4.0)]
