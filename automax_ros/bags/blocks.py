@@ -7,7 +7,7 @@ which stand in another order than that of sending.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,8 @@ BLOCK_BYTES = 32 << 20
 """A block ends with the chunk that makes it larger than this, in bytes unpacked, or gives it more messages than a chunk
 may have (decision)."""
 _CHANNELS = 1 << 16
+TableOf = Callable[[bytes], ChunkTable | None]
+"""Finds where the messages of an unpacked chunk stand; None where they have to be read one by one."""
 _TWO_NUMBERS = struct.Struct("<HH")
 """What a schema or channel begins with: its own number, and in a channel that of its schema."""
 
@@ -62,8 +64,12 @@ class MessageBlock:
         )
 
 
-def message_blocks(reader: BagReader, types: Sequence[str]) -> Iterator[MessageBlock | BagMessage]:
+def message_blocks(
+    reader: BagReader, types: Sequence[str], table_of: TableOf | None = None
+) -> Iterator[MessageBlock | BagMessage]:
     """Return the messages of these types in the order of sending: in blocks, or one by one.
+
+    ``table_of`` finds the messages of a chunk by itself; without it the chunks' indexes tell.
 
     Raises:
         BagError: as ``BagReader.messages`` does, at the same message.
@@ -74,7 +80,7 @@ def message_blocks(reader: BagReader, types: Sequence[str]) -> Iterator[MessageB
     total = sum(size_of(file) for file in reader.files)
     before, order = 0, reader.new_order()
     for path in reader.files:
-        file = _BlockFile(McapFile(path), DataSource(path), types, order)
+        file = _BlockFile(McapFile(path), DataSource(path), types, order, table_of)
         for item in file.items():
             if reader.on_progress is not None:
                 reader.on_progress(min(1.0, (before + file.position) / total))
@@ -86,8 +92,10 @@ def message_blocks(reader: BagReader, types: Sequence[str]) -> Iterator[MessageB
 class _BlockFile:
     """One file, read in blocks."""
 
-    def __init__(self, file: McapFile, source: DataSource, types: Sequence[str], order: FileOrder) -> None:
-        self._file, self._source, self._order = file, source, order
+    def __init__(
+        self, file: McapFile, source: DataSource, types: Sequence[str], order: FileOrder, table_of: TableOf | None
+    ) -> None:
+        self._file, self._source, self._order, self._table_of = file, source, order, table_of
         self._types = frozenset(types)
         self._kind_of = {name: kind for kind, name in enumerate(types)}
         self._kinds = np.full(_CHANNELS, -1, np.int64)
@@ -106,7 +114,7 @@ class _BlockFile:
     def items(self) -> Iterator[MessageBlock | BagMessage]:
         """Return what the file holds; what was read before an error is handed out first."""
         try:
-            for record in self._file.chunks():
+            for record in self._file.chunks(indexed=self._table_of is None):
                 table = self._table(record) if isinstance(record, WholeChunk) else None
                 if isinstance(record, WholeChunk) and table is not None:
                     self._keep(record, table)
@@ -122,7 +130,7 @@ class _BlockFile:
 
     def _table(self, chunk: WholeChunk) -> ChunkTable | None:
         """Return where the messages of a chunk stand; None where they have to be read one by one."""
-        table = chunk.table()
+        table = chunk.table() if self._table_of is None else self._table_of(chunk.data)
         if table is None or not self._is_defined(table):
             return None
         if not self._begun:

@@ -18,7 +18,7 @@ from automax_ros.bags.mcap_output import MESSAGE_FIELDS, RECORD_HEAD
 _INDEX_HEAD = struct.Struct("<HI")
 """Channel and bytes of the entries: what the content of a message index begins with."""
 _ENTRY = np.dtype([("log_time", "<u8"), ("place", "<u8")])
-_HEAD = np.dtype(
+HEAD = np.dtype(
     [
         ("opcode", "u1"),
         ("length", "<u8"),
@@ -28,7 +28,11 @@ _HEAD = np.dtype(
         ("publish_time", "<u8"),
     ]
 )
-_HEAD_SIZE = RECORD_HEAD.size + MESSAGE_FIELDS.size
+"""What a message's record begins with."""
+MESSAGE_HEAD = RECORD_HEAD.size + MESSAGE_FIELDS.size
+"""Bytes of ``HEAD``: what stands before a message itself."""
+Definition = tuple[int, int, bytes]
+"""A schema or channel: the place of its record, its opcode and its content."""
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
 _MOST_DEFINITIONS = 10_000
 MOST_MESSAGES = 400_000
@@ -44,12 +48,12 @@ class ChunkTable:
 
     heads: NDArray[np.void]
     places: NDArray[np.int64]
-    definitions: tuple[tuple[int, int, bytes], ...]
+    definitions: tuple[Definition, ...]
 
     @property
     def starts(self) -> NDArray[np.int64]:
         """Where the messages themselves begin."""
-        return self.places + _HEAD_SIZE
+        return self.places + MESSAGE_HEAD
 
     @property
     def lengths(self) -> NDArray[np.int64]:
@@ -63,7 +67,7 @@ class WholeChunk:
     def __init__(self, data: bytes, place: int = 0) -> None:
         self.data, self.place = data, place
         self._indexes: list[bytes] | None = []
-        self._left = len(data) // _HEAD_SIZE * _ENTRY.itemsize
+        self._left = len(data) // MESSAGE_HEAD * _ENTRY.itemsize
         """How many bytes entries can have at most."""
 
     def add_index(self, content: bytes) -> None:
@@ -84,11 +88,11 @@ class WholeChunk:
             return None
         parts = [np.frombuffer(content, _ENTRY, offset=_INDEX_HEAD.size)["place"] for content in self._indexes]
         told = np.sort(np.concatenate(parts))
-        if told[-1] > len(self.data) - _HEAD_SIZE:
+        if told[-1] > len(self.data) - MESSAGE_HEAD:
             return None
         places = told.astype(np.int64)
-        found = np.ndarray((len(self.data) - _HEAD_SIZE + 1,), f"V{_HEAD_SIZE}", self.data, strides=(1,))
-        heads = found[places].view(_HEAD)
+        found = np.ndarray((len(self.data) - MESSAGE_HEAD + 1,), f"V{MESSAGE_HEAD}", self.data, strides=(1,))
+        heads = found[places].view(HEAD)
         lengths = heads["length"]
         if (heads["opcode"] != int(Opcode.MESSAGE)).any() or (lengths < MESSAGE_FIELDS.size).any():
             return None
@@ -105,7 +109,7 @@ class WholeChunk:
             return None
         return ChunkTable(heads, places, tuple(item for item in definitions if item is not None))
 
-    def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[tuple[int, int, bytes] | None]:
+    def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[Definition | None]:
         """Return the records between messages; None for one that is neither schema nor channel."""
         for begin, end in gaps:
             position = begin
@@ -115,5 +119,12 @@ class WholeChunk:
                 if opcode not in _DEFINITIONS or start + length > end:
                     yield None
                     return
-                yield position, opcode, self.data[start : start + length]
+                yield definition_at(self.data, position)
                 position = start + length
+
+
+def definition_at(data: bytes, place: int) -> Definition:
+    """Return the schema or channel whose record begins at a place of a chunk."""
+    opcode, length = RECORD_HEAD.unpack_from(data, place)
+    start = place + RECORD_HEAD.size
+    return place, opcode, data[start : start + length]

@@ -13,13 +13,14 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
 
+from automax_ros.bags.checked_stream import CheckedStream
 from automax_ros.bags.chunk_table import WholeChunk
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
@@ -30,6 +31,10 @@ _FIRST_PRIVATE_OPCODE = 0x80
 """From here on opcodes belong to others; readers pass over what they do not know."""
 TRUNCATED_HINT = "the recording was not finished or copied in part; `automax bag repair` saves what is sound"
 
+_NOTHING: frozenset[int] = frozenset()
+_INDEXES = frozenset({int(Opcode.MESSAGE_INDEX)})
+_MESSAGES = _INDEXES | {int(Opcode.CHUNK), int(Opcode.MESSAGE)}
+"""Records that may be passed over."""
 _END = -1
 """Stands for the end of the data where an opcode is expected."""
 _Record = TypeVar("_Record")
@@ -58,9 +63,8 @@ class McapFile:
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
         self._definition_bytes = 0
-        self._position = 0
+        self._stream: CheckedStream | None = None
         self._place: int | None = None
-        self._crc = 0
         self._unpacker = Unpacker(path, 0)
         self.chunks_read = 0
         self.stored_bytes = 0
@@ -69,7 +73,7 @@ class McapFile:
     @property
     def position(self) -> int:
         """How many bytes of the file are read."""
-        return self._position
+        return self._stream.position if self._stream is not None else 0
 
     def records(self, *, messages: bool = True) -> Iterator[RawMessage | Attachment | Metadata]:
         """Return messages (if wanted), attachments and metadata in the order of the file.
@@ -77,21 +81,19 @@ class McapFile:
         Raises:
             BagError: the file is truncated, damaged, beyond the limits or no recording of ROS 2.
         """
-        for opcode, content in self._parts():
+        for opcode, content in self._parts(_INDEXES if messages else _MESSAGES):
             if opcode == Opcode.CHUNK:
-                if messages:
-                    data = self._unpacked(self._parsed(Chunk.read, content))
-                    yield from self.chunk_messages(WholeChunk(data, self._position))
+                data = self._unpacked(self._parsed(Chunk.read, content))
+                yield from self.chunk_messages(WholeChunk(data, self.position))
             elif opcode == Opcode.MESSAGE:
-                if messages:
-                    yield self._message(content)
+                yield self._message(content)
             elif opcode == Opcode.ATTACHMENT:
                 yield self._parsed(Attachment.read, content)
             elif opcode == Opcode.METADATA:
                 yield self._parsed(Metadata.read, content)
 
-    def chunks(self) -> Iterator[WholeChunk | RawMessage]:
-        """Return the chunks, unpacked, with what the file tells of their places, and the messages outside of chunks.
+    def chunks(self, *, indexed: bool = True) -> Iterator[WholeChunk | RawMessage]:
+        """Return the chunks, unpacked, with their indexes (if wanted), and the messages outside of chunks.
 
         A chunk is handed out before an error of what follows it is raised. ``chunk_messages`` takes it apart.
 
@@ -99,13 +101,13 @@ class McapFile:
             BagError: as ``records`` does, but for what is wrong inside a chunk.
         """
         pending: WholeChunk | None = None
-        parts = self._parts()
+        parts = self._parts(_NOTHING if indexed else _INDEXES)
         while True:
             try:
                 opcode, content = next(parts, (_END, b""))
                 chunk = None
                 if opcode == Opcode.CHUNK:
-                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content)), self._position)
+                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content)), self.position)
                 elif opcode == Opcode.ATTACHMENT:
                     self._parsed(Attachment.read, content)
                 elif opcode == Opcode.METADATA:
@@ -150,56 +152,70 @@ class McapFile:
                 raise self._damaged(f"a record of kind {opcode} inside a chunk")
         self._place = None
 
-    def _parts(self) -> Iterator[tuple[int, bytes]]:
+    def _parts(self, without: frozenset[int]) -> Iterator[tuple[int, bytes]]:
         """Return opcode and content of each record of the data; checks what stands around them, takes definitions."""
         with opened(self.path) as file:
             self._unpacker = Unpacker(self.path, os.fstat(file.fileno()).st_size)
-            if file.read(len(MAGIC)) != MAGIC:
+            self._stream = stream = CheckedStream(file)
+            if stream.take(len(MAGIC)) != MAGIC:
                 raise BagError("AMX6810", self.path, "is not an mcap file", NO_BAG_HINT)
-            self._position, self._crc = len(MAGIC), zlib.crc32(MAGIC)
-            self._check_header(*self._next_record(file)[1:])
+            self._check_header(*self._next_record(stream))
             while True:
-                crc_before, opcode, content = self._next_record(file)
+                opcode, length = self._next_head(stream)
+                if opcode in without:
+                    self._skip(stream, length)
+                    continue
+                crc = stream.crc(RECORD_HEAD.size) if opcode == Opcode.DATA_END else 0
+                content = self._read(stream, length)
                 if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                     self.define(opcode, content)
                 elif opcode == Opcode.DATA_END:
-                    expected = self._parsed(DataEnd.read, content).data_section_crc
-                    self._check_crc(expected, crc_before, "the data")
+                    self._check_crc(self._parsed(DataEnd.read, content).data_section_crc, crc, "the data")
                     break
                 elif opcode == Opcode.FOOTER:
                     raise self._damaged("a footer without the end of the data")
                 else:
                     yield opcode, content
-            self._read_summary(file)
+            self._read_summary(stream)
 
-    def _read_summary(self, file: BinaryIO) -> None:
+    def _read_summary(self, stream: CheckedStream) -> None:
         """Read what stands after the data; only its checksum and its end matter here."""
-        self._crc = 0
-        opcode: int = Opcode.DATA_END
+        stream.begin_crc()
+        opcode, length = self._next_head(stream)
         while opcode != Opcode.FOOTER:
-            crc_before, opcode, content = self._next_record(file)
+            self._skip(stream, length)
+            opcode, length = self._next_head(stream)
+        crc = stream.crc(RECORD_HEAD.size)
+        content = self._read(stream, length)
         expected = self._parsed(Footer.read, content).summary_crc
-        covered = RECORD_HEAD.pack(opcode, len(content)) + content[: -len(b"crc4")]
-        self._check_crc(expected, zlib.crc32(covered, crc_before), "the summary")
-        if file.read(len(MAGIC) + 1) != MAGIC:
+        covered = RECORD_HEAD.pack(opcode, length) + content[: -len(b"crc4")]
+        self._check_crc(expected, zlib.crc32(covered, crc), "the summary")
+        if stream.take(len(MAGIC) + 1) != MAGIC:
             raise self._damaged("the closing mark is missing or does not end the file")
 
-    def _next_record(self, file: BinaryIO) -> tuple[int, int, bytes]:
-        """Read a record: the checksum of all before it, its opcode and its content."""
-        crc = self._crc
-        head = self._read(file, RECORD_HEAD.size)
-        opcode, length = RECORD_HEAD.unpack(head)
+    def _next_record(self, stream: CheckedStream) -> tuple[int, bytes]:
+        opcode, length = self._next_head(stream)
+        return opcode, self._read(stream, length)
+
+    def _next_head(self, stream: CheckedStream) -> tuple[int, int]:
+        """Read the opcode of a record and the length of its content."""
+        opcode, length = RECORD_HEAD.unpack(self._read(stream, RECORD_HEAD.size))
         if length > MAX_RECORD_BYTES:
             raise self._too_large(f"a record of {length} bytes, at most {MAX_RECORD_BYTES} are read")
-        return crc, opcode, self._read(file, length)
+        return opcode, length
 
-    def _read(self, file: BinaryIO, length: int) -> bytes:
-        data = file.read(length)
-        self._position += len(data)
+    def _read(self, stream: CheckedStream, length: int) -> bytes:
+        data = stream.take(length)
         if len(data) < length:
-            raise BagError("AMX6812", self.path, f"ends early, at byte {self._position}", TRUNCATED_HINT)
-        self._crc = zlib.crc32(data, self._crc)
+            raise self._ends_early(stream)
         return data
+
+    def _skip(self, stream: CheckedStream, length: int) -> None:
+        if stream.skip(length) < length:
+            raise self._ends_early(stream)
+
+    def _ends_early(self, stream: CheckedStream) -> BagError:
+        return BagError("AMX6812", self.path, f"ends early, at byte {stream.position}", TRUNCATED_HINT)
 
     def _parsed(self, parse: Callable[[ReadDataStream], _Record], content: bytes) -> _Record:
         """Let the library parse one record, which cannot read beyond the record's end."""
@@ -261,7 +277,7 @@ class McapFile:
             data = self._unpacker.unpacked(chunk)
         except BagError as error:
             raise BagError(
-                error.code, self.path, f"{error.message} (before byte {self._position})", error.hint
+                error.code, self.path, f"{error.message} (before byte {self.position})", error.hint
             ) from error
         self.chunks_read += 1
         self.stored_bytes += len(chunk.data)
@@ -272,5 +288,5 @@ class McapFile:
         return BagError("AMX6814", self.path, message)
 
     def _damaged(self, message: str) -> BagError:
-        place = self._position if self._place is None else self._place
+        place = self.position if self._place is None else self._place
         return BagError("AMX6813", self.path, f"{message} (before byte {place})", DAMAGED_HINT)

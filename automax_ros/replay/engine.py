@@ -239,7 +239,7 @@ class Run:
         names = self._all_tasks
         span = self._begin, self._end
         blocks = BlockReplay(self._tasks, names, self._commons, self.take, _TYPES, span, self._forms)
-        return all(self._take_item(blocks, item) for item in message_blocks(reader, blocks.types))
+        return all(self._take_item(blocks, item) for item in message_blocks(reader, blocks.types, blocks.table_of))
 
     def _take_item(self, blocks: BlockReplay, item: MessageBlock | BagMessage) -> bool:
         if isinstance(item, BagMessage):

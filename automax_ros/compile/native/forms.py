@@ -6,10 +6,11 @@ import enum
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native.build import LIMIT_S, end_running
+from automax_ros.compile.native.build import LIMIT_S, end_running, library
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.source import NotNative
 
@@ -84,6 +85,16 @@ class NativeForms:
             raise
         pool.shutdown()
         return outcomes
+
+    def library(self, text: str, worthwhile_ns: int) -> Path | None:
+        """Return the library of a C text that helps a run of at least this time; None where it is not to be had."""
+        too_short = self.expected_ns is not None and self.expected_ns < worthwhile_ns
+        if self.mode is NativeMode.OFF or (self.mode is NativeMode.AUTO and too_short):
+            return None
+        try:
+            return library(text, self.cache, limit_s=self.limit_s)
+        except NotNative:
+            return None
 
     def form(self, compiled: CompiledTask) -> NativeOutcome:
         """Return a task as it is to run: as it is given where it is not native."""

@@ -113,17 +113,20 @@ def put(begins: Ints, columns: Sequence[Array], kept: Sequence[Array]) -> None:
 
 
 class ValueRules:
-    """What values the variables of a rack can have, by their numbers; strings have none here."""
+    """What values the variables of a rack can have, by their numbers; strings have none here.
+
+    ``count`` variables: how many ``elements`` each has, its ``least`` and ``greatest`` value, whether it is a ``real``.
+    """
 
     def __init__(self, variables: Sequence[CommonVariable]) -> None:
         count = len(variables)
         self.count = count
         # The last item of each is that of variables which the rack does not have: no value fits it.
         self.real = np.array([*(item.type is DataType.REAL for item in variables), False], bool)
-        self._elements = np.array([*(item.elements for item in variables), 0], np.int64)
+        self.elements = np.array([*(item.elements for item in variables), 0], np.int64)
         ranges = [*(item.type.range if item.type is not DataType.STRING else (1, 0) for item in variables), (1, 0)]
-        self._least = np.array([low for low, _ in ranges], np.float64)
-        self._greatest = np.array([high for _, high in ranges], np.float64)
+        self.least = np.array([low for low, _ in ranges], np.float64)
+        self.greatest = np.array([high for _, high in ranges], np.float64)
 
     def wrong(self, entries: Entries) -> Ints:
         """Return the messages that have a value that its variable cannot have, ascending."""
@@ -132,9 +135,9 @@ class ValueRules:
         views = np.minimum(entries.views, self.count)
         values = entries.values
         fits = (
-            (entries.elements < self._elements[views])
-            & (self._least[views] <= values)
-            & (values <= self._greatest[views])
+            (entries.elements < self.elements[views])
+            & (self.least[views] <= values)
+            & (values <= self.greatest[views])
             & (self.real[views] | (values == np.floor(values)))
         )
         if fits.all():
@@ -156,6 +159,8 @@ def first_other(recorded: Entries, own: Entries, *, bits: bool) -> int:
     With ``bits`` values are the same to the last bit, and elements count too.
     """
     count = min(len(recorded), len(own))
+    if not len(recorded.views) and not len(own.views):
+        return count
     first = min((_first(part) for part in _differing(recorded, own, count, bits=bits)), default=count)
     return min(first, count)
 

@@ -119,6 +119,12 @@ def scans_by_task(
     return {task: together.of(rows) for task, rows in chosen_rows.items() if len(rows)}, places[left]
 
 
+def tell_of_time(errors: ScanErrors) -> Ints:
+    """Return the scans that tell of a fault by time, which no execution of a source does."""
+    timed = np.flatnonzero(np.isin(errors.codes, (OVERLAP, EVENT_TIMEOUT)))
+    return np.searchsorted(errors.offsets, timed, side="right") - 1
+
+
 class _Names:
     """The names of the tasks in scans, read from their beginnings."""
 
@@ -165,14 +171,13 @@ class _Builder:
     def made(self, rules: ValueRules) -> ScanColumns:
         """Return the columns."""
         stamps, scans, durations = self._numbers.values()
-        entries = [builder.made() for builder in self._entries.values()]
+        entries = [rules.typed(builder.made()) for builder in self._entries.values()]
         errors = self._made_errors()
         odd = self._bad.copy()
         for builder, made in zip(self._entries.values(), entries, strict=True):
             odd |= builder.bad
             odd[rules.wrong(made)] = True
-        timed = np.flatnonzero(np.isin(errors.codes, (OVERLAP, EVENT_TIMEOUT)))
-        odd[np.searchsorted(errors.offsets, timed, side="right") - 1] = True
+        odd[tell_of_time(errors)] = True
         latched, read, written, committed = entries
         return ScanColumns(
             self.places, stamps, scans, durations, self._full, latched, read, written, committed, errors, odd

@@ -10,6 +10,8 @@ from automax_ros.bags.blocks import MessageBlock
 from automax_ros.bags.reader import BagMessage
 from automax_ros.replay.columns.entries import ValueRules
 from automax_ros.replay.columns.forms import ColumnForms
+from automax_ros.replay.columns.library import ColumnLibrary
+from automax_ros.replay.columns.native_messages import native_scans, native_writes
 from automax_ros.replay.columns.scans import SCAN, ScanColumns, scans_by_task
 from automax_ros.replay.columns.stretch import TaskStretches
 from automax_ros.replay.columns.writes import WRITE, WriteColumns, write_columns
@@ -46,6 +48,9 @@ class BlockReplay:
         self._begin, self._end = span
         self._rules = ValueRules(commons.rack)
         self._stretches = {name: TaskStretches(task, commons, self._rules, forms) for name, task in tasks.items()}
+        self._library = forms.library
+        self.table_of = None if self._library is None else self._library.table
+        """What finds the messages of a chunk; None: its index."""
         self.types = (SCAN, WRITE, *sorted({*types} - {SCAN, WRITE}))
         """The types of messages to read, in the order in which a block numbers them."""
 
@@ -55,7 +60,7 @@ class BlockReplay:
         Raises:
             BagError: as ``take`` does of each of its messages.
         """
-        part = _BlockPart(block, self._names, self._commons.facts.table.run_id, self._rules)
+        part = _BlockPart(block, self._names, self._commons.facts.table.run_id, self._rules, self._library)
         begin = 0
         for place in part.by_themselves(self._end):
             if not self._between(part, begin, place) or not self._take(block.message(place)):
@@ -111,10 +116,17 @@ class BlockReplay:
 class _BlockPart:
     """A block with its scans and writes as columns."""
 
-    def __init__(self, block: MessageBlock, names: Collection[str], run_id: int, rules: ValueRules) -> None:
+    def __init__(
+        self, block: MessageBlock, names: Collection[str], run_id: int, rules: ValueRules, library: ColumnLibrary | None
+    ) -> None:
         self.block = block
-        self._scans, self._strays = scans_by_task(block, np.flatnonzero(block.kinds == 0), tuple(names), rules)
-        self.writes, self._forcing = write_columns(block, np.flatnonzero(block.kinds == 1), run_id, rules)
+        scans, writes = (np.flatnonzero(block.kinds == kind) for kind in (0, 1))
+        if library is None:
+            self._scans, self._strays = scans_by_task(block, scans, tuple(names), rules)
+            self.writes, self._forcing = write_columns(block, writes, run_id, rules)
+        else:
+            self._scans, self._strays = native_scans(library, block, scans, tuple(names), rules)
+            self.writes, self._forcing = native_writes(library, block, writes, run_id, rules)
         self._modeled = {name: bool(scans.durations.any()) for name, scans in self._scans.items()}
 
     def by_themselves(self, end: int | None) -> list[int]:

@@ -90,7 +90,7 @@ class TaskStretches:
             self._form = _Form(
                 task,
                 self._forms.form(compiled, views),
-                LatchedColumns(views, self._rules.count),
+                LatchedColumns(views, self._rules.count, self._forms.library),
                 np.array([task.memory.view(name) for name in compiled.written], np.int64),
                 np.array([places[name] for name in compiled.written], np.int64),
                 tuple(type_of_name(name) is DataType.BOOLEAN for name in compiled.latched),
@@ -115,15 +115,23 @@ class TaskStretches:
         if not done:
             return 0
         scans = scans.part(0, done)
-        committed = _commits(np.array(executed.outputs, np.int64).reshape(-1, done), latched[form.places, :done], form)
         return min(
-            first_other(self._rules.typed(scans.committed), committed, bits=False),
-            first_other(self._rules.typed(scans.written), executed.written, bits=True),
+            self._same_commits(scans.committed, executed.outputs, latched[form.places, :done], form),
+            first_other(scans.written, executed.written, bits=True),
             self._same_errors(scans, executed),
         )
 
+    def _same_commits(self, recorded: Entries, outputs: list[Ints], latched: Ints, form: _Form) -> int:
+        """Return how many scans committed the same."""
+        if self._forms.library is not None:
+            return self._forms.library.same_commits(recorded, outputs, list(latched), form.written)
+        own = _commits(np.array(outputs, np.int64).reshape(-1, len(recorded)), latched, form)
+        return first_other(recorded, own, bits=False)
+
     def _same_errors(self, scans: ScanColumns, executed: Executed) -> int:
         """Return how many scans logged the same errors; in an edited task lines do not count."""
+        if not len(executed.errors) and not len(scans.errors.lines):
+            return len(scans)
         rows, lines, codes = executed.errors.T
         offsets = np.concatenate((np.zeros(1, np.int64), np.cumsum(np.bincount(rows, minlength=len(scans)))))
         recorded, own = scans.errors.lines, lines

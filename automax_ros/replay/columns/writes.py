@@ -17,8 +17,8 @@ from automax_ros.wire.cdr_columns import Ints, decode_columns
 from automax_ros.wire.messages import NAMES, CommonWrite
 
 WRITE = NAMES[CommonWrite]
-_LIMIT = np.iinfo(np.int64).max
-_FORCING = (int(WriteKind.FORCE), int(WriteKind.RELEASE))
+LIMIT = np.iinfo(np.int64).max
+FORCING = (int(WriteKind.FORCE), int(WriteKind.RELEASE))
 
 
 @dataclass(frozen=True)
@@ -61,24 +61,26 @@ def write_columns(block: MessageBlock, places: Ints, run_id: int, rules: ValueRu
     for group in groups:
         fields, rows = group.fields, group.rows
         sequences[rows], kinds[rows] = fields["sequence"], fields["kind"]
-        good[rows] = (fields["run_id"] == np.uint64(run_id)) & (fields["sequence"] < _LIMIT)
+        good[rows] = (fields["run_id"] == np.uint64(run_id)) & (fields["sequence"] < LIMIT)
         builder.add(group, "values")
     for row in odd.tolist():
-        write = _decoded(block, int(places[row]))
+        write = decoded_write(block, int(places[row]))
         if write is None:
             break  # a replay ends at the first malformed message
-        if write.sequence < _LIMIT:
-            sequences[row], kinds[row], good[row] = write.sequence, write.kind, write.run_id == run_id
+        kinds[row] = write.kind
+        if write.sequence < LIMIT:
+            sequences[row], good[row] = write.sequence, write.run_id == run_id
             builder.add_one(row, write.values)
     entries = builder.made()
-    forcing = np.isin(kinds, _FORCING)
+    forcing = np.isin(kinds, FORCING)
     good &= ~(builder.bad | forcing)
     good[rules.wrong(entries)] = False
     good[1:] &= np.diff(sequences) == 1
     return WriteColumns(places, sequences, rules.typed(entries), good), places[forcing]
 
 
-def _decoded(block: MessageBlock, place: int) -> CommonWrite | None:
+def decoded_write(block: MessageBlock, place: int) -> CommonWrite | None:
+    """Return a write, decoded by itself; None if it is malformed."""
     try:
         message = block.message(place).message
     except BagError:

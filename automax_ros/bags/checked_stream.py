@@ -1,0 +1,59 @@
+"""The bytes of a file, read in large pieces, with the checksum of what was taken."""
+
+from __future__ import annotations
+
+import zlib
+from typing import BinaryIO
+
+PIECE_BYTES = 1 << 18
+"""What is read at once, in bytes (decision: records of 100 bytes cost what they are, not a read each)."""
+
+
+class CheckedStream:
+    """Takes bytes of a file one after the other; ``position`` counts them."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._buffer = b""
+        self._at = self._summed = self._crc = 0
+        self._before = 0
+        """Bytes of the file before the buffer."""
+
+    @property
+    def position(self) -> int:
+        """How many bytes are taken."""
+        return self._before + self._at
+
+    def take(self, length: int) -> bytes:
+        """Return the next bytes, fewer where the file ends before."""
+        if self._at + length > len(self._buffer):
+            self._fill(length)
+        begin = self._at
+        self._at = min(begin + length, len(self._buffer))
+        return self._buffer[begin : self._at]
+
+    def skip(self, length: int) -> int:
+        """Pass over the next bytes; return how many there were."""
+        if self._at + length > len(self._buffer):
+            self._fill(length)
+        begin = self._at
+        self._at = min(begin + length, len(self._buffer))
+        return self._at - begin
+
+    def crc(self, without: int = 0) -> int:
+        """Return the CRC-32 of what was taken since ``begin_crc``, but for the last bytes, taken in one go."""
+        end = self._at - without
+        self._crc = zlib.crc32(memoryview(self._buffer)[self._summed : end], self._crc)
+        self._summed = end
+        return self._crc
+
+    def begin_crc(self) -> None:
+        """Begin with a checksum at the next byte."""
+        self._crc, self._summed = 0, self._at
+
+    def _fill(self, length: int) -> None:
+        self.crc()
+        rest = self._buffer[self._at :]
+        self._before += self._at
+        self._buffer = rest + self._file.read(max(PIECE_BYTES, length - len(rest)))
+        self._at = self._summed = 0

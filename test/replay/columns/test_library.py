@@ -1,0 +1,263 @@
+"""What ``columns.c`` does is what NumPy and the scalar decoder do, on any bytes."""
+
+from __future__ import annotations
+
+import functools
+import random
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bags.mutations import CHANGES
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from automax_ros.bags.blocks import MessageBlock, message_blocks
+from automax_ros.bags.chunk_table import WholeChunk
+from automax_ros.bags.errors import BagError
+from automax_ros.bags.mcap_file import McapFile
+from automax_ros.bags.reader import BagMessage, BagReader, ChannelReader, DataSource
+from automax_ros.core.types import DataType
+from automax_ros.rack.config import CommonVariable
+from automax_ros.replay.columns.entries import Entries, ValueRules, first_other
+from automax_ros.replay.columns.latched import LatchedColumns
+from automax_ros.replay.columns.native_messages import native_scans, native_writes
+from automax_ros.replay.columns.scans import SCAN, scans_by_task
+from automax_ros.replay.columns.writes import WRITE, write_columns
+from automax_ros.running.task import OVERLAP
+from automax_ros.wire.cdr import encode
+from automax_ros.wire.messages import NAMES, CommonWrite, Scan, ScanError
+from automax_ros.wire.values import Values
+
+from ..replays import recorded
+
+GOLDEN = Path(__file__).parents[3] / "bags" / "section_drive"
+TASKS = ("DRIVE", "LINE", "SPEED")
+RUN = (1 << 64) - 7
+RULES = ValueRules(
+    [
+        CommonVariable("A%", DataType.INTEGER),
+        CommonVariable("B@", DataType.BOOLEAN),
+        CommonVariable("C", DataType.REAL),
+        CommonVariable("D!", DataType.DOUBLE, dimensions=(3,)),
+        CommonVariable("E$", DataType.STRING),
+    ]
+)
+numbers = st.sampled_from((0.0, -0.0, 1.0, -1.0, 0.5, 32767.0, 32768.0, 1e9, 1e300, float("nan"), float("inf")))
+
+
+@pytest.fixture
+def library(column_library):
+    if column_library is None:
+        pytest.skip("there is no C compiler")
+    return column_library
+
+
+@st.composite
+def values(draw) -> Values:
+    count = draw(st.sampled_from((0, 0, 1, 1, 2, 4)))
+    sizes = [count + (draw(st.integers(0, 60)) == 0) for _ in range(3)]
+    texts = draw(st.sampled_from(((),) * 20 + (("ready",), ("Grüße", ""))))
+    return Values(
+        *(tuple(draw(st.integers(0, most)) for _ in range(size)) for most, size in zip((5, 4), sizes, strict=False)),
+        tuple(draw(numbers) for _ in range(sizes[2])),
+        texts,
+    )
+
+
+@st.composite
+def messages(draw) -> Scan | CommonWrite:
+    sequence = draw(st.sampled_from((3, 4, 5, (1 << 63) - 1, (1 << 63) + 9)))
+    stamp = draw(st.integers(0, 10**12))
+    if draw(st.booleans()):
+        run = draw(st.sampled_from((RUN, RUN, RUN, 5)))
+        return CommonWrite(stamp, run, 1, 2, draw(st.integers(0, 6)), sequence, draw(values()))
+    task = draw(st.sampled_from((*TASKS, "SPEED", "SPEE", "SPEEDY", "", "Größe")))
+    code = st.sampled_from((7001, OVERLAP))
+    errors = tuple(ScanError(number, draw(code)) for number in range(draw(st.sampled_from((0, 0, 0, 1, 3)))))
+    parts = [draw(values()) for _ in range(4)]
+    return Scan(stamp, 1, task, sequence, draw(st.integers(0, 9)), 0, draw(st.booleans()), *parts, errors)
+
+
+@st.composite
+def blocks(draw) -> MessageBlock:
+    """Scans and writes, some of them many times, some damaged, with other bytes between them."""
+    items: list[tuple[int, bytes]] = []
+    for message in draw(st.lists(messages(), min_size=1, max_size=5)):
+        data = encode(message)
+        items += [(int(isinstance(message, CommonWrite)), data)] * draw(st.sampled_from((1, 2, 12)))
+    for _ in range(draw(st.sampled_from((0, 0, 0, 1, 3)))):
+        place = draw(st.integers(0, len(items) - 1))
+        kind, data = items[place]
+        at = draw(st.integers(0, max(0, len(data) - 1)))
+        other = bytes([draw(st.sampled_from((0, 1, 2, 0x7F, 0xFF)))])
+        items[place] = kind, draw(st.sampled_from((data[:at], data[:at] + other + data[at + 1 :], data + bytes(at))))
+    return block_of(items)
+
+
+@functools.cache
+def source() -> DataSource:
+    """The channels of a recording: 0 that of scans, 1 that of writes."""
+    file = McapFile(next(GOLDEN.glob("*.mcap")))
+    all(file.records())
+    made = DataSource(file.path)
+    kinds = (NAMES[Scan], NAMES[CommonWrite])
+    for channel in file.channels.values():
+        schema = file.schemas[channel.schema_id]
+        if schema.name in kinds:
+            made.channels[kinds.index(schema.name)] = ChannelReader(file.path, channel, schema, wanted=True)
+    return made
+
+
+def block_of(items: list[tuple[int, bytes]]) -> MessageBlock:
+    lengths = np.array([len(data) for _, data in items], np.int64)
+    starts = np.cumsum([3, *(lengths[:-1] + 3)]).astype(np.int64)
+    data = np.frombuffer(b"xyz".join([b"", *(data for _, data in items), b""]), np.uint8)
+    which = np.array([kind for kind, _ in items], np.int64)
+    times = np.arange(len(items), dtype=np.uint64)
+    return MessageBlock(source(), data, which, which, starts, lengths, times, times)
+
+
+def told(columns, count: int) -> list[str]:
+    """What the first scans or writes are, bit for bit."""
+    parts = columns.part(0, count)
+    found = []
+    for name, part in sorted(vars(parts).items()):
+        fields = sorted(vars(part).items()) if hasattr(part, "__dataclass_fields__") else [("", part)]
+        found += [f"{name}.{field}: {column.tolist()}" for field, column in fields]
+    return found
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
+@given(block=blocks())
+def test_messages_are_taken_as_numpy_and_the_scalar_decoder_take_them(library, block):
+    scans = np.flatnonzero(block.kinds == 0)
+    expected, strays = scans_by_task(block, scans, TASKS, RULES)
+    found, others = native_scans(library, block, scans, TASKS, RULES)
+    end = malformed(block, scans)
+    assert [place for place in others.tolist() if place < end] == [place for place in strays.tolist() if place < end]
+    for task in TASKS:
+        own, its = found.get(task), expected.get(task)
+        count = 0 if its is None else int((its.places < end).sum())
+        assert count == (0 if own is None else int((own.places < end).sum()))
+        if own is not None and its is not None:
+            assert own.odd[:count].tolist() == its.odd[:count].tolist()
+            assert own.odd[count:].all()
+            for begin in (0, *(np.flatnonzero(its.odd[:count]) + 1).tolist()):
+                length = int(np.argmax(np.append(its.odd[begin:count], True)))
+                assert told(own.part(begin, count), length) == told(its.part(begin, count), length)
+
+
+def malformed(block: MessageBlock, places: np.ndarray) -> int:
+    """The place of the first message that is malformed."""
+    for place in places.tolist():
+        try:
+            block.message(place)
+        except BagError:
+            return int(place)
+    return len(block)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
+@given(block=blocks())
+def test_writes_are_taken_as_numpy_and_the_scalar_decoder_take_them(library, block):
+    writes = np.flatnonzero(block.kinds == 1)
+    end = malformed(block, writes)
+    expected, forcing = write_columns(block, writes, RUN, RULES)
+    found, own_forcing = native_writes(library, block, writes, RUN, RULES)
+    assert [place for place in own_forcing.tolist() if place < end] == forcing[forcing < end].tolist()
+    good = [place for place, is_good in zip(writes.tolist(), found.good, strict=True) if is_good and place < end]
+    assert good == [
+        place for place, is_good in zip(writes.tolist(), expected.good, strict=True) if is_good and place < end
+    ]
+    for row in np.flatnonzero(found.good & (writes < end)).tolist():
+        assert told(found.part(row, row + 1), 1) == told(expected.part(row, row + 1), 1)
+
+
+@st.composite
+def lists(draw, count: int) -> Entries:
+    sizes = [draw(st.sampled_from((0, 0, 1, 2))) for _ in range(count)]
+    offsets = np.cumsum([0, *sizes])
+    total = int(offsets[-1])
+    views = np.array([draw(st.integers(0, 4)) for _ in range(total)], np.int64)
+    found = np.array([draw(st.integers(-3, 3)) for _ in range(total)], np.float64)
+    return Entries(offsets, views, np.zeros(total, np.int64), found)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
+@given(data=st.data(), views=st.permutations((0, 2, 3)), count=st.integers(1, 30))
+def test_latched_values_hold_until_the_next_ones(library, data, views, count):
+    entries = data.draw(lists(count))
+    before = [7, -8, 9]
+    expected = LatchedColumns(views, 5).columns(entries, before)
+    assert LatchedColumns(views, 5, library).columns(entries, before).tolist() == expected.tolist()
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
+@given(data=st.data(), count=st.integers(1, 20))
+def test_commits_are_compared_as_numpy_compares_them(library, data, count):
+    views = np.array([3, 1], np.int64)
+    column = st.lists(st.integers(0, 2), min_size=count, max_size=count)
+    latched, outputs = ([np.array(data.draw(column), np.int64) for _ in views] for _ in range(2))
+    changed = (np.array(outputs) != np.array(latched)).T
+    own = Entries(
+        np.concatenate(([0], np.cumsum(changed.sum(axis=1)))),
+        views[np.nonzero(changed)[1]],
+        np.zeros(int(changed.sum()), np.int64),
+        np.array(outputs, np.float64).T[changed],
+    )
+    recorded = data.draw(lists(count)) if data.draw(st.booleans()) else own
+    if data.draw(st.booleans()) and len(own.views):
+        values = own.values.copy()
+        values[data.draw(st.integers(0, len(values) - 1))] += data.draw(st.sampled_from((0.0, 0.5, 1.0)))
+        recorded = Entries(own.offsets, own.views, own.elements, values)
+    same = library.same_commits(recorded, outputs, latched, views)
+    assert same == first_other(recorded, own, bits=False)
+    assert recorded is not own or same == count
+
+
+def test_chunks_are_taken_apart_as_their_indexes_tell(library):
+    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)]
+    for chunk in chunks:
+        expected, found = chunk.table(), library.table(chunk.data)
+        assert expected is not None
+        assert found.heads.tobytes() == expected.heads.tobytes()
+        assert found.places.tolist() == expected.places.tolist()
+        assert found.definitions == expected.definitions
+    assert chunks
+
+
+def test_other_records_and_cut_off_ones_are_left_to_the_reader(library):
+    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)]
+    data = chunks[0].data
+    places = library.table(data).places.tolist()
+    for cut in (1, 8, 9, 30, len(data) - places[-1] - 1):
+        assert library.table(data[: places[-1] + cut]) is None
+    assert len(library.table(data[: places[-1]]).places) == len(places) - 1
+    for opcode in (0, 1, 6, 0x0F, 0x80, 0xFF):
+        assert library.table(data[: places[9]] + bytes([opcode]) + data[places[9] + 1 :]) is None
+    assert library.table(b"") is None
+
+
+def test_damaged_recordings_tell_the_same_messages_and_the_same_error(library, tmp_path: Path):
+    bag, changed = recorded(tmp_path), tmp_path / "changed"
+    data = (bag / "scans_0.mcap").read_bytes()
+    shutil.copytree(bag, changed)
+    types = (SCAN, WRITE)
+
+    def outcome(items) -> tuple[list[BagMessage], str]:
+        found: list[BagMessage] = []
+        try:
+            for item in items:
+                found += [item] if isinstance(item, BagMessage) else map(item.message, range(len(item)))
+        except BagError as error:
+            return found, str(error)
+        return found, ""
+
+    for number in range(2 * len(CHANGES)):
+        chance = random.Random(f"library {number}")
+        (changed / "scans_0.mcap").write_bytes(CHANGES[number % len(CHANGES)](bytearray(data), chance))
+        expected = outcome(BagReader(changed).messages(types=types))
+        found = outcome(message_blocks(BagReader(changed), types, library.table))
+        assert repr(found) == repr(expected), number
