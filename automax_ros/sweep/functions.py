@@ -180,7 +180,7 @@ class Settle(_FromNow):
     has a band too.
     """
 
-    def __init__(self, band: float, *, percent: bool, target: float | None = None) -> None:
+    def __init__(self, band: float, target: float | None = None, *, percent: bool) -> None:
         self._band, self._percent, self._target = band, percent, target
         self._high: list[tuple[float, int]] = []
         self._low: list[tuple[float, int]] = []

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.config import RackConfig
-from automax_ros.sweep.measures import FUNCTIONS, MOST_MEASURES, Measure, read_measures
+from automax_ros.sweep.measures import FUNCTIONS, MOST_MEASURES, Measure, Subject, read_measures
 
 from .helpers import rack_in
 
@@ -117,3 +117,22 @@ def test_near_names_are_told(config: RackConfig):
         with pytest.raises(Fault) as caught:
             read(config, text)
         assert caught.value.hint == hint
+
+
+@pytest.mark.parametrize("name", [name for name, item in FUNCTIONS.items() if item.subject is Subject.NUMBER])
+def test_every_function_computes_with_as_many_numbers_as_it_takes(config: RackConfig, name: str):
+    """5 holds for 1 s, 8 for 3 s; before that it was 4."""
+    function = FUNCTIONS[name]
+    expected = {"settle": (0.0, 1.0), "overshoot": (0.0, 300.0), "rise": (1.0, 0.0), "itae": (62.5, 22.5)}
+    for count in range(function.least, function.most + 1):
+        numbers = {0: "", 1: ", 5", 2: ", 1, 8"}[count]
+        (measure,) = read(config, f"{name}(ERR%{numbers})")
+        accumulator = measure.accumulator()
+        accumulator.begin(4)
+        accumulator.hold(5, 0, NS_PER_S)
+        accumulator.hold(8, NS_PER_S, 4 * NS_PER_S)
+        found = accumulator.result(8, 4 * NS_PER_S)
+        if name in expected:
+            assert found == pytest.approx(expected[name][count - function.least])
+        else:
+            assert found is not None
