@@ -10,6 +10,7 @@ from typing import Any
 
 from automax_ros.cli.plot_figure import DPI, save
 from automax_ros.cli.usage import UsageError
+from automax_ros.core.text import printable
 from automax_ros.core.types import Value
 from automax_ros.sweep.run import Plan
 from automax_ros.sweep.sweeping import Row
@@ -17,15 +18,17 @@ from automax_ros.sweep.sweeping import Row
 MOST_LANES = 8
 """Most measures, and most quantities, that are drawn (decision)."""
 _WIDTH_IN, _LANE_IN, _MAP_IN, _CELL_IN = 9.0, 2.2, 4.5, 2.4
+_MOST_TICKS = 20
 _COLOUR, _BEST, _FONT = "#1f4e9c", "#c1272d", 8
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """A column of the table as numbers: of other things, which of its values it is."""
+    """A column of the table as numbers: of texts, which of ``texts`` each is."""
 
     label: str
     numbers: list[float]
+    texts: tuple[str, ...] = ()
 
     @property
     def distinct(self) -> list[float]:
@@ -59,8 +62,9 @@ def draw(plan: Plan, rows: Sequence[Row], best: Sequence[Row], path: Path) -> No
 
 def _axis(label: str, values: Sequence[Value]) -> _Axis:
     if any(isinstance(value, str) for value in values):
-        order = sorted(set(map(str, values)))
-        return _Axis(label, [order.index(str(value)) for value in values])
+        texts = tuple(sorted(set(map(str, values))))
+        places = {text: place for place, text in enumerate(texts)}
+        return _Axis(label, [places[str(value)] for value in values], texts)
     return _Axis(label, [float(value) for value in values])
 
 
@@ -87,7 +91,7 @@ def _lines(varied: _Axis, measures: Sequence[_Axis], marked: Sequence[int]) -> A
         numbers = [varied.numbers[place] for place in order], [measure.numbers[place] for place in order]
         axis.plot(*numbers, ".-", color=_COLOUR, linewidth=1)
         _mark(axis, varied, measure, marked)
-        _name(axis, varied.label, measure.label)
+        _name(axis, varied, measure)
     return figure
 
 
@@ -102,7 +106,7 @@ def _maps(across: _Axis, up: _Axis, measures: Sequence[_Axis], marked: Sequence[
         figure.colorbar(drawn, ax=axis).ax.tick_params(labelsize=_FONT)
         axis.plot([across.numbers[at] for at in marked], [up.numbers[at] for at in marked], "o", color=_BEST)
         axis.set_title(_plain(measure.label), fontsize=_FONT + 1)
-        _name(axis, across.label, up.label)
+        _name(axis, across, up)
     return figure
 
 
@@ -113,7 +117,7 @@ def _points(varied: Sequence[_Axis], measures: Sequence[_Axis], marked: Sequence
         for axis, quantity in zip(line, varied, strict=True):
             axis.plot(quantity.numbers, measure.numbers, ".", color=_COLOUR, markersize=3)
             _mark(axis, quantity, measure, marked)
-            _name(axis, quantity.label, measure.label)
+            _name(axis, quantity, measure)
     return figure
 
 
@@ -121,9 +125,13 @@ def _mark(axis: Any, across: _Axis, up: _Axis, marked: Sequence[int]) -> None:
     axis.plot([across.numbers[at] for at in marked], [up.numbers[at] for at in marked], "o", color=_BEST)
 
 
-def _name(axis: Any, across: str, up: str) -> None:
-    axis.set_xlabel(_plain(across), fontsize=_FONT)
-    axis.set_ylabel(_plain(up), fontsize=_FONT)
+def _name(axis: Any, across: _Axis, up: _Axis) -> None:
+    axis.set_xlabel(_plain(across.label), fontsize=_FONT)
+    axis.set_ylabel(_plain(up.label), fontsize=_FONT)
+    for texts, set_ticks in ((across.texts, axis.set_xticks), (up.texts, axis.set_yticks)):
+        if texts:
+            every = -(-len(texts) // _MOST_TICKS)
+            set_ticks(range(0, len(texts), every), [_plain(printable(text)) for text in texts[::every]])
     axis.tick_params(labelsize=_FONT)
     axis.grid(alpha=0.3)
 

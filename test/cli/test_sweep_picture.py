@@ -26,7 +26,8 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         varied = [read_varied(rack, text) for text in texts]
         plan = plan_of(rack, texts, measures)
         points = sample(varied, count, 1) if count else grid(varied)
-        rows = [Row(number, point, Outcome((sum(point), None))) for number, point in enumerate(points, 1)]
+        sums = [sum(value for value in point if not isinstance(value, str)) for point in points]
+        rows = [Row(number, point, Outcome((one, None))) for number, (point, one) in enumerate(zip(points, sums), 1)]
         sweep_picture.draw(plan, rows, rows[:1], tmp_path / "picture.png")
         return (figures[-1] if figures else None), rows, plan
 
@@ -61,6 +62,15 @@ def test_points_for_a_sample_and_for_more(drawn):
     assert list(y) == [sum(row.point) for row in rows]
     figure, _, _ = drawn(["REF%=0,1", "SLOW=1,2", "LOOP.STEPS=3,4"])
     assert len(figure.axes) == 6
+
+
+def test_texts_stand_at_their_places(drawn):
+    figure, _, _ = drawn(["NOTE$=stop,go,$x$", "REF%=3,4"])
+    axis = figure.axes[0]
+    assert [text.get_text() for text in axis.get_xticklabels()] == [r"\$x\$", "go", "stop"]
+    np.testing.assert_array_equal(axis.get_xticks(), [0, 1, 2])
+    figure, _, _ = drawn(["NOTE$=" + ",".join(f"n{number:03d}" for number in range(100))])
+    assert len(figure.axes[0].get_xticklabels()) == 20
 
 
 def test_nothing_where_nothing_varies(drawn):
