@@ -27,7 +27,10 @@ def drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         plan = plan_of(rack, texts, measures)
         points = sample(varied, count, 1) if count else grid(varied)
         sums = [sum(value for value in point if not isinstance(value, str)) for point in points]
-        rows = [Row(number, point, Outcome((one, None))) for number, (point, one) in enumerate(zip(points, sums), 1)]
+        rows = [
+            Row(number, point, Outcome((one, None)))
+            for number, (point, one) in enumerate(zip(points, sums, strict=True), 1)
+        ]
         sweep_picture.draw(plan, rows, rows[:1], tmp_path / "picture.png")
         return (figures[-1] if figures else None), rows, plan
 
