@@ -162,11 +162,11 @@ def _absolute(_: Frame, arguments: list[Typed]) -> list[Typed]:
     item = arguments[0]
     low, high = item.range.low, item.range.high
     least = 0 if low <= 0 <= high else min(abs(low), abs(high))
-    result = Range(item.range.kind, least, max(abs(low), abs(high)))
+    most = max(abs(low), abs(high))
     if item.range.kind is Kind.REAL:
-        return [Typed(f"fabs({bare(item.text)})", result)]
-    item = item.whole
-    return [Typed(f"({item.text} < 0 ? -{item.signed} : {item.signed})", Range(Kind.INT, result.low, result.high))]
+        return [Typed(f"fabs({bare(item.text)})", Range(Kind.REAL, least, most, item.range.never_nan))]
+    width = "wide" if item.range.is_wide else "of"
+    return [Typed(f"magnitude_{width}({bare(item.text)})", Range(Kind.INT, least, most))]
 
 
 def _real(_: Frame, arguments: list[Typed]) -> list[Typed]:
@@ -220,7 +220,7 @@ def _stored_real(frame: Frame, arguments: list[Typed]) -> list[Typed]:
         for bound in (item.range.low, item.range.high)
     ]
     # not a number becomes 0
-    result = Range(Kind.REAL, min(0.0, stored[0]), max(0.0, stored[1]))
+    result = Range(Kind.REAL, min(0.0, stored[0]), max(0.0, stored[1]), never_nan=True)
     return _delivered(frame, "stored_real", [bare(item.text)], [result, ANY_BOOL], can_end=False)
 
 

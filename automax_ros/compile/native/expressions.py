@@ -78,7 +78,7 @@ def _unary(frame: Context, node: ast.UnaryOp, known: Environment) -> Typed:
     low, high = operand.range.low, operand.range.high
     if isinstance(node.op, ast.USub):
         if operand.range.kind is Kind.REAL:
-            return Typed(f"(-{operand.text})", Range(Kind.REAL, -high, -low))
+            return Typed(f"(-{operand.text})", Range(Kind.REAL, -high, -low, operand.range.never_nan))
         return _whole_result(f"-{operand.signed}", Range(Kind.INT, -high, -low), operand)
     if isinstance(node.op, ast.Invert) and operand.range.is_whole:
         return Typed(f"(~{operand.signed})", Range(Kind.INT, -high - 1, -low - 1))
@@ -298,20 +298,29 @@ def _attribute(frame: Context, node: ast.Attribute, _: Environment) -> Typed:
 
 
 def extreme(arguments: Sequence[Typed], *, least: bool) -> Typed:
-    """Return Python's ``min`` or ``max``: of equal ones the first."""
+    """Return Python's ``min`` or ``max``: of equal ones the first, and the first beside what is not a number."""
     result = arguments[0]
     for item in arguments[1:]:
-        test = f"{item.text} < {result.text}" if least else f"{item.text} > {result.text}"
-        choose = min if least else max
-        low, high = choose(result.range.low, item.range.low), choose(result.range.high, item.range.high)
         kinds = {result.range.kind, item.range.kind}
         if not (result.range.is_exact and item.range.is_exact) and Kind.REAL in kinds:
             raise NotNative("a REAL compared with an integer beyond 53 bits")
         kind = Kind.REAL if Kind.REAL in kinds else Kind.INT if Kind.INT in kinds else Kind.BOOL
-        found = Range(kind, low, high)
+        found = _extreme_range(kind, result.range, item.range, least=least)
+        wide = result.range.is_wide or item.range.is_wide
+        name = f"{'least' if least else 'most'}_{'real' if kind is Kind.REAL else 'wide' if wide else 'of'}"
+        narrowed = "(int64_t)" * (wide and not found.is_wide)
         mixed = result.mixed or item.mixed or len(kinds) > 1
-        result = Typed(f"({test} ? {_branch(item)} : {_branch(result)})", found, mixed)
+        result = Typed(f"{narrowed}{name}({bare(result.text)}, {bare(item.text)})", found, mixed)
     return result
+
+
+def _extreme_range(kind: Kind, first: Range, second: Range, *, least: bool) -> Range:
+    """Return the range of the lesser or greater of two: of the first, where the second is not a number."""
+    choose = min if least else max
+    low, high = choose(first.low, second.low), choose(first.high, second.high)
+    if not second.is_number:
+        low, high = (low, first.high) if least else (first.low, high)
+    return Range(kind, low, high, kind is Kind.REAL and first.is_number)
 
 
 _EXPRESSIONS: dict[type[ast.expr], Callable[[Context, Any, Environment], Typed]] = {

@@ -177,14 +177,22 @@ class Frame:
         return known
 
     def place_in(self, size: int, index: ast.expr, known: Environment) -> str:
-        """Return an index that surely lies inside."""
-        place = self.value(index, known)
-        return self.held(place.whole, Range(Kind.INT, 0, size - 1)).text
+        """Return an index that lies inside: unless it is a literal the scan asks, whatever was shown of it (decision).
+
+        No fault of a proof, and no value that comes from outside, then reaches memory beside the array.
+        """
+        place, inside = self.value(index, known).whole, Range(Kind.INT, 0, size - 1)
+        if isinstance(index, ast.Constant):
+            return self.held(place, inside).text
+        return self._asked_to_lie_in(place, inside).text
 
     def held(self, item: Typed, declared: Range | None) -> Typed:
         """Return a value that is surely within a range: where that cannot be shown, the scan ends if it is not."""
         if declared is None or declared.holds(item.range):
             return item
+        return self._asked_to_lie_in(item, declared)
+
+    def _asked_to_lie_in(self, item: Typed, declared: Range) -> Typed:
         if item.range.kind is not declared.kind or declared.kind is not Kind.INT:
             raise NotNative("a value of another kind than that of its variable")
         low, high = max(item.range.low, declared.low), min(item.range.high, declared.high)

@@ -27,6 +27,18 @@ static inline int64_t floor_remainder(int64_t left, int64_t right) {
     return rest != 0 && (rest < 0) != (right < 0) ? rest + right : rest;
 }
 
+/* min(first, second) and max(first, second): of equal ones, and where one is not a number, the first. */
+static inline int64_t least_of(int64_t first, int64_t second) { return second < first ? second : first; }
+static inline int64_t most_of(int64_t first, int64_t second) { return second > first ? second : first; }
+static inline __int128 least_wide(__int128 first, __int128 second) { return second < first ? second : first; }
+static inline __int128 most_wide(__int128 first, __int128 second) { return second > first ? second : first; }
+static inline double least_real(double first, double second) { return second < first ? second : first; }
+static inline double most_real(double first, double second) { return second > first ? second : first; }
+
+/* abs(value). */
+static inline int64_t magnitude_of(int64_t value) { return value < 0 ? -value : value; }
+static inline __int128 magnitude_wide(__int128 value) { return value < 0 ? -value : value; }
+
 /* A value that no block leaves beyond its bounds; ranges alone do not show it. */
 static inline int64_t held(int64_t value, int64_t low, int64_t high, int *ended) {
     if (value >= low && value <= high) return value;

@@ -1,6 +1,7 @@
 """What is known of a value at a place of a task: its kind, and the least and the most it can be.
 
-A REAL's range leaves out what is not a number: whatever makes an integer of a REAL asks for that when it runs.
+A REAL's bounds leave out what is not a number: whatever makes an integer of a REAL asks for that when it runs. Where a
+comparison tells something of another value, it matters: one with what is not a number fails whatever that value is.
 """
 
 from __future__ import annotations
@@ -36,16 +37,25 @@ INFINITE = math.inf
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """A kind, and bounds that the value keeps; of one that differs from path to path ``kind`` is None."""
+    """A kind, and bounds that the value keeps; of one that differs from path to path ``kind`` is None.
+
+    ``never_nan`` says of a REAL that it is surely a number.
+    """
 
     kind: Kind | None
     low: float
     high: float
+    never_nan: bool = False
 
     @property
     def is_whole(self) -> bool:
         """Whether Python computes with it as with an integer."""
         return self.kind is _INT or self.kind is _BOOL
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is surely a number: what is not fails every comparison."""
+        return self.is_whole or self.never_nan
 
     @property
     def is_wide(self) -> bool:
@@ -64,14 +74,15 @@ class Range:
 
     def holds(self, other: Range) -> bool:
         """Return whether another range lies within this one."""
-        return self.kind is other.kind and self.low <= other.low and other.high <= self.high
+        may_be_nan = other.never_nan or not self.never_nan
+        return self.kind is other.kind and self.low <= other.low and other.high <= self.high and may_be_nan
 
     def joined(self, other: Range) -> Range:
         """Return what a value is that comes from one of two paths."""
         if self == other:
             return self
         kind = self.kind if self.kind is other.kind else None
-        return Range(kind, min(self.low, other.low), max(self.high, other.high))
+        return Range(kind, min(self.low, other.low), max(self.high, other.high), self.never_nan and other.never_nan)
 
     def widened(self, new: Range) -> Range:
         """Return a range that holds both, with bounds that move in few steps only, so that loops come to an end."""
@@ -81,7 +92,7 @@ class Range:
         steps = _REAL_STEPS if both.kind is Kind.REAL else _INTEGER_STEPS
         low = self.low if both.low >= self.low else _beyond(steps, both.low)
         high = self.high if both.high <= self.high else _beyond(steps, both.high)
-        return Range(both.kind, low, high)
+        return Range(both.kind, low, high, both.never_nan)
 
 
 ANY_REAL = Range(Kind.REAL, -INFINITE, INFINITE)
@@ -103,7 +114,7 @@ def _beyond(steps: tuple[float, ...], bound: float) -> float:
 def exactly(value: float) -> Range:
     """Return the range of a literal."""
     kind = _BOOL if isinstance(value, bool) else _INT if isinstance(value, int) else _REAL
-    return ANY_REAL if math.isnan(value) else Range(kind, value, value)
+    return ANY_REAL if math.isnan(value) else Range(kind, value, value, kind is _REAL)
 
 
 def of_type(kind: DataType) -> Range:
@@ -126,7 +137,9 @@ def corners(left: Range, right: Range, operation: Callable[[float, float], float
         return Range(kind, -INFINITE, INFINITE)
     if any(math.isnan(result) for result in results):
         return Range(kind, -INFINITE, INFINITE)
-    return Range(kind, min(results), max(results))
+    low, high = min(results), max(results)
+    is_finite = real and left.is_number and right.is_number and low > -INFINITE and high < INFINITE
+    return Range(kind, low, high, is_finite)
 
 
 def span(ranges: Iterable[Range]) -> Range:

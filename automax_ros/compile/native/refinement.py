@@ -87,7 +87,7 @@ def _compared(frame: Context, test: ast.Compare, known: Environment, *, truth: b
     for left, sign, right in pairs:
         relation = type(sign) if truth else _OPPOSITE[type(sign)]
         for subject, seen, other in ((left, relation, right), (right, _MIRRORED[relation], left)):
-            after = _bounded(frame, subject, seen, other, known)
+            after = _bounded(frame, subject, seen, other, known, truth=truth)
             if after is None:
                 return None
             known = after
@@ -95,17 +95,20 @@ def _compared(frame: Context, test: ast.Compare, known: Environment, *, truth: b
 
 
 def _bounded(
-    frame: Context, subject: ast.expr, relation: type[ast.cmpop], other: ast.expr, known: Environment
+    frame: Context, subject: ast.expr, relation: type[ast.cmpop], other: ast.expr, known: Environment, *, truth: bool
 ) -> Environment | None:
     """Return what ``subject relation other`` tells of the subject, where that is a name or a name with its sign turned.
 
-    A REAL that is not a number fails every comparison, so of a REAL a range is never found to be empty.
+    ``truth`` is False where it was found because its opposite failed. What is not a number fails every comparison: so
+    of a REAL a range is never found to be empty, and where the other may be none its failing tells nothing.
     """
     turned = isinstance(subject, ast.UnaryOp) and isinstance(subject.op, ast.USub)
     name = subject.operand if isinstance(subject, ast.UnaryOp) and turned else subject
     if not isinstance(name, ast.Name) or name.id not in known:
         return known
     present, bound = known[name.id], frame.value(other, known).range
+    if not truth and not bound.is_number:
+        return known
     if turned:
         relation, bound = _MIRRORED[relation], Range(bound.kind, -bound.high, -bound.low)
     low, high = _limits(present, relation, bound)

@@ -90,7 +90,7 @@ def as_real(value: Typed) -> Typed:
     if value.range.kind is Kind.REAL:
         return value
     low, high = float(value.range.low), float(value.range.high)
-    return Typed(f"(double){value.text}", Range(Kind.REAL, low, high))
+    return Typed(f"(double){value.text}", Range(Kind.REAL, low, high, never_nan=True))
 
 
 def widened(value: Typed) -> str:
