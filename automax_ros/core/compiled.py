@@ -3,7 +3,8 @@
 The Python files are the reference and always there. Machine code made from them (by mypyc, `make setup`) lies in a
 folder ``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter;
 nothing else is looked at. A group of modules is used only if every source that it was made from, and every source that
-its types came from, still has the same content (decision): whoever edits a file runs what was edited.
+its types came from, still has the same content (decision): whoever edits a file runs what was edited. Where libraries
+are missing, or cannot be loaded on this machine, the Python files run too; ``automax --version`` says why.
 ``AUTOMAX_COMPILED=off`` in the environment switches all of it off.
 """
 
@@ -12,7 +13,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec, SourceFileLoader
+from types import ModuleType
 
 FOLDER = "automax_ros_compiled"
 INDEX = "index.txt"
@@ -38,9 +40,48 @@ class CompiledGroup:
     def fresh(self, package: str) -> bool:
         """Whether the sources below the folder ``package`` are those that were compiled; looked at once."""
         if self.stale is None:
-            reasons = (_changed(package, file, digest) for file, digest in self.sources.items())
-            self.stale = next(filter(None, reasons), "")
+            missing = (f"{file} is missing" for file in set(self.libraries.values()) if not os.path.isfile(file))
+            changed = (_changed(package, file, digest) for file, digest in self.sources.items())
+            self.stale = next(missing, "") or next(filter(None, changed), "")
         return not self.stale
+
+    def loads(self) -> bool:
+        """Whether this machine loads the library that its modules share; asked of a group that is fresh."""
+        for name in self.libraries:
+            if name not in self.modules and not self.stale:
+                try:
+                    __import__(name)
+                except ImportError as error:
+                    self.refuse(error)
+        return not self.stale
+
+    def refuse(self, error: ImportError) -> None:
+        """Note that the library cannot be loaded."""
+        self.stale = f"its library cannot be loaded: {error}"
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the library that its modules share is loaded: they are machine code from then on, all or none."""
+        return any(name in sys.modules for name in self.libraries if name not in self.modules)
+
+
+class CompiledLoader(ExtensionFileLoader):
+    """Loads a module of a group; where the machine cannot load the group's first one, the Python file (decision)."""
+
+    def __init__(self, name: str, file: str, group: CompiledGroup, source: str) -> None:
+        super().__init__(name, file)
+        self.group, self.source = group, source
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Return the module, or None for one that the Python file then fills."""
+        try:
+            return super().create_module(spec)
+        except ImportError as error:
+            if self.group.has_begun or spec.name not in self.group.modules:
+                raise
+            self.group.refuse(error)
+            spec.loader, spec.origin = SourceFileLoader(spec.name, self.source), self.source
+            return None  # type: ignore[return-value]
 
 
 class CompiledFinder:
@@ -57,7 +98,8 @@ class CompiledFinder:
         if group is None or not group.fresh(self.package):
             return None
         file = group.libraries[fullname]
-        spec = ModuleSpec(fullname, ExtensionFileLoader(fullname, file), origin=file)
+        source = os.path.join(self.package, *fullname.split(".")[1:]) + ".py"
+        spec = ModuleSpec(fullname, CompiledLoader(fullname, file, group, source), origin=file)
         spec.has_location = True
         return spec
 
@@ -92,10 +134,17 @@ def read_index(folder: str) -> list[CompiledGroup]:
             lines = [line.rstrip("\n").split("\t") for line in file]
     except (OSError, UnicodeDecodeError):
         return []
-    groups: list[CompiledGroup] = []
     if lines[:1] != [["automax_ros compiled", VERSION, EXTENSION_SUFFIXES[0]]]:
         return []
-    for line in lines[1:]:
+    try:
+        return _groups(folder, lines[1:])
+    except IndexError:
+        return []  # it was not written to its end
+
+
+def _groups(folder: str, lines: Sequence[list[str]]) -> list[CompiledGroup]:
+    groups: list[CompiledGroup] = []
+    for line in lines:
         if line[0] == "group":
             groups.append(CompiledGroup(line[1]))
         elif line[0] == "library":
@@ -115,7 +164,7 @@ def describe(package: str) -> list[str]:
     finder = next((finder for finder in sys.meta_path if isinstance(finder, CompiledFinder)), None)
     if finder is None:
         return ["plain Python: nothing was compiled ahead of time for this interpreter"]
-    used = [group for group in finder.groups if group.fresh(package)]
+    used = [group for group in finder.groups if group.fresh(package) and group.loads()]
     count = sum(len(group.modules) for group in used)
     lines = [f"compiled: {count} modules ({', '.join(group.name for group in used)})"] if used else []
     return lines + [f"plain Python: {group.name}, for {group.stale}" for group in finder.groups if group not in used]

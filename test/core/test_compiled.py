@@ -1,5 +1,6 @@
 """Modules compiled ahead of time: used while their sources are those that were compiled, and told about."""
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -32,6 +33,9 @@ def index(folder, head=HEAD):
     lines.append("module\tautomax_ros.drive.motor\tdrive-1/shims.so")
     lines += [f"source\t{name}\t{compiled.source_digest(text)}" for name, text in TEXTS.items()]
     (folder / compiled.INDEX).write_text("\n".join(lines) + "\n")
+    (folder / "drive-1").mkdir(exist_ok=True)
+    for library in ("library.so", "shims.so"):
+        (folder / "drive-1" / library).write_bytes(b"no machine code")
     return compiled.read_index(str(folder))
 
 
@@ -64,6 +68,35 @@ def test_a_source_that_changed_is_what_runs(package, name, text):
     assert found.groups[0].stale.startswith(name)
 
 
+@pytest.mark.parametrize("library", ["library.so", "shims.so"])
+def test_without_its_libraries_the_python_file_runs(package, library):
+    found = finder(package)
+    (package.parent / compiled.FOLDER / "drive-1" / library).unlink()
+    assert found.find_spec("automax_ros.drive.motor") is None
+    assert found.groups[0].stale.endswith(f"{library} is missing")
+
+
+def test_with_a_library_that_cannot_be_loaded_the_python_file_runs_and_it_is_told(package, monkeypatch):
+    monkeypatch.delitem(sys.modules, "automax_drive__mypyc", raising=False)
+    found = finder(package)
+    spec = found.find_spec("automax_ros.drive.motor")
+    motor = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(motor)
+    assert (motor.MOTOR, motor.__file__) == (1, str(package / "drive" / "motor.py"))
+    assert found.find_spec("automax_ros.drive.motor") is None
+    monkeypatch.setattr(sys, "meta_path", [found])
+    (told,) = compiled.describe(str(package))
+    assert told.startswith("plain Python: drive, for its library cannot be loaded: ")
+    assert "library.so" in told or "shims.so" in told
+
+
+def test_what_is_told_was_tried(package, monkeypatch):
+    monkeypatch.delitem(sys.modules, "automax_drive__mypyc", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [finder(package)])
+    (told,) = compiled.describe(str(package))
+    assert told.startswith("plain Python: drive, for its library cannot be loaded: ")
+
+
 def test_time_of_a_file_does_not_count(package):
     for name in TEXTS:
         os.utime(package / name, (1, 1))
@@ -77,8 +110,9 @@ def test_what_another_interpreter_or_version_has_built_is_passed_over(package, h
 
 def test_a_damaged_index_is_none(tmp_path):
     assert compiled.read_index(str(tmp_path)) == []
-    (tmp_path / compiled.INDEX).write_bytes(b"\xff\xfe\x00")
-    assert compiled.read_index(str(tmp_path)) == []
+    for content in (b"\xff\xfe\x00", f"{HEAD}\nlibrary\tx\n".encode(), f"{HEAD}\ngroup\tdrive\nmodule\ta".encode()):
+        (tmp_path / compiled.INDEX).write_bytes(content)
+        assert compiled.read_index(str(tmp_path)) == []
 
 
 def run(program, switch):

@@ -35,6 +35,16 @@ def test_a_basic_task_is_not_native() -> None:
         translate(task.compiled)
 
 
+@pytest.mark.parametrize(
+    "value",
+    ["BIT_SET%(A%, B%)", "BIT_CLR%(A%, B%)", "SHIFTL%(A%, B%)", "SHIFTR%(A%, B%)", "ROTATEL%(A%, B%)"]
+    + ["ROTATER%(A%, B%)", "A% ** B%", "A% / B%", "SGN(A%)", "ABS(A%)", "MIN(A%, B%)", "INT(R)"]
+    + [f"INT({name}(R))" for name in ("SQRT", "SIN", "COS", "TAN", "ATN", "LN", "EXP", "R **")],
+)
+def test_what_computes_with_numbers_is_native(value: str) -> None:
+    assert "static int scan(" in translate(compiled_of(lines(f"A% = {value}", declare="LOCAL A%, B%, R"))).text
+
+
 def test_limits_are_those_of_types_and_of_what_scans_leave() -> None:
     text = lines(
         "CALL COUNTER(INPUT_PLUS=A%, INPUT_MINUS=B%, RESET=X@, OUTPUT=C%)",
