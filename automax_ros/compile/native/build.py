@@ -71,10 +71,15 @@ def library(text: str, cache: NativeCache, options: Sequence[str] = (), limit_s:
         NotNative: no compiler, it fails or takes longer than ``limit_s``, or the cache is not safe.
     """
     compiler = find_compiler(limit_s)
-    options = ("-O1" if len(text) >= LONG_TEXT else "-O2", *options)
+    options = (level_of(text), *options)
     key = key_of(text, compiler, options)
     found = cache.found(key)
     return found if found is not None else cache.store(key, build(text, compiler, options, limit_s))
+
+
+def level_of(text: str) -> str:
+    """Return the compiler's option for how much it does to make a text quick."""
+    return "-O1" if len(text) >= LONG_TEXT else "-O2"
 
 
 def key_of(text: str, compiler: Compiler, options: Sequence[str] = ()) -> str:

@@ -67,7 +67,7 @@ static inline double divided(double left, double right, int *ended) {
 
 /* The integer below, or toward 0; what is not a number, or does not fit, ends the scan. */
 static inline int64_t floored(double value, int *ended) {
-    if (!(value > -9.2e18 && value < 9.2e18)) {
+    if (!(fabs(value) < 9.2e18)) {
         if (*ended == 0) *ended = AUTOMAX_FAULT;
         return 0;
     }
@@ -76,7 +76,7 @@ static inline int64_t floored(double value, int *ended) {
 }
 
 static inline int64_t truncated(double value, int *ended) {
-    if (!(value > -9.2e18 && value < 9.2e18)) {
+    if (!(fabs(value) < 9.2e18)) {
         if (*ended == 0) *ended = AUTOMAX_FAULT;
         return 0;
     }

@@ -1,6 +1,7 @@
 """The host: an iterator with close() that does what the compiler's generator does. Its C texts are written here."""
 
 import gc
+import sys
 import weakref
 
 import pytest
@@ -10,6 +11,9 @@ from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.source import NativeSource, NotNative
 from automax_ros.compile.native.task import native_form
 from automax_ros.compile.scan_io import ScanTooLong
+from automax_ros.core.types import type_of_name
+from automax_ros.running.memory import CommonMemory
+from automax_ros.running.views import ViewSpec
 
 from ..support import compiled_of, task_of
 from .support import exporting
@@ -299,3 +303,53 @@ def test_a_task_scans_natively_and_holds_variables_in_python(cache):
 def test_a_library_without_scans_is_not_native(compiled, cache):
     with pytest.raises(NotNative, match="native code cannot be loaded"):
         native_form(compiled, cache, lambda _: NativeSource("TASK", "int nothing;\n"))
+
+
+def test_cells_are_read_again_when_they_hold_another_object(compiled, cache):
+    """What latches cells looks at those that changed: a new value, or an equal one of another object or type."""
+    memory = CommonMemory([ViewSpec(name, type_of_name(name)) for name in (*LATCHED, "GAIN")])
+    task = native_form(compiled, cache, lambda _: NativeSource("TASK", exporting(PASS + "s[2].i += l[0].i;")))
+    state, given, committed = compiled.layout.fresh(), 0, []
+
+    class Cells:
+        latch = memory.latching(memory.plan(range(len(LATCHED))))
+        commit = staticmethod(committed.append)
+
+    cells = Cells.latch.cells
+    scans = task.scans(state, Cells())
+    for value in (5, 5, 70_000, int("70000"), True, 1, -3, -3):
+        cells[0] = value
+        given += value
+        next(scans)
+        assert committed.pop() == [(2, value)]
+    scans.close()
+    assert state[2] == given
+
+
+def test_objects_of_cells_are_given_back(compiled, cache):
+    memory = CommonMemory([ViewSpec(name, type_of_name(name)) for name in (*LATCHED, "GAIN")])
+    task = native_form(compiled, cache, lambda _: NativeSource("TASK", exporting(PASS)))
+    first, second = int("123456789"), int("987654321")
+    before = sys.getrefcount(first), sys.getrefcount(second)
+
+    class Cells:
+        latch = memory.latching(memory.plan(range(len(LATCHED))))
+
+        @staticmethod
+        def commit(_: object) -> None:
+            """Drop it."""
+
+    cells = Cells.latch.cells
+    scans = task.scans(compiled.layout.fresh(), Cells())
+    for which in (0, 1, 1, 0):
+        cells[0] = (first, second)[which]
+        next(scans)
+    cells[0] = 0
+    next(scans)
+    assert (sys.getrefcount(first), sys.getrefcount(second)) == before
+    cells[0] = first
+    next(scans)
+    scans.close()
+    del scans
+    cells[0] = 0
+    assert sys.getrefcount(first) == before[0]

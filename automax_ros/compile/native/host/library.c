@@ -16,10 +16,12 @@ static PyObject *new_scans(Code *code, scan_function scan, PyObject *arguments)
     self->io = Py_NewRef(io);
     size_t count = 2 * code->slots + code->latched_count + code->written_count;
     self->values = PyMem_Calloc(count ? count : 1, sizeof(automax_slot));
-    if (self->values == NULL) {
+    self->seen = PyMem_Calloc(code->latched_count + 1, sizeof(PyObject *));
+    if (self->values == NULL || self->seen == NULL) {
         Py_DECREF(self);
         return PyErr_NoMemory();
     }
+    self->seen_count = code->latched_count;
     self->loaded = self->values + code->slots;
     self->latched = self->loaded + code->slots;
     self->out = self->latched + code->latched_count;

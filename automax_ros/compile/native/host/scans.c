@@ -1,6 +1,18 @@
 /* The scans of a task: an iterator with close(), as a generator is one. */
 
-/* Reads the cells that a latch would copy: the latched values as they are now. */
+/* Takes the value of a cell that holds another object than in the scan before; that one is kept until then. */
+static int latch_cell(Scans *self, Py_ssize_t k, PyObject *value)
+{
+    PyObject *before = self->seen[k];
+    self->seen[k] = NULL;
+    Py_XDECREF(before);
+    if (memory_slot(value, self->code->latched[k].kind, &self->latched[k]))
+        return -1;
+    self->seen[k] = Py_NewRef(value);
+    return 0;
+}
+
+/* Reads the cells that a latch would copy: the latched values as they are now. Most hold the object that they held. */
 static int latch_cells(Scans *self)
 {
     const Code *code = self->code;
@@ -8,10 +20,10 @@ static int latch_cells(Scans *self)
         PyObject *value = PyList_GetItem(self->cells, code->latched[k].view);
         if (value == NULL)
             return -1;
-        if (!exact_slot(value, code->latched[k].kind, &self->latched[k]))
+        if (value == self->seen[k])
             continue;
         Py_INCREF(value);
-        int problem = memory_slot(value, code->latched[k].kind, &self->latched[k]);
+        int problem = latch_cell(self, k, value);
         Py_DECREF(value);
         if (problem)
             return -1;
@@ -169,6 +181,8 @@ static int scans_traverse(Scans *self, visitproc visit, void *arg)
     Py_VISIT(self->cells);
     for (int k = 0; k < MEMBERS; k++)
         Py_VISIT(self->members[k]);
+    for (Py_ssize_t k = 0; k < self->seen_count; k++)
+        Py_VISIT(self->seen[k]);
     return 0;
 }
 
@@ -184,6 +198,8 @@ static int scans_clear(Scans *self)
     Py_CLEAR(self->cells);
     for (int k = 0; k < MEMBERS; k++)
         Py_CLEAR(self->members[k]);
+    for (Py_ssize_t k = 0; k < self->seen_count; k++)
+        Py_CLEAR(self->seen[k]);
     return 0;
 }
 
@@ -201,6 +217,7 @@ static void scans_dealloc(Scans *self)
     PyTypeObject *type = Py_TYPE(self);
     PyObject_GC_UnTrack(self);
     scans_clear(self);
+    PyMem_Free(self->seen);
     PyMem_Free(self->values);
     type->tp_free(self);
     Py_DECREF(type);

@@ -56,6 +56,8 @@ typedef struct {
     scan_function scan;
     PyObject *make_python, *python, *state, *io, *latch, *cells;
     PyObject *members[MEMBERS];
+    PyObject **seen; /* for each latched common the object that its slot was made of */
+    Py_ssize_t seen_count;
     automax_slot *values, *loaded, *latched, *out;
     int stage, running;
 } Scans;
