@@ -161,7 +161,7 @@ class TaskMessages:
             raise CdrError(f"scan of task {self._task.name}: {error}") from error
 
     def _in_length(self, record: ScanRecord, stamp: int, before: Latched) -> bytes:
-        """Return the bytes of a scan that has read or written beside its latch: as many values as others before it."""
+        """Return the bytes of a scan that read or wrote apart from its latch: as many values as others before it."""
         latched = record.latched
         differs: tuple[bool, ...] = () if latched == before else tuple(map(ne, latched, before))
         changed_views, changed = tuple(compress(self._views, differs)), tuple(compress(latched, differs))

@@ -298,7 +298,7 @@ def _attribute(frame: Context, node: ast.Attribute, _: Environment) -> Typed:
 
 
 def extreme(arguments: Sequence[Typed], *, least: bool) -> Typed:
-    """Return Python's ``min`` or ``max``: of equal ones the first, and the first beside what is not a number."""
+    """Return Python's ``min`` or ``max``: of equal ones the first, and the first where the other is not a number."""
     result = arguments[0]
     for item in arguments[1:]:
         kinds = {result.range.kind, item.range.kind}

@@ -22,7 +22,7 @@ LINE_NS = 75
 WORTHWHILE_NS, WORTHWHILE_LINE_NS = 2_000_000_000, 10_000_000
 """Time that scans must take in Python for native ones to be built or looked for, ns, and what each line of the task
 adds to that (decision: twice what it takes at most to translate and build the task the first time, which is a second,
-and 5 ms a line; what is kept from another run takes some hundredths).
+and 5 ms per line; what is kept from another run takes some hundredths).
 """
 
 

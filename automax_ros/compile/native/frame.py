@@ -179,7 +179,7 @@ class Frame:
     def place_in(self, size: int, index: ast.expr, known: Environment) -> str:
         """Return an index that lies inside: unless it is a literal the scan asks, whatever was shown of it (decision).
 
-        No fault of a proof, and no value that comes from outside, then reaches memory beside the array.
+        No fault of a proof, and no value that comes from outside, then reaches memory outside the array.
         """
         place, inside = self.value(index, known).whole, Range(Kind.INT, 0, size - 1)
         if isinstance(index, ast.Constant):
