@@ -145,7 +145,7 @@ class Circuit(Conduction):
 
     def pieces(self) -> list[Piece]:
         """Return the armature current since the last sample, interval by interval, without those where none flowed."""
-        return [Piece(*piece) for piece in self._pieces]
+        return self._pieces[:]
 
     def take_events(self) -> list[CircuitEvent]:
         """Return what happened since the last call; the last 10,000 are kept, ``events_lost`` counts the others."""
@@ -272,6 +272,7 @@ class Circuit(Conduction):
             "bridge": self.bridge.state(),
             "machine": self.machine.state(),
             "energy": self.energy.state() if self.energy else None,
+            "_pieces": [piece.numbers() for piece in self._pieces],
             "events": [(kind.value, *rest) for kind, *rest in self._events],
             "conducting": self._net.mask,
             # The order in which currents are looked at decides the last bits of an instant that several share.
@@ -284,11 +285,12 @@ class Circuit(Conduction):
         Raises:
             ParameterError: it is not the state of such a circuit.
         """
-        parts = ("line", "bridge", "machine", "energy", "events", "conducting", "guards")
+        parts = ("line", "bridge", "machine", "energy", "_pieces", "events", "conducting", "guards")
         check_names("circuit", state, (*self._kept, *parts))
         if (state["energy"] is None) != (self.energy is None):
             raise ParameterError("the state is that of a circuit with another choice of energy=")
         super().restore({name: state[name] for name in self._kept})
+        self._pieces = [Piece(*numbers) for numbers in state["_pieces"]]
         self._highest = inf
         self.line.restore(state["line"])
         self.bridge.restore(state["bridge"])

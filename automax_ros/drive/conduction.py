@@ -21,7 +21,7 @@ from automax_ros.drive.scr import BIT, MASK, NUMBER, RAIL_MASKS, numbers_of
 from automax_ros.drive.search import next_ending, next_turn_on
 from automax_ros.drive.state import Stateful
 from automax_ros.drive.totals import add_up
-from automax_ros.drive.waves import Piece, RawPiece
+from automax_ros.drive.waves import Piece
 from automax_ros.drive.wiring import ARMATURE_ARC, PHASE_ARC, settle
 
 EVENTS_KEPT: Final = 10_000
@@ -38,7 +38,7 @@ class Conduction(Stateful):
 
     _kept = (
         "now_ns", "current_a", "events_lost", "_modes", "_newest", "_emf", "_sample_ns", "_current_before", "_charge",
-        "_volt_s", "_zero_s", "_ended_ns", "_overlap_s", "_square", "_pieces",
+        "_volt_s", "_zero_s", "_ended_ns", "_overlap_s", "_square",
     )  # fmt: skip
 
     def __init__(self, line: AcLine, bridge: Bridge, machine: Machine, *, trace: bool, energy: bool) -> None:
@@ -66,7 +66,7 @@ class Conduction(Stateful):
         self._sample_ns = self.now_ns
         self._current_before = self.current_a
         self._charge = self._volt_s = self._zero_s = self._overlap_s = self._square = self._highest = 0.0
-        self._pieces: list[RawPiece] = []
+        self._pieces: list[Piece] = []
 
     def _run(self, stop_ns: int) -> None:
         """Let time pass to an instant before which no gate begins and the line stays as it is."""
@@ -116,7 +116,7 @@ class Conduction(Stateful):
                         + k * first
                         + a * (1.0 - fall) / decay
                     )
-                    self._pieces.append((first, theta, omega, c, d, k, a, decay))
+                    self._pieces.append(Piece(first, theta, omega, c, d, k, a, decay))
                     highest = self._highest - sag
                     if not (-highest <= current <= highest and -highest <= after <= highest):
                         self._highest = max(current, -current, after, -after) + sag
@@ -152,7 +152,7 @@ class Conduction(Stateful):
         self._charge += charge
         self._volt_s += self._emf * total
         if len(self._pieces) > PIECES_KEPT:
-            self._square += add_up([Piece(*piece).square() for piece in self._pieces])
+            self._square += add_up([piece.square() for piece in self._pieces])
             self._pieces.clear()
         machine = self.machine
         if machine.turns:

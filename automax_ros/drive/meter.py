@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from automax_ros.drive.state import Stateful
 from automax_ros.drive.totals import add_up
-from automax_ros.drive.waves import Moments, Piece, RawPiece, Wave, bound
+from automax_ros.drive.waves import Moments, Piece, Wave, bound
 
 if TYPE_CHECKING:
     from automax_ros.drive.ac_line import AcLine
@@ -41,7 +41,7 @@ class Sample:
         zero_current_s: float,
         overlap_s: float,
         square: float,
-        pieces: list[RawPiece],
+        pieces: list[Piece],
         highest_a: float = inf,
     ) -> None:
         """Take the integrals, and what the current's magnitude (A) has not passed, for all that was looked at."""
@@ -75,9 +75,7 @@ class Sample:
         # No pulse of a bridge is steeper than a triangle by more than this: most samples need no search.
         if conducting_s <= 0.0 or abs(self.charge_c) * _STEEPEST < level_a * conducting_s:
             return False
-        return any(
-            bound(piece) > level_a and max(map(abs, Piece(*piece).extremes())) > level_a for piece in self._pieces
-        )
+        return any(bound(piece) > level_a and max(map(abs, piece.extremes())) > level_a for piece in self._pieces)
 
     @property
     def rms_current_a(self) -> float:
@@ -87,7 +85,7 @@ class Sample:
     @property
     def square_a2s(self) -> float:
         """Integral of the square of the armature current, A2 s; computed when asked for."""
-        return self._square + add_up([Piece(*piece).square() for piece in self._pieces])
+        return self._square + add_up([piece.square() for piece in self._pieces])
 
 
 @dataclass
@@ -169,10 +167,19 @@ class EnergyMeter(Stateful):
         heat = z.r * square
         drop = -net.rail_offset * charge
         volts_c = volts_d = 0.0
-        for share, offset, arc_v, (cosine, sine) in zip(
-            net.share, net.offsets, wiring.phase_arc_v, map(line.unit_wave, range(3)), strict=True
-        ):
+        share_a, share_b, share_c = net.share
+        offset_a, offset_b, offset_c = net.offsets
+        arc_a, arc_b, arc_c = wiring.phase_arc_v
+        for x in range(3):
+            # Written out: compiled, a tuple's numbers are quick to get only where their places are known.
+            if x == 0:
+                share, offset, arc_v = share_a, offset_a, arc_a
+            elif x == 1:
+                share, offset, arc_v = share_b, offset_b, arc_b
+            else:
+                share, offset, arc_v = share_c, offset_c, arc_c
             if share:
+                cosine, sine = line.unit_wave(x)
                 volts_c += share * cosine
                 volts_d += share * sine
                 heat += z.rs * share * share * square

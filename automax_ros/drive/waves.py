@@ -11,7 +11,9 @@ the source's decay rate (1/s).
 from __future__ import annotations
 
 from math import cos, exp, expm1, hypot, inf, sin, sqrt
-from typing import Final, NamedTuple
+from typing import Final
+
+from automax_ros.core.machine_code import mypyc_attr
 
 STRIDE_S: Final = 1e-8
 """A dip below zero that is shorter than this may be passed over: its depth is below 1e-8 A in any real circuit."""
@@ -137,17 +139,30 @@ def _between(
     return low
 
 
-class Piece(NamedTuple):
-    """The armature current (A) over one conduction interval, and the voltage that drives it."""
+@mypyc_attr(acyclic=True)
+class Piece:
+    """The armature current (A) over one conduction interval; nobody changes it."""
 
-    duration_s: float
-    theta: float
-    omega: float
-    c: float
-    d: float
-    k: float
-    a: float
-    decay: float
+    # Not a tuple: compiled, its numbers stand in it, where a tuple has eight objects.
+    __slots__ = ("_is_squared", "_square", "a", "c", "d", "decay", "duration_s", "k", "omega", "theta")
+
+    def __init__(
+        self, duration_s: float, theta: float, omega: float, c: float, d: float, k: float, a: float, decay: float
+    ) -> None:
+        """Take the duration (s), the line's angle at the start and its angular frequency, and the wave's factors."""
+        self.duration_s = duration_s
+        self.theta = theta
+        self.omega = omega
+        self.c = c
+        self.d = d
+        self.k = k
+        self.a = a
+        self.decay = decay
+        self._square, self._is_squared = 0.0, False
+
+    def numbers(self) -> list[float]:
+        """Return the arguments of a piece like this."""
+        return [self.duration_s, self.theta, self.omega, self.c, self.d, self.k, self.a, self.decay]
 
     def value(self, t: float) -> float:
         """Return the current (A) at t seconds after the start."""
@@ -155,10 +170,11 @@ class Piece(NamedTuple):
         return self.c * cos(angle) + self.d * sin(angle) + self.k + self.a * exp(-self.decay * t)
 
     def square(self) -> float:
-        """Return the integral of the current's square (A^2 s)."""
-        moments = Moments(self.theta, self.omega, self.decay, inf, self.duration_s)
-        wave = (self.c, self.d, self.k, self.a, 0.0)
-        return moments.square(wave)
+        """Return the integral of the current's square (A^2 s); computed when it is asked for first."""
+        if not self._is_squared:
+            moments = Moments(self.theta, self.omega, self.decay, inf, self.duration_s)
+            self._square, self._is_squared = moments.square((self.c, self.d, self.k, self.a, 0.0)), True
+        return self._square
 
     def extremes(self) -> tuple[float, float]:
         """Return the least and the greatest current (A) of the interval."""
@@ -182,13 +198,10 @@ class Piece(NamedTuple):
         return first_zero(c, d, k, a, 0.0, angle, self.omega, self.decay, 1.0, self.duration_s - start)
 
 
-RawPiece = tuple[float, float, float, float, float, float, float, float]
-"""A Piece's fields, in a form that is quick to make."""
-
-
-def bound(piece: RawPiece) -> float:
+def bound(piece: Piece) -> float:
     """Return what the magnitude of a piece's current (A) cannot pass: its ends, and what its bend allows between."""
-    duration, theta, omega, c, d, k, a, decay = piece
+    duration, theta, omega = piece.duration_s, piece.theta, piece.omega
+    c, d, k, a, decay = piece.c, piece.d, piece.k, piece.a, piece.decay
     end = theta + omega * duration
     first = abs(c * cos(theta) + d * sin(theta) + k + a)
     last = abs(c * cos(end) + d * sin(end) + k + a * exp(-decay * duration))

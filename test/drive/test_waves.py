@@ -120,9 +120,10 @@ def test_piece_knows_its_values():
     st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.01, 2000.0),
 )  # fmt: skip
 def test_bound_is_never_below_the_extremes(duration, theta, omega, c, d, k, a, decay):
-    piece = (duration, theta, omega, c, d, k, a, decay)
+    piece = Piece(duration, theta, omega, c, d, k, a, decay)
+    assert Piece(*piece.numbers()).numbers() == piece.numbers() == [duration, theta, omega, c, d, k, a, decay]
     times = [duration * index / 200 for index in range(201)]
-    largest = max(abs(Piece(*piece).value(t)) for t in times)
+    largest = max(abs(piece.value(t)) for t in times)
     assert bound(piece) >= largest * (1 - 1e-12)
     # It is a bound that says something: in short pieces hardly more than the ends.
     if duration < 1e-6:
