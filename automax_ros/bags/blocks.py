@@ -14,17 +14,17 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
+from automax_ros.bags.block_buffer import BlockBuffer
 from automax_ros.bags.chunk_table import MOST_MESSAGES, ChunkTable, WholeChunk
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.opening import size_of
 from automax_ros.bags.reader import BagMessage, BagReader, ChannelReader, DataSource, FileOrder
+from automax_ros.bags.unpacking import Buffer
 
-BLOCK_BYTES = 32 << 20
-"""A block ends with the chunk that makes it larger than this, in bytes unpacked, or gives it more messages than a chunk
-may have (decision)."""
+Bytes = NDArray[np.uint8]
 _CHANNELS = 1 << 16
-TableOf = Callable[[bytes], ChunkTable | None]
+TableOf = Callable[[Buffer], ChunkTable | None]
 """Finds where the messages of an unpacked chunk stand; None where they have to be read one by one."""
 _TWO_NUMBERS = struct.Struct("<HH")
 """What a schema or channel begins with: its own number, and in a channel that of its schema."""
@@ -99,12 +99,13 @@ class _BlockFile:
         self._types = frozenset(types)
         self._kind_of = {name: kind for kind, name in enumerate(types)}
         self._kinds = np.full(_CHANNELS, -1, np.int64)
-        self._known: set[int] = set()
         self._begun = False
         self.last_log: int | None = None
-        self._chunks: list[bytes] = []
-        self._tables: list[ChunkTable] = []
-        self._bytes = self._messages = 0
+        self._is_known = np.zeros(_CHANNELS, bool)
+        self._buffer = BlockBuffer()
+        self._data: Bytes = np.empty(0, np.uint8)
+        self._tables: list[tuple[int, ChunkTable]] = []
+        self._messages = 0
 
     @property
     def position(self) -> int:
@@ -114,11 +115,18 @@ class _BlockFile:
     def items(self) -> Iterator[MessageBlock | BagMessage]:
         """Return what the file holds; what was read before an error is handed out first."""
         try:
-            for record in self._file.chunks(indexed=self._table_of is None):
-                table = self._table(record) if isinstance(record, WholeChunk) else None
-                if isinstance(record, WholeChunk) and table is not None:
-                    self._keep(record, table)
-                    if self._bytes < BLOCK_BYTES and self._messages < MOST_MESSAGES:
+            for record in self._file.chunks(indexed=self._table_of is None, room=self._buffer.room):
+                table = None
+                if isinstance(record, WholeChunk):
+                    data, begin = self._buffer.taken()
+                    table = self._table(record)
+                    if data is not self._data:
+                        yield from self._kept()
+                        self._data = data
+                if table is not None:
+                    self._tables.append((begin, table))
+                    self._messages += len(table.places)
+                    if self._messages < MOST_MESSAGES:
                         continue
                 yield from self._kept()
                 if table is None:
@@ -134,18 +142,20 @@ class _BlockFile:
         if table is None or not self._is_defined(table):
             return None
         if not self._begun:
-            self._order.begin(self._file.path, int(table.heads["log_time"][0]))
+            self._order.begin(self._file.path, int(table.log_times[0]))
             self._begun = True
-        self.last_log = int(table.heads["log_time"][-1])
+        self.last_log = int(table.log_times[-1])
         return table
 
     def _is_defined(self, table: ChunkTable) -> bool:
         """Take over what a chunk defines; return whether its channels stand before their messages and can be read."""
-        numbers, firsts = np.unique(table.heads["channel"], return_index=True)
+        if not table.definitions and self._is_known[table.numbers].all():
+            return True
+        numbers, firsts = np.unique(table.numbers, return_index=True)
         unknown = [
             (number, int(table.places[first]))
             for number, first in zip(numbers.tolist(), firsts.tolist(), strict=True)
-            if number not in self._known
+            if not self._is_known[number]
         ]
         if not unknown and not table.definitions:
             return True
@@ -190,41 +200,28 @@ class _BlockFile:
                 made = self._source.channels[number] = ChannelReader(self._source.path, channel, schema, wanted)
             except BagError:
                 return False
-        self._known.add(number)
+        self._is_known[number] = True
         if made.wanted:
             self._kinds[number] = self._kind_of[made.type_name]
         return True
 
-    def _keep(self, chunk: WholeChunk, table: ChunkTable) -> None:
-        self._chunks.append(chunk.data)
-        self._tables.append(table)
-        self._bytes += len(chunk.data)
-        self._messages += len(table.places)
-
     def _kept(self) -> Iterator[MessageBlock]:
         """Return the chunks kept so far as one block, and forget them."""
-        if not self._chunks:
+        if not self._tables:
             return
-        begins = np.cumsum([0, *map(len, self._chunks)])
-        heads = np.concatenate([table.heads for table in self._tables])
-        starts = np.concatenate([table.starts + begin for table, begin in zip(self._tables, begins, strict=False)])
-        lengths = np.concatenate([table.lengths for table in self._tables])
-        data = np.frombuffer(b"".join(self._chunks), np.uint8)
-        self._chunks, self._tables, self._bytes, self._messages = [], [], 0, 0
-        numbers = heads["channel"].astype(np.int64)
-        kinds = self._kinds[numbers]
-        wanted = np.flatnonzero(kinds >= 0)
-        if len(wanted):
-            yield MessageBlock(
-                self._source,
-                data,
-                kinds[wanted],
-                numbers[wanted],
-                starts[wanted],
-                lengths[wanted],
-                heads["log_time"][wanted],
-                heads["publish_time"][wanted],
-            )
+        tables = [table for _, table in self._tables]
+        starts = np.concatenate([table.starts + begin for begin, table in self._tables])
+        numbers = np.concatenate([table.numbers for table in tables])
+        lengths = np.concatenate([table.lengths for table in tables])
+        log_times = np.concatenate([table.log_times for table in tables])
+        stamps = np.concatenate([table.stamps for table in tables])
+        self._tables, self._messages = [], 0
+        columns = self._kinds[numbers], numbers, starts, lengths, log_times, stamps
+        wanted = columns[0] >= 0
+        if not wanted.all():
+            columns = tuple(column[wanted] for column in columns)
+        if len(columns[0]):
+            yield MessageBlock(self._source, self._data, *columns)
 
     def _one_by_one(self, record: WholeChunk | RawMessage) -> Iterator[BagMessage]:
         """Return messages that stand in no block."""

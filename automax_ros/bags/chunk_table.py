@@ -14,11 +14,12 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from automax_ros.bags.mcap_output import MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.bags.unpacking import Buffer
 
 _INDEX_HEAD = struct.Struct("<HI")
 """Channel and bytes of the entries: what the content of a message index begins with."""
 _ENTRY = np.dtype([("log_time", "<u8"), ("place", "<u8")])
-HEAD = np.dtype(
+_HEAD = np.dtype(
     [
         ("opcode", "u1"),
         ("length", "<u8"),
@@ -30,7 +31,7 @@ HEAD = np.dtype(
 )
 """What a message's record begins with."""
 MESSAGE_HEAD = RECORD_HEAD.size + MESSAGE_FIELDS.size
-"""Bytes of ``HEAD``: what stands before a message itself."""
+"""Bytes of its record that stand before a message itself."""
 Definition = tuple[int, int, bytes]
 """A schema or channel: the place of its record, its opcode and its content."""
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
@@ -41,13 +42,16 @@ MOST_MESSAGES = 400_000
 
 @dataclass(frozen=True)
 class ChunkTable:
-    """Where the messages of a chunk stand, in the order of the file: ``heads`` has their channels, lengths and times.
+    """Where the messages of a chunk stand, in the order of the file: ``numbers`` of their channels, lengths and times.
 
     ``places`` are where their records begin. ``definitions`` are the schemas and channels: place, opcode, content.
     """
 
-    heads: NDArray[np.void]
+    numbers: NDArray[np.int64]
     places: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    log_times: NDArray[np.uint64]
+    stamps: NDArray[np.uint64]
     definitions: tuple[Definition, ...]
 
     @property
@@ -55,16 +59,11 @@ class ChunkTable:
         """Where the messages themselves begin."""
         return self.places + MESSAGE_HEAD
 
-    @property
-    def lengths(self) -> NDArray[np.int64]:
-        """How many bytes they have."""
-        return self.heads["length"].astype(np.int64) - MESSAGE_FIELDS.size
-
 
 class WholeChunk:
     """The unpacked bytes of a chunk, which ends at a ``place`` of the file, and the indexes that follow it there."""
 
-    def __init__(self, data: bytes, place: int = 0) -> None:
+    def __init__(self, data: Buffer, place: int = 0) -> None:
         self.data, self.place = data, place
         self._indexes: list[bytes] | None = []
         self._left = len(data) // MESSAGE_HEAD * _ENTRY.itemsize
@@ -92,7 +91,7 @@ class WholeChunk:
             return None
         places = told.astype(np.int64)
         found = np.ndarray((len(self.data) - MESSAGE_HEAD + 1,), f"V{MESSAGE_HEAD}", self.data, strides=(1,))
-        heads = found[places].view(HEAD)
+        heads = found[places].view(_HEAD)
         lengths = heads["length"]
         if (heads["opcode"] != int(Opcode.MESSAGE)).any() or (lengths < MESSAGE_FIELDS.size).any():
             return None
@@ -107,7 +106,14 @@ class WholeChunk:
         definitions = list(self._definitions(zip(known[gaps].tolist(), begins[gaps].tolist(), strict=True)))
         if None in definitions or len(definitions) > _MOST_DEFINITIONS:
             return None
-        return ChunkTable(heads, places, tuple(item for item in definitions if item is not None))
+        return ChunkTable(
+            heads["channel"].astype(np.int64),
+            places,
+            lengths.astype(np.int64) - MESSAGE_FIELDS.size,
+            heads["log_time"].copy(),
+            heads["publish_time"].copy(),
+            tuple(item for item in definitions if item is not None),
+        )
 
     def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[Definition | None]:
         """Return the records between messages; None for one that is neither schema nor channel."""
@@ -123,8 +129,8 @@ class WholeChunk:
                 position = start + length
 
 
-def definition_at(data: bytes, place: int) -> Definition:
+def definition_at(data: Buffer, place: int) -> Definition:
     """Return the schema or channel whose record begins at a place of a chunk."""
     opcode, length = RECORD_HEAD.unpack_from(data, place)
     start = place + RECORD_HEAD.size
-    return place, opcode, data[start : start + length]
+    return place, opcode, bytes(data[start : start + length])

@@ -25,7 +25,7 @@ from automax_ros.bags.chunk_table import WholeChunk
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.bags.opening import NO_BAG_HINT, opened
-from automax_ros.bags.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Unpacker
+from automax_ros.bags.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Buffer, Room, Unpacker
 
 _FIRST_PRIVATE_OPCODE = 0x80
 """From here on opcodes belong to others; readers pass over what they do not know."""
@@ -92,9 +92,10 @@ class McapFile:
             elif opcode == Opcode.METADATA:
                 yield self._parsed(Metadata.read, content)
 
-    def chunks(self, *, indexed: bool = True) -> Iterator[WholeChunk | RawMessage]:
+    def chunks(self, *, indexed: bool = True, room: Room | None = None) -> Iterator[WholeChunk | RawMessage]:
         """Return the chunks, unpacked, with their indexes (if wanted), and the messages outside of chunks.
 
+        ``room`` gives each chunk the place to which it is unpacked, in the order of the chunks.
         A chunk is handed out before an error of what follows it is raised. ``chunk_messages`` takes it apart.
 
         Raises:
@@ -107,7 +108,7 @@ class McapFile:
                 opcode, content = next(parts, (_END, b""))
                 chunk = None
                 if opcode == Opcode.CHUNK:
-                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content)), self.position)
+                    chunk = WholeChunk(self._unpacked(self._parsed(Chunk.read, content), room), self.position)
                 elif opcode == Opcode.ATTACHMENT:
                     self._parsed(Attachment.read, content)
                 elif opcode == Opcode.METADATA:
@@ -134,7 +135,7 @@ class McapFile:
         Raises:
             BagError: it is damaged or beyond the limits.
         """
-        data, position = chunk.data, 0
+        data, position = bytes(chunk.data), 0
         self._place = chunk.place
         while position < len(data):
             start = position + RECORD_HEAD.size
@@ -272,9 +273,10 @@ class McapFile:
         schema = self.schemas.get(channel.schema_id)
         return RawMessage(channel, schema, sequence, log_time, publish_time, content[MESSAGE_FIELDS.size :])
 
-    def _unpacked(self, chunk: Chunk) -> bytes:
+    def _unpacked(self, chunk: Chunk, room: Room | None = None) -> Buffer:
+        data: Buffer
         try:
-            data = self._unpacker.unpacked(chunk)
+            data = self._unpacker.unpacked(chunk) if room is None else self._unpacker.unpacked_in(chunk, room)
         except BagError as error:
             raise BagError(
                 error.code, self.path, f"{error.message} (before byte {self.position})", error.hint

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import lz4.frame
@@ -20,6 +21,10 @@ FREE_BYTES = 512 << 20
 """A file may unpack to this many times its size and these bytes, not more (decision): recordings come to 10 or 50."""
 DAMAGED_HINT = "copy the file again from where it was recorded, or save what is sound by `automax bag repair`"
 
+Buffer = bytes | memoryview
+Room = Callable[[int], memoryview]
+"""Gives as many bytes to write to."""
+
 
 class Unpacker:
     """Decompresses the chunks of one file of ``stored_bytes`` bytes."""
@@ -34,17 +39,39 @@ class Unpacker:
         Raises:
             BagError: damaged, beyond the limits, or of a compression that we do not know; the message names no place.
         """
-        size = chunk.uncompressed_size
-        self._admit(size)
+        self._admit(chunk.uncompressed_size)
+        data = self._decompressed(chunk)
+        self._check(chunk, data)
+        return data
+
+    def unpacked_in(self, chunk: Chunk, room: Room) -> memoryview:
+        """Return what a chunk holds, in the room for it, which is asked for when its size is known to be admissible.
+
+        Raises:
+            BagError: as ``unpacked`` does.
+        """
+        self._admit(chunk.uncompressed_size)
+        place = room(chunk.uncompressed_size)
+        if _is_in(place, chunk):
+            self._check(chunk, place)
+        else:
+            data = self._decompressed(chunk)
+            self._check(chunk, data)
+            place[:] = data
+        return place
+
+    def _decompressed(self, chunk: Chunk) -> bytes:
         try:
-            data = self._whole(chunk.compression, chunk.data, size)
+            return self._whole(chunk.compression, chunk.data, chunk.uncompressed_size)
         except (zstandard.ZstdError, RuntimeError, EOFError) as error:  # lz4 raises RuntimeError
             raise self._damaged(f"a chunk cannot be decompressed: {error}") from error
+
+    def _check(self, chunk: Chunk, data: Buffer) -> None:
+        size = chunk.uncompressed_size
         if len(data) != size:
             raise self._damaged(f"a chunk has {len(data)} bytes and should have {size}")
         if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
             raise self._damaged("the checksum of a chunk is wrong")
-        return data
 
     def beginning(self, compression: str, data: bytes, size: int) -> bytes:
         """Return as much of a chunk of ``size`` bytes as the beginning of its compressed data gives.
@@ -90,3 +117,15 @@ class Unpacker:
 
     def _damaged(self, message: str) -> BagError:
         return BagError("AMX6813", self._path, message, DAMAGED_HINT)
+
+
+def _is_in(place: memoryview, chunk: Chunk) -> bool:
+    """Decompress a sound zstd frame that states its size into its place; FALSE if it is anything else."""
+    if chunk.compression != "zstd" or not len(place):
+        return False
+    with contextlib.suppress(zstandard.ZstdError):
+        if zstandard.get_frame_parameters(chunk.data).content_size == len(place):
+            with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
+                # The second read comes to the end of the frame, and to its checksum.
+                return reader.readinto(place) == len(place) and not reader.read(1)
+    return False

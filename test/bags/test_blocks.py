@@ -78,9 +78,9 @@ def test_an_index_that_fills_its_chunk_tells_where_messages_stand(chunk: ChunkBu
     table = indexed(chunk, chunk.index).table()
     assert table is not None
     assert table.lengths.tolist() == [number + 4 for number in range(20)]
-    assert table.heads["log_time"].tolist() == [1000 + number for number in range(20)]
-    assert table.heads["publish_time"].tolist() == [2000 + number for number in range(20)]
-    assert table.heads["channel"].tolist() == [1 + number % 2 for number in range(20)]
+    assert table.log_times.tolist() == [1000 + number for number in range(20)]
+    assert table.stamps.tolist() == [2000 + number for number in range(20)]
+    assert table.numbers.tolist() == [1 + number % 2 for number in range(20)]
     data = bytes(chunk.data)
     assert [data[start : start + length] for start, length in zip(table.starts, table.lengths, strict=True)] == [
         bytes(range(number + 4)) for number in range(20)

@@ -4,23 +4,30 @@
 
 enum { SCHEMA = 3, CHANNEL = 4, MESSAGE = 5, RECORD_HEAD = 9, MESSAGE_HEAD = 31, MOST_FIELDS = 32 };
 
-/* Finds the records of a chunk: the heads of messages and their places, and the places of definitions. Returns how many
- * messages there are, -1 where other records stand among them, one is cut off, or there is no room for all of them. */
+/* Finds the records of a chunk. Of each message it sets channel, place, bytes of the message itself, log time and time
+ * of sending, in `columns` with room for `room` of them, and the places of definitions. Returns how many messages there
+ * are, -1 where other records stand among them, one is cut off, or there is no room for all of them. */
 int64_t automax_records(
-    const uint8_t *data, int64_t size, int64_t room, uint8_t *heads, int64_t *places, int64_t definition_room,
-    int64_t *definitions, int64_t *defined
+    const uint8_t *data, int64_t size, int64_t room, int64_t *columns, int64_t definition_room, int64_t *definitions,
+    int64_t *defined
 ) {
     int64_t found = 0;
     *defined = 0;
     for (int64_t place = 0; place < size;) {
         uint64_t length;
+        uint16_t channel;
         if (size - place < RECORD_HEAD) return -1;
         memcpy(&length, data + place + 1, sizeof length);
         if (length > (uint64_t)(size - place - RECORD_HEAD)) return -1;
         if (data[place] == MESSAGE) {
             if (length < MESSAGE_HEAD - RECORD_HEAD || found == room) return -1;
-            memcpy(heads + found * MESSAGE_HEAD, data + place, MESSAGE_HEAD);
-            places[found++] = place;
+            memcpy(&channel, data + place + 9, sizeof channel);
+            columns[found] = channel;
+            columns[room + found] = place;
+            columns[2 * room + found] = (int64_t)length - (MESSAGE_HEAD - RECORD_HEAD);
+            memcpy(columns + 3 * room + found, data + place + 15, 8);
+            memcpy(columns + 4 * room + found, data + place + 23, 8);
+            found++;
         } else if (data[place] == SCHEMA || data[place] == CHANNEL) {
             if (*defined == definition_room) return -1;
             definitions[(*defined)++] = place;

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from automax_ros.bags.chunk_table import HEAD, MESSAGE_HEAD, MOST_MESSAGES, ChunkTable, definition_at
+from automax_ros.bags.chunk_table import MESSAGE_HEAD, MOST_MESSAGES, ChunkTable, definition_at
+from automax_ros.bags.unpacking import Buffer
 from automax_ros.replay.columns.entries import Entries, ValueRules
 from automax_ros.wire.cdr_columns import Bytes, Ints
 from automax_ros.wire.cdr_fields import MACROS, FieldsSource, fields_source
@@ -120,21 +121,22 @@ class ColumnLibrary:
         """
         self._library = ctypes.CDLL(str(path))
 
-    def table(self, data: bytes) -> ChunkTable | None:
+    def table(self, data: Buffer) -> ChunkTable | None:
         """Return where the messages of a chunk stand, None where they have to be read one by one."""
         room = min(len(data) // MESSAGE_HEAD, MOST_MESSAGES)
-        heads, places = np.empty(room, HEAD), np.empty(room, np.int64)
+        columns = np.empty((5, room), np.int64)
         definitions, defined = np.empty(_MOST_DEFINITIONS, np.int64), ctypes.c_int64()
         found = self._count(
             "automax_records",
-            *(ctypes.c_char_p(data), ctypes.c_int64(len(data)), ctypes.c_int64(room)),
-            *(_address(heads, HEAD), _address(places, np.int64)),
-            *(ctypes.c_int64(_MOST_DEFINITIONS), _address(definitions, np.int64), ctypes.byref(defined)),
+            *(_address(np.frombuffer(data, np.uint8), np.uint8), ctypes.c_int64(len(data)), ctypes.c_int64(room)),
+            *(_address(columns, np.int64), ctypes.c_int64(_MOST_DEFINITIONS), _address(definitions, np.int64)),
+            ctypes.byref(defined),
         )
         if found <= 0:
             return None
+        numbers, places, lengths, log_times, stamps = columns[:, :found]
         told = tuple(definition_at(data, place) for place in definitions[: defined.value].tolist())
-        return ChunkTable(heads[:found], places[:found], told)
+        return ChunkTable(numbers, places, lengths, log_times.view(np.uint64), stamps.view(np.uint64), told)
 
     def taken(
         self, kind: TakenKind, data: Bytes, starts: Ints, lengths: Ints, rules: ValueRules, texts: Sequence[str] = ()
