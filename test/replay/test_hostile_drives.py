@@ -31,7 +31,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return without_checksums(folder / "bag" / "scans_0.mcap", folder / "plain.mcap")
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=75, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(changes=st.lists(st.tuples(st.integers(0, 1 << 20), st.integers(0, 255)), min_size=1, max_size=4))
 def test_changed_bytes_give_a_page_or_an_error(
     plain: bytes, tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, int]]

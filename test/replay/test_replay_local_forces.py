@@ -117,7 +117,7 @@ def test_a_scan_under_way_is_replayed_as_it_began(tmp_path):
             rack.unforce("SPEED.SUM%")
 
     rack = build_modeled(tmp_path)
-    bag = record(rack, tmp_path / "bag", often, slices=600, seconds=1.02)
+    bag = record(rack, tmp_path / "bag", often, slices=300, seconds=0.51)
     assert sum(late) > 5
     assert replayed(bag).identical
 

@@ -67,13 +67,13 @@ def remark_changes_nothing(text: str, history) -> None:
 
 
 @given(tasks(), HISTORY)
-@repeatable(25)
+@repeatable(15)
 def test_random_tasks_replay_identically(text, history):
     replays_identically(text, history)
 
 
 @given(tasks(), HISTORY)
-@repeatable(15)
+@repeatable(10)
 def test_a_remark_changes_nothing(text, history):
     remark_changes_nothing(text, history)
 

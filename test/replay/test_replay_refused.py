@@ -263,13 +263,13 @@ rack: LINE1
 slots:
   0: {module: 57C435, tick_ms: 5.5, tasks: {FILL: {priority: 4}}}
 common:
-  BIG%(20000): {}
+  BIG%(6000): {}
 """
     text = """\
-10 COMMON BIG%(20000)
+10 COMMON BIG%(6000)
 20 LOCAL I%
 30 CALL SCAN_LOOP(TICKS=100)
-40 FOR I% = 0 TO 20000
+40 FOR I% = 0 TO 6000
 50 BIG%(I%) = 1
 60 NEXT I%
 70 END
@@ -280,5 +280,5 @@ common:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert len(report.differences) == 50
-    assert report.more == 20001 - 50
-    assert peak < 100_000_000
+    assert report.more == 6001 - 50
+    assert peak < 30_000_000
