@@ -15,19 +15,15 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from automax_ros.pieces.attempt import Answer, Refusal, attempt
+from automax_ros.pieces.connecting import client_of
 from automax_ros.pieces.faults import ClusterFault
 from automax_ros.pieces.installation import Installation, installation
 from automax_ros.pieces.piece import Done, Piece, PieceFault, death_of, fault_of
 
-CONNECT_S = 10
-"""How long a scheduler may take to answer, s (decision)."""
 WITHOUT_WORKERS_S = 300
 """How long a cluster may be without any worker, s (decision): some begin workers only when there is work."""
-_BEGINNINGS = 3
-"""How often a client is begun (decision): Dask gives its thread 10 s to begin, and fails by a bare AssertionError."""
 _POLL_S = 0.1
 _LOOK_S = 2.0
-_INSTALL = "install it with `pip install 'automax_ros[cluster]'`"
 _SAME = "install the same version on all machines, and start the workers again"
 _LOGGERS = ("distributed.client", "distributed.core", "distributed.comm", "distributed.batched", "distributed.utils")
 
@@ -63,17 +59,12 @@ def on_cluster(
 @contextmanager
 def _connected(scheduler: str) -> Iterator[_Cluster]:
     """Connect to a scheduler while the block lasts; what Dask logs meanwhile we say in our own words."""
-    try:
-        from distributed import Client
-    except ImportError as error:
-        what = f"a cluster needs Dask, which is not installed here ({error})"
-        raise ClusterFault("AMX6851", scheduler, what, _INSTALL) from error
     loggers = {name: logging.getLogger(name) for name in _LOGGERS}
     levels = {name: logger.level for name, logger in loggers.items()}
     for logger in loggers.values():
         logger.setLevel(logging.CRITICAL + 1)
     try:
-        client = _client(Client, scheduler)
+        client = client_of(scheduler)
         try:
             yield _Cluster(client, scheduler)
         finally:
@@ -82,25 +73,6 @@ def _connected(scheduler: str) -> Iterator[_Cluster]:
     finally:
         for name, logger in loggers.items():
             logger.setLevel(levels[name])
-
-
-def _client(kind: Callable[..., Any], scheduler: str) -> Any:
-    """Return a client of a scheduler.
-
-    Raises:
-        ClusterFault: it does not answer, or this machine is too busy to ask it.
-    """
-    for _ in range(_BEGINNINGS):
-        try:
-            return kind(scheduler, timeout=CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TypeError, ImportError) as error:
-            what = f"no Dask scheduler answers: {error}"
-            hint = "give the address that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
-            raise ClusterFault("AMX6852", scheduler, what, hint) from error
-        except AssertionError:
-            continue
-    what = "the Dask scheduler was not asked: this machine is too busy for Dask to begin a thread within 10 s"
-    raise ClusterFault("AMX6852", scheduler, what, "give the command again when less is going on here")
 
 
 class _Cluster:

@@ -1,6 +1,8 @@
 """Pieces done by a Dask cluster: a real scheduler and real workers, which die, and are of another version."""
 
+import gc
 import signal
+import socket
 import sys
 
 import pytest
@@ -138,24 +140,42 @@ def test_a_scheduler_that_is_lost_is_said_to_be(tmp_path):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x", "tls://127.0.0.1:1"])
 def test_a_scheduler_that_does_not_answer_is_said_to_be(address, monkeypatch):
-    monkeypatch.setattr("automax_ros.pieces.cluster.CONNECT_S", 1)
+    monkeypatch.setattr("automax_ros.pieces.connecting.CONNECT_S", 1)
     with pytest.raises(ClusterFault, match="no Dask scheduler answers") as caught:
         run_pieces(squares(3), Where(scheduler=address))
     assert caught.value.code == "AMX6852"
     assert caught.value.place == address
 
 
+def test_a_server_that_is_no_scheduler_is_not_waited_for_for_ever(monkeypatch):
+    monkeypatch.setattr("automax_ros.pieces.connecting.CONNECT_S", 1)
+    monkeypatch.setattr("automax_ros.pieces.connecting._MORE_S", 1)
+    with socket.create_server(("127.0.0.1", 0)) as server:  # which connects, and says nothing
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(ClusterFault, match="answers: nothing that is one does within 1 s") as caught:
+            run_pieces(squares(3), Where(scheduler=address))
+    assert caught.value.code == "AMX6852"
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_client_that_could_not_begin_is_not_waited_for():
+    with pytest.raises(ClusterFault, match="no Dask scheduler answers"):
+        run_pieces(squares(3), Where(scheduler="nonsense://x"))
+    gc.collect()  # Dask would wait for it here, and fail
+
+
 @pytest.mark.parametrize("often", [1, 99])
 def test_a_machine_that_is_too_busy_for_dask_to_begin_gets_another_chance(two_workers, monkeypatch, often):
     """So Dask fails where its thread takes more than 10 s to begin."""
-    client, begun = distributed.Client, []
+    begun = []
 
-    def late(*arguments, **named):
-        begun.append(1)
-        assert len(begun) > often
-        return client(*arguments, **named)
+    class Late(distributed.Client):
+        def __init__(self, *arguments, **named):
+            begun.append(1)
+            assert len(begun) > often
+            super().__init__(*arguments, **named)
 
-    monkeypatch.setattr(distributed, "Client", late)
+    monkeypatch.setattr(distributed, "Client", Late)
     if often == 1:
         assert run_pieces(squares(3), Where(scheduler=two_workers.address)) == run_pieces(squares(3), Where(1))
         return
