@@ -33,6 +33,32 @@ class Group:
 _COLD = ("steady", "drive_case", "drive_rules", "gain_rules", "nameplate", "limits", "assessment")
 """What a drive's tools ask once: compiling takes longer than it saves."""
 
-GROUPS = (Group("drive", folders=("drive",), without=tuple(f"drive/{name}.py" for name in _COLD)),)
+_SCANS = (
+    "running/scan_record.py",
+    "running/scheduler.py",
+    "running/task.py",
+    "running/task_io.py",
+    "rack/observers.py",
+    "rack/scheduled_task.py",
+)
+"""What each scan goes through."""
+_RECORDING = (
+    "wire/patterns.py",
+    "wire/prepared.py",
+    "wire/rack_messages.py",
+    "wire/stream.py",
+    "wire/task_messages.py",
+    "wire/write_messages.py",
+    "bags/chunk_builder.py",
+    "bags/recorder.py",
+    "bags/recording.py",
+    "bags/writer.py",
+)
+"""What each message of a recording goes through."""
+
+GROUPS = (
+    Group("drive", folders=("drive",), without=tuple(f"drive/{name}.py" for name in _COLD)),
+    Group("scans", files=(*_SCANS, *_RECORDING)),
+)
 """What runs as machine code. ``sum`` of floating-point numbers must not stand in it (decision): Python 3.12 and later
 round once, at the end, where C rounds after each addition."""

@@ -13,7 +13,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from automax_ros.bags.mcap_output import MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.bags.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.bags.unpacking import Buffer
 
 _INDEX_HEAD = struct.Struct("<HI")

@@ -21,9 +21,10 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema
 
 from automax_ros.bags.checked_stream import CheckedStream
+from automax_ros.bags.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.bags.chunk_table import WholeChunk
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.bags.mcap_output import MAGIC
 from automax_ros.bags.opening import NO_BAG_HINT, opened
 from automax_ros.bags.unpacking import DAMAGED_HINT, MAX_RECORD_BYTES, Buffer, Room, Unpacker
 

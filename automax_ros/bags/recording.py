@@ -7,9 +7,11 @@ from contextlib import contextmanager
 
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.writer import BagWriter
+from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.wire.rack_files import RackFile
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Recording:
     """A bag being recorded, with the rack's files in it.
 

@@ -20,10 +20,11 @@ from mcap.records import Attachment, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
 
 import automax_ros
+from automax_ros.bags.chunk_builder import ChunkBuilder
 from automax_ros.bags.chunk_thread import ChunkThread
 from automax_ros.bags.data_file import DataFile, sync_path
 from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.mcap_output import ChunkBuilder, McapOutput
+from automax_ros.bags.mcap_output import McapOutput
 from automax_ros.bags.metadata import (
     METADATA_FILE,
     BagMetadata,

@@ -7,16 +7,18 @@ memory stays written). It notes what it reads, so that another rack can execute 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
-from automax_ros.compile.scan_io import StateValues
+from automax_ros.compile.compiler import ScanSteps
+from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
 from automax_ros.running.error_log import ErrorLog, LogEntry
+from automax_ros.running.scan_record import ScanRecord, Status, Steps
 from automax_ros.running.task_io import Call, ScanMemory
-from automax_ros.running.views import LatchPlan
+from automax_ros.running.views import LatchPlan, Memory
 
 Progress = Mapping[str, Any]
 """How far a scan is, in numbers, texts, lists and mappings."""
@@ -119,6 +121,54 @@ class ScanUnderWay:
             "steps": self.steps,
             "heard": list(self.memory.heard),
         }
+
+
+Begun = tuple[ScanUnderWay, ScanRecord | None, Generator[int, None, bool]]
+"""A scan that has begun: what it works on, its record if one is kept, and the compiled form that executes it."""
+
+
+class Stepped(Protocol):
+    """A task as ``scan_in_steps`` sees it: the beginning and the three ends of a scan."""
+
+    memory: Memory
+
+    @property
+    def status(self) -> Status: ...  # noqa: D102
+
+    def begin_steps(self, now_ns: int, skipped: int, form: ScanSteps | None) -> Begun: ...  # noqa: D102
+
+    def end_steps(self, outcome: Any) -> None: ...  # noqa: D102
+
+    def give_up_steps(self) -> None: ...  # noqa: D102
+
+    def too_long(self, error: ScanTooLong) -> None: ...  # noqa: D102
+
+
+def scan_in_steps(task: Stepped, now_ns: int, skipped: int, form: ScanSteps | None) -> Steps:
+    """Execute one scan of a task in steps: see ``Task.scan_modeled``.
+
+    It stays plain Python, since a generator of machine code that is dropped is not closed: the scan would never end.
+    """
+    if task.status is not Status.RUNNING:
+        return None
+    scan, record, steps = task.begin_steps(now_ns, skipped, form)
+    outcome: Any = False
+    try:
+        while True:
+            cost = next(steps)
+            scan.steps += 1
+            later = yield cost
+            if later is not None:
+                task.memory.now_ns = later
+    except StopIteration as end:
+        outcome = end.value
+    except ScanTooLong as error:
+        task.too_long(error)
+    except BaseException:
+        task.give_up_steps()
+        raise
+    task.end_steps(outcome)
+    return record
 
 
 def add_error(entry: LogEntry, log: ErrorLog, scan: ScanUnderWay | None) -> None:

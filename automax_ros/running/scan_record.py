@@ -17,7 +17,10 @@ class Status(enum.Enum):
     FAULTED = "faulted"
 
 
-class ScanRecord:
+_FIELDS = ("commits", "duration_ns", "errors", "latched", "reads", "scan", "skipped", "time_ns", "writes")
+
+
+class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
     """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
 
     ``time_ns`` is the instant of the latch, ``duration_ns`` the time of execution: the host's, or the modeled one from
@@ -25,7 +28,7 @@ class ScanRecord:
     """
 
     # Not a dataclass: every recorded scan makes one, and that takes twice as long.
-    __slots__ = ("commits", "duration_ns", "errors", "latched", "reads", "scan", "skipped", "time_ns", "writes")
+    __slots__ = _FIELDS
 
     def __init__(self, time_ns: int, scan: int, skipped: int = 0) -> None:
         """Begin the record of a scan that has seen and done nothing; ``skipped`` deadlines were missed before it."""
@@ -43,13 +46,11 @@ class ScanRecord:
         """Return whether another record says the same."""
         if not isinstance(other, ScanRecord):
             return NotImplemented
-        return all(getattr(self, name) == getattr(other, name) for name in ScanRecord.__slots__)
-
-    __hash__ = None  # type: ignore[assignment]  # it changes while the scan goes on
+        return all(getattr(self, name) == getattr(other, name) for name in _FIELDS)
 
     def __repr__(self) -> str:
         """Return all of it as text."""
-        return f"ScanRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in sorted(ScanRecord.__slots__))})"
+        return f"ScanRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in _FIELDS)})"
 
 
 Steps = Generator[int, int | None, ScanRecord | None]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Generator, Mapping, Sequence
 from typing import Any
@@ -10,16 +9,25 @@ from typing import Any
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.compile.layout import Layout
 from automax_ros.compile.scan_io import ScanTooLong, StateValues
-from automax_ros.core.numbers import stored_real
-from automax_ros.core.types import DataType, Value
+from automax_ros.core.machine_code import mypyc_attr
+from automax_ros.core.types import Value
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.running.backplane import NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.events import Events
-from automax_ros.running.modeled_scan import HeardMemory, Progress, ScanUnderWay, add_error, cleared_errors
+from automax_ros.running.modeled_scan import (
+    Begun,
+    HeardMemory,
+    Progress,
+    ScanUnderWay,
+    add_error,
+    cleared_errors,
+    scan_in_steps,
+)
 from automax_ros.running.scan_record import ScanRecord, Status, Steps
 from automax_ros.running.snapshot import snapshot_layout
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
+from automax_ros.running.tunable_value import tunable_value
 from automax_ros.running.views import Memory
 
 __all__ = ["EVENT_TIMEOUT", "OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task"]
@@ -33,6 +41,7 @@ _RUNNING = Status.RUNNING
 """A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Task:
     """One task in one rack: its compiled functions, its state, and its place in the rack.
 
@@ -125,7 +134,7 @@ class Task:
             if self.compiled.startup(self.state, self._io):
                 self.status = Status.ENDED
         except ScanTooLong as error:
-            self._too_long(error)
+            self.too_long(error)
         return record
 
     def scan(self, now_ns: int, skipped: int = 0) -> ScanRecord | None:
@@ -149,7 +158,7 @@ class Task:
             self._scans = None
             if not isinstance(error, ScanTooLong):
                 raise
-            self._too_long(error)
+            self.too_long(error)
         return record
 
     @property
@@ -174,8 +183,10 @@ class Task:
         another ``form`` of the scan, what that yields. State and number of the scan are the task's when the generator
         has ended; closed before that, it leaves them as they were (decision: what it has written stays written).
         """
-        if self.status is not Status.RUNNING:
-            return None
+        return scan_in_steps(self, now_ns, skipped, form)
+
+    def begin_steps(self, now_ns: int, skipped: int, form: ScanSteps | None) -> Begun:
+        """Begin a scan in steps, of a task in RUN: see ``scan_modeled``."""
         self.heed_forces()
         self._put_down()
         self._heard.begin()
@@ -186,29 +197,26 @@ class Task:
             scan.log = self.errors.copy()
         record = self._begin_record(now_ns, skipped, self._heard_io) if self._recording else None
         self._begins(now_ns)
-        steps = (form or self._form_in_steps())(scan.state, self._heard_io)
-        outcome: Any = False
-        try:
-            while True:
-                cost = next(steps)
-                scan.steps += 1
-                later = yield cost
-                if later is not None:
-                    self.memory.now_ns = later
-        except StopIteration as end:
-            outcome = end.value
-        except ScanTooLong as error:
-            self._too_long(error)
-        except BaseException:
-            self.errors, self._under_way = scan.log or ErrorLog(), None
-            raise  # Forces that wait go on doing so: a scan may be given up by the garbage collector, amid anything.
+        return scan, record, (form or self._form_in_steps())(scan.state, self._heard_io)
+
+    def end_steps(self, outcome: Any) -> None:
+        """End the scan under way with what its compiled form returned: TRUE if the task executed STOP."""
+        scan = self._under_way
+        assert scan is not None
         self.scan_number += 1
         self._state, self._under_way = scan.state, None
         if self._forces_wait:
             self.heed_forces()
         if outcome:
-            self._over(outcome, now_ns)
-        return record
+            self._over(outcome, scan.began_ns)
+
+    def give_up_steps(self) -> None:
+        """Leave the task as the scan under way found it.
+
+        Forces that wait go on doing so: a scan may be given up by the garbage collector, amid anything.
+        """
+        scan, self._under_way = self._under_way, None
+        self.errors = ErrorLog() if scan is None or scan.log is None else scan.log
 
     def resume_scan(self, progress: Progress) -> Steps:
         """Return a scan in steps that is as far as another was: it has announced its last step (see ``progress``)."""
@@ -286,21 +294,7 @@ class Task:
             KeyError: the task has no tunable of that name.
             ValueError: the value lies outside its limits or is not of its type.
         """
-        symbol = self.compiled.program.symbols[name]
-        if symbol.tuning is None:
-            raise KeyError(name)
-        low, high = symbol.tuning.low, symbol.tuning.high
-        assert not isinstance(low, str)
-        assert not isinstance(high, str)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise ValueError(f"{name} cannot be {value!r}: that is not a number")
-        # A limit such as 0.1 is held in single precision too, so the stored value is what must lie inside.
-        stored = stored_real(float(value))[0] if symbol.type is DataType.REAL else int(value)
-        if symbol.type is not DataType.REAL and stored != value:
-            raise ValueError(f"{name} = {value} is not a whole number")
-        if not low <= stored <= high:
-            raise ValueError(f"{name} = {value:.8g} lies outside {low:.8g} to {high:.8g}")
-        return stored
+        return tunable_value(self.compiled.program.symbols[name], name, value)
 
     def hold(self, forces: Mapping[str, Value]) -> None:
         """Hold these simple locals, and no others, at values of their types against every write of the task.
@@ -395,6 +389,7 @@ class Task:
         io.record = ScanRecord(now_ns, self.present_scan, skipped=skipped)
         return io.record
 
-    def _too_long(self, error: ScanTooLong) -> None:
+    def too_long(self, error: ScanTooLong) -> None:
+        """Fault the task for the scan that is executed."""
         (self._io if self._under_way is None else self._heard_io).log(error.line, SCAN_TOO_LONG)
         self.status = Status.FAULTED

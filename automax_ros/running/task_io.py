@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, Protocol, cast
 
 from automax_ros.core.kinds import WriteKind
+from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Latched, Value
 from automax_ros.running.backplane import BUS_ERROR, Backplane
 from automax_ros.running.error_log import ErrorLog
@@ -69,6 +70,7 @@ class ScanMemory(Protocol):
     def is_forced(self, view: int) -> bool: ...  # noqa: D102
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class TaskIo:
     """What a compiled scan touches: common memory through one task, its error log and its printed lines.
 
@@ -139,6 +141,7 @@ class TaskIo:
         return None
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class RecordingIo(TaskIo):
     """The same, noting everything in ``record``."""
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from automax_ros.bags.blocks import MessageBlock, message_blocks
+from automax_ros.bags.chunk_builder import ChunkBuilder
 from automax_ros.bags.chunk_table import WholeChunk
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.mcap_output import ChunkBuilder
 from automax_ros.bags.reader import BagMessage, BagReader
 
 from .mutations import CHANGES

@@ -10,9 +10,10 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 import automax_ros
+from automax_ros.bags.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder
 from automax_ros.bags.data_file import DataFile
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.mcap_output import MESSAGE_FIELDS, RECORD_HEAD, ChunkBuilder, McapOutput
+from automax_ros.bags.mcap_output import McapOutput
 from automax_ros.bags.metadata import BagMetadata, yaml_text
 from automax_ros.bags.repair.contents import SCAN, WRITE, FileContents
 from automax_ros.bags.repair.provenance import Provenance

@@ -20,8 +20,9 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
 
+from automax_ros.bags.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.mcap_output import MAGIC, MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.bags.mcap_output import MAGIC
 from automax_ros.bags.opening import NO_BAG_HINT, opened
 from automax_ros.bags.unpacking import MAX_RECORD_BYTES, Unpacker
 
