@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Generator
 
+from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Latched, Value
 
 
@@ -20,6 +21,7 @@ class Status(enum.Enum):
 _FIELDS = ("commits", "duration_ns", "errors", "latched", "reads", "scan", "skipped", "time_ns", "writes")
 
 
+@mypyc_attr(serializable=True)
 class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
     """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
 

@@ -81,7 +81,11 @@ class Scheduler:
         Raises:
             ValueError: the instant lies in the past.
         """
-        return self.post(time_ns, ScheduledEvent(key, lambda now, _: action(now)))
+
+        def once(now_ns: int, _: int) -> None:
+            action(now_ns)
+
+        return self.post(time_ns, ScheduledEvent(key, once))
 
     def every(self, period_ns: int, first_ns: int, key: EventKey, action: PeriodicAction) -> ScheduledEvent:
         """Post an event at ``first_ns`` and each ``period_ns`` after it.
