@@ -16,6 +16,6 @@ else:
         """Return a decorator that leaves a class as it is: mypyc has read the arguments already.
 
         ``allow_interpreted_subclasses=True`` on a class that a plain one inherits from: without it the methods that
-        the plain one overrides would not be called. ``serializable=True`` on one that is copied or pickled.
+        the plain one overrides would not be called.
         """
         return lambda kind: kind

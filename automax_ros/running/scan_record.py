@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
-from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Latched, Value
 
 
@@ -21,7 +20,6 @@ class Status(enum.Enum):
 _FIELDS = ("commits", "duration_ns", "errors", "latched", "reads", "scan", "skipped", "time_ns", "writes")
 
 
-@mypyc_attr(serializable=True)
 class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
     """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
 
@@ -50,9 +48,20 @@ class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
             return NotImplemented
         return all(getattr(self, name) == getattr(other, name) for name in _FIELDS)
 
+    def __reduce__(self) -> tuple[Callable[..., ScanRecord], tuple[object, ...]]:
+        """Return what makes a copy: a class of machine code has none of its own."""
+        return _with_fields, tuple(getattr(self, name) for name in _FIELDS)
+
     def __repr__(self) -> str:
         """Return all of it as text."""
         return f"ScanRecord({', '.join(f'{name}={getattr(self, name)!r}' for name in _FIELDS)})"
+
+
+def _with_fields(*values: object) -> ScanRecord:
+    record = ScanRecord(0, 0)
+    for name, value in zip(_FIELDS, values, strict=True):
+        setattr(record, name, value)
+    return record
 
 
 Steps = Generator[int, int | None, ScanRecord | None]

@@ -14,6 +14,7 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
+from automax_ros.rack.observers import Observers
 from automax_ros.rack.rack import Rack
 
 ROOT = Path(__file__).parents[2]
@@ -300,7 +301,7 @@ def test_a_rack_scans_while_a_new_source_is_compiled(context, executor, monkeypa
     executor.add_node(user)
     with RackNodes(folder / "rack.yaml", context=context) as nodes:
         told = []
-        monkeypatch.setattr(nodes.rack.observers, "operated", told.append)
+        monkeypatch.setattr(Observers, "operated", lambda _, operation: told.append(operation))
         monkeypatch.setattr("automax_ros.rack.installation.compile_program", slow)
         nodes.add_to(executor)
         nodes.start()
