@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 import zlib
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 PIECE_BYTES = 1 << 18
 """What is read at once, in bytes (decision: records of 100 bytes cost what they are, not a read each)."""
@@ -31,6 +32,16 @@ class CheckedStream:
         begin = self._at
         self._at = min(begin + length, len(self._buffer))
         return self._buffer[begin : self._at]
+
+    def numbers(self, layout: struct.Struct) -> tuple[Any, ...]:
+        """Return the numbers that stand in the next bytes; none where the file ends before."""
+        if self._at + layout.size > len(self._buffer):
+            self._fill(layout.size)
+            if layout.size > len(self._buffer):
+                self._at = len(self._buffer)
+                return ()
+        self._at += layout.size
+        return layout.unpack_from(self._buffer, self._at - layout.size)
 
     def skip(self, length: int) -> int:
         """Pass over the next bytes; return how many there were."""

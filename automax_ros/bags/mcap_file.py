@@ -201,7 +201,10 @@ class McapFile:
 
     def _next_head(self, stream: CheckedStream) -> tuple[int, int]:
         """Read the opcode of a record and the length of its content."""
-        opcode, length = RECORD_HEAD.unpack(self._read(stream, RECORD_HEAD.size))
+        head = stream.numbers(RECORD_HEAD)
+        if not head:
+            raise self._ends_early(stream)
+        opcode, length = head
         if length > MAX_RECORD_BYTES:
             raise self._too_large(f"a record of {length} bytes, at most {MAX_RECORD_BYTES} are read")
         return opcode, length

@@ -124,7 +124,9 @@ class RecordedCommons(CommonLog):
             return False
         log.sequence = int(sequences[-1])
         cells = self._begins[views] + elements
-        last = len(cells) - 1 - np.unique(cells[::-1], return_index=True)[1]
+        newest = np.full(len(self._cells), -1, np.int64)
+        np.maximum.at(newest, cells, np.arange(len(cells)))
+        last = newest[newest >= 0]
         chosen = (views[last].tolist(), cells[last].tolist(), values[last].tolist())
         for view, cell, value in zip(*chosen, strict=True):
             typed = self._kinds[view][0]

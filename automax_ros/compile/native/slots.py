@@ -35,6 +35,14 @@ class StateSlots:
         self._fields = layout.fields
         self._limits = tuple(limits) or (_INT64,) * len(layout.fields)
         self._size = sum(field.size for field in layout.fields)
+        python = {BOOLEAN: bool, INTEGER: int, REAL: float}
+        kinds = [python[kind_of(field.type)] for field in layout.fields]
+        self._fitting = [(kind, low, high) for kind, (low, high) in zip(kinds, self._limits, strict=True)]
+        """The type in Python that each field has, and the least and greatest integer."""
+        self._places = [
+            (position, index) for position, field in enumerate(layout.fields) for index in range(field.size)
+        ]
+        """Field and element of each slot."""
 
     @property
     def fields(self) -> tuple[tuple[int, int, bool, int, int], ...]:
@@ -53,43 +61,32 @@ class StateSlots:
         slots = np.empty(self._size, np.int64)
         reals = slots.view(np.float64)
         place = 0
-        for field, limits, held in zip(self._fields, self._limits, state, strict=True):
-            values = _values(field, held)
-            _require_fit(field, limits, values)
-            into = reals if field.type is DataType.REAL else slots
-            into[place : place + field.size] = values
+        for field, (python, low, high), held in zip(self._fields, self._fitting, state, strict=True):
+            into = reals if python is float else slots
+            values = _elements(field, held) if field.is_array else (held,)
+            for number, value in enumerate(values, place):
+                if type(value) is not python or (python is int and not low <= value <= high):  # type: ignore[operator]
+                    raise Misfit(field.name)
+                into[number] = value
             place += field.size
         return slots
 
     def put(self, slots: Slots, before: Slots, state: list[StateValue]) -> None:
         """Put into a state, in place, what is no longer as it was ``before``."""
-        place = 0
-        for position, field in enumerate(self._fields):
-            part = slots[place : place + field.size]
-            changed = np.flatnonzero(part != before[place : place + field.size])
+        for place in np.flatnonzero(slots != before).tolist():
+            position, index = self._places[place]
+            value = _object(self._fields[position], slots[place])
             held = state[position]
-            for index in changed.tolist():
-                value = _object(field, part[index])
-                if isinstance(held, list):
-                    held[index] = value
-                else:
-                    state[position] = value
-            place += field.size
+            if isinstance(held, list):
+                held[index] = value
+            else:
+                state[position] = value
 
 
-def _values(field: StateField, held: StateValue) -> list[Value]:
-    values = held if isinstance(held, list) else [held]
-    if isinstance(held, list) is not field.is_array or len(values) != field.size:
+def _elements(field: StateField, held: StateValue) -> list[Value]:
+    if not isinstance(held, list) or len(held) != field.size:
         raise Misfit(field.name)
-    return values
-
-
-def _require_fit(field: StateField, limits: tuple[int, int], values: list[Value]) -> None:
-    python = {BOOLEAN: bool, INTEGER: int, REAL: float}[kind_of(field.type)]
-    low, high = limits
-    for value in values:
-        if type(value) is not python or (python is int and not low <= value <= high):  # type: ignore[operator]
-            raise Misfit(field.name)
+    return held
 
 
 def _object(field: StateField, slot: np.int64) -> Value:
