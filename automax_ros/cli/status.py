@@ -12,8 +12,8 @@ from automax_ros.cli.status_parts import Progress, Summary
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.values import value_text
-from automax_ros.rack.modules.drive_interrupts import Timed
 from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import CommonElement
 from automax_ros.running.health import Health

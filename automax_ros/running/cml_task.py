@@ -47,35 +47,41 @@ Sensed = tuple[int, Measured, Sequence[Under]]
 """Rack time of a scan, what was measured, and what is under forces."""
 
 
-class CmlIo(TaskIo):
-    """What a scan of a current minor loop task touches."""
+class _LoopScans:
+    """The minor loop's part of the scans that one ``io`` executes; what ``io`` records has all of it."""
 
-    def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
-        """Bind a task and the memory that its scans work on."""
-        super().__init__(task, memory, hear)
-        self._cml = task
+    def __init__(self, task: CmlTask, io: TaskIo, memory: ScanMemory, hear: Hear) -> None:
+        """Take part in the scans of an ``io``: from now on it tells when it latches."""
+        self._task, self._io, self._memory, self._hear = task, io, memory, hear
+        self._recording = io if isinstance(io, RecordingIo) else None
         self._latched_ns = 0
         self._command = Command(0)
-        self._take_latch = self.latch
-        self.latch = self._latch_at
+        self._take_latch = io.latch
+        io.latch = self._latch_at
 
-    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:
+    def scan(self, inputs: tuple[Any, ...], records: list[Value] | None) -> Sequence[Value] | None:
         """Execute a scan of the loop; ``records`` is a local DIAG_DATA.
 
         Returns the outputs but DIAG_DATA in their order, None where none is written.
         """
-        task = self._cml
+        task, recording = self._task, self._recording
         now_ns, measured, under = self._hear(self._sense)
         if type(measured) is not Measured:
             measured = Measured(*measured)
-        if under:
-            inputs = self._under_forces(inputs, under)
+        for place, view, value in under:
+            inputs = (*inputs[:place], value, *inputs[place + 1 :])
+            if recording is not None:
+                recording.record.reads.append((view, 0, value))
         outcome = task.loop.scan(now_ns, measured, _new(Inputs, inputs))
         self._command = outcome.command
-        self._note(now_ns, measured)
+        if recording is not None:
+            reads = recording.record.reads
+            reads += noted_measured(measured)
+            reads += noted_time(now_ns)
+            reads += noted_command(outcome.command)
         self._hear(self._give)
         for code in outcome.problems:
-            self.log(task.cml.line, code)
+            self._io.log(task.cml.line, code)
         if outcome.record is not None:
             self._keep(outcome.record, records)
         return outcome.outputs
@@ -85,45 +91,48 @@ class CmlIo(TaskIo):
         return self._take_latch()
 
     def _sense(self) -> Sensed:
-        return self._cml.sense(self._latched_ns)
+        return self._task.sense(self._latched_ns)
 
     def _give(self) -> None:
-        self._cml.port.command(self._command)
-
-    def _under_forces(self, inputs: tuple[Any, ...], under: Sequence[Under]) -> tuple[Any, ...]:
-        """Return the inputs with what is under a force where that has no effect."""
-        for place, _, value in under:
-            inputs = (*inputs[:place], value, *inputs[place + 1 :])
-        return inputs
-
-    def _note(self, now_ns: int, measured: Measured) -> None:
-        """Note nothing: the scan is not recorded."""
+        self._task.port.command(self._command)
 
     def _keep(self, record: Record, records: list[Value] | None) -> None:
         """Write a record of the diagnostic data: an array of the task's own, or a common in actual memory (52.3.2)."""
-        view = self._cml.records
+        view, io = self._task.records, self._io
         if records is not None:
             page = page_of(int(records[PAGE_NUMBER]))
             for index, value in writes(page, int(records[next_entry_index(page)]), record):
                 records[index] = value
         elif view is not None:
-            page = page_of(int(self.read_now(view, PAGE_NUMBER)))
-            for index, value in writes(page, int(self.read_now(view, next_entry_index(page))), record):
-                self.write_now(view, value, index)
+            page = page_of(int(io.read_now(view, PAGE_NUMBER)))
+            for index, value in writes(page, int(io.read_now(view, next_entry_index(page))), record):
+                io.write_now(view, value, index)
 
 
-class RecordingCmlIo(CmlIo, RecordingIo):
+class CmlIo(TaskIo):
+    """What a scan of a current minor loop task touches."""
+
+    def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task and the memory that its scans work on."""
+        super().__init__(task, memory, hear)
+        self._loop = _LoopScans(task, self, memory, hear)
+
+    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:
+        """Execute a scan of the loop."""
+        return self._loop.scan(inputs, records)
+
+
+class RecordingCmlIo(RecordingIo):
     """The same, noting everything, what was measured and commanded among the reads."""
 
-    def _under_forces(self, inputs: tuple[Any, ...], under: Sequence[Under]) -> tuple[Any, ...]:
-        self.record.reads += [(view, 0, value) for _, view, value in under]
-        return super()._under_forces(inputs, under)
+    def __init__(self, task: CmlTask, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task and the memory that its scans work on."""
+        super().__init__(task, memory, hear)
+        self._loop = _LoopScans(task, self, memory, hear)
 
-    def _note(self, now_ns: int, measured: Measured) -> None:
-        reads = self.record.reads
-        reads += noted_measured(measured)
-        reads += noted_time(now_ns)
-        reads += noted_command(self._command)
+    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:
+        """Execute a scan of the loop."""
+        return self._loop.scan(inputs, records)
 
 
 class CmlTask(Task):

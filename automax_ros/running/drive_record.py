@@ -34,11 +34,11 @@ _FIRST_PULSE = len(COMMAND_NAMES)
 
 def noted_measured(measured: Measured) -> list[Noted]:
     """Return what is noted of a measurement: its first number always, so that there is something."""
-    return [
-        (MEASURED_VIEW, place, value)
-        for place, (value, usual) in enumerate(zip(measured, _USUAL, strict=True))
-        if value != usual or not place
-    ]
+    noted: list[Noted] = [(MEASURED_VIEW, 0, measured[0])]
+    for place, value in enumerate(measured):
+        if place and value != _USUAL[place]:
+            noted.append((MEASURED_VIEW, place, value))
+    return noted
 
 
 def noted_time(now_ns: int) -> list[Noted]:
@@ -49,11 +49,11 @@ def noted_time(now_ns: int) -> list[Noted]:
 
 def noted_command(command: Command) -> list[Noted]:
     """Return what is noted of a command: its first number always."""
-    return [
-        (COMMAND_VIEW, place, value)
-        for place, value in enumerate(command_numbers(command))
-        if value != (_USUAL_COMMAND[place] if place < _FIRST_PULSE else 0) or not place
-    ]
+    noted: list[Noted] = []
+    for place, value in enumerate(command_numbers(command)):
+        if not place or value != (_USUAL_COMMAND[place] if place < _FIRST_PULSE else 0):
+            noted.append((COMMAND_VIEW, place, value))
+    return noted
 
 
 def command_numbers(command: Command) -> list[int]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Latched, Value
 from automax_ros.running.registers import RegisterMap
 from automax_ros.running.views import CellLatch, LatchPlan, ViewSpec, latch_plan
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Image:
     """The values of all views. What writes it, and what a write means besides, is the business of its subclasses."""
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Sequence
 
 from automax_ros.core.kinds import WriteKind
+from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Value
 from automax_ros.running.image import Image
 from automax_ros.running.views import MemoryValueError, ViewSpec, Write, WriteGroup, fitting
@@ -21,6 +22,7 @@ FORCING = "FORCINGSTATUS@"
 """The pre-defined common that is TRUE while anything is forced (2.4.6)."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CommonMemory(Image):
     """The common variables and module registers of one rack.
 

@@ -40,12 +40,13 @@ class Freezer:
 class ProcessInputs:
     """Writes of one rack's inputs and other variables from outside its tasks, between scans.
 
-    ``frozen`` has what is frozen now: to be asked before ``scanned``, since that comes after every scan.
+    ``memory`` is what they write. ``frozen`` has what is frozen now: to be asked before ``scanned``, since that comes
+    after every scan.
     """
 
     def __init__(self, memory: CommonMemory, scheduler: Scheduler) -> None:
         """Begin with inputs that follow the process."""
-        self._memory, self._scheduler = memory, scheduler
+        self.memory, self._scheduler = memory, scheduler
         self.frozen: dict[Key, Freezer] = {}
         self._shapes: dict[Key, Shape] = {}
 
@@ -60,7 +61,7 @@ class ProcessInputs:
             value = self._shapes[key](value)
         freezer = self.frozen.get(key)
         if freezer is None:
-            self._memory.write_now(view, value, writer, element, kind)
+            self.memory.write_now(view, value, writer, element, kind)
         else:
             # Last in order, so that a word written after one of its bits wins over it.
             freezer.kept.pop(key, None)
@@ -72,7 +73,7 @@ class ProcessInputs:
         Raises:
             MemoryValueError: the value does not fit the variable's type, or the element does not exist.
         """
-        self.write(view, element, self._memory.accepted(view, value, element), writer)
+        self.write(view, element, self.memory.accepted(view, value, element), writer)
 
     def freeze(self, freezer: Freezer, tasks: Iterable[str]) -> None:
         """Take in what the process has done until now, and hold it until all of ``tasks`` have scanned."""
@@ -96,9 +97,9 @@ class ProcessInputs:
         for key in freezer.keys:
             self.frozen.pop(key, None)
         kept, freezer.kept = freezer.kept, {}
-        self._memory.now_ns = self._scheduler.now_ns
+        self.memory.now_ns = self._scheduler.now_ns
         for (view, element), (value, writer) in kept.items():
-            self._memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
+            self.memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
         return bool(kept)
 
     def load(self, freezer: Freezer, owed: Iterable[str], kept: Iterable[Sequence[object]]) -> None:

@@ -11,36 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from types import MappingProxyType
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.json_schema import Keys, whole
-from automax_ros.core.numbers import round_count
 from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
+from automax_ros.rack.modules.drive_voltage import DriveAnalogModule
 from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
-from automax_ros.rack.modules.io_module import IoModule
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
 from automax_ros.rack.scalars import integer_value
 
-GAINS = {230: 0.02, 380: 0.0121, 460: 0.01, 550: 0.00835, 660: 0.00696}
-"""Volts at the 57C405 a volt of the armature, by the nominal line voltage of the transformer, V rms (52.6.1)."""
-FULL_SCALE_V, FULL_SCALE_COUNTS = 10.0, 4095
-"""What the input shows at its full scale (decision: as a 57C409)."""
 _REGISTERS = Registers(4, by_itself=True)
-
-
-@cache
-def voltage_gain(line_v: float) -> float:
-    """Return the gain of the transformer for a line of a nominal voltage (V rms, line to line)."""
-    return GAINS[min(GAINS, key=lambda nominal: abs(nominal - line_v))]
-
-
-def voltage_counts(volts: float, line_v: float) -> int:
-    """Return what register 0 shows for an armature voltage, V."""
-    counts = round_count(volts * voltage_gain(line_v) / FULL_SCALE_V * FULL_SCALE_COUNTS)
-    return max(-FULL_SCALE_COUNTS, min(FULL_SCALE_COUNTS, counts))
 
 
 @dataclass(frozen=True)
@@ -66,14 +48,6 @@ class DriveAnalogConfig(WithoutTasks):
         if self.drive is not None:
             parts.drives.wire_voltage(self.drive, module.feel)
         return module
-
-
-class DriveAnalogModule(IoModule):
-    """A 57C405."""
-
-    def feel(self, volts: float, line_v: float) -> None:
-        """Show an armature voltage, V, through the transformer for a line of a nominal voltage, V."""
-        self._show(0, voltage_counts(volts, line_v))
 
 
 class DriveAnalogKind:

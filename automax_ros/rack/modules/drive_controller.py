@@ -143,14 +143,18 @@ class DriveControllerModule:
         """Return what was measured at the last interrupt, with registers, inputs and switches as they are now."""
         digital = self._digital
         digital.serve(dig_slot)
-        read, view, last = self._memory.read_now, self._view, self._measured
+        memory, view, last = self._memory, self._view, self._measured
         values = (
             last.status | digital.status() | self._switches.status(),
-            *last[1:6],
-            int(read(view, TACH_THRESHOLD)),
-            int(read(view, PHASE_STEP)),
-            int(read(view, PERIOD_STEP)),
-            int(read(view, OPTIONS)),
+            last.current,
+            last.zero_us,
+            last.tail_us,
+            last.since_sync_ns,
+            last.voltage,
+            int(memory.read_now(view, TACH_THRESHOLD)),
+            int(memory.read_now(view, PHASE_STEP)),
+            int(memory.read_now(view, PERIOD_STEP)),
+            int(memory.read_now(view, OPTIONS)),
             last.line,
         )
         return _new(Measured, values)

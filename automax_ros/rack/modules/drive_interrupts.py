@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 from automax_ros.core.text import count_of
 from automax_ros.rack.modules.kind import ModuleState
@@ -41,14 +40,6 @@ class InterruptTiming:
         self.greatest_ns = max(self.greatest_ns, late_ns)
         if late_ns > LATE_NS:
             self.late += 1
-
-
-@runtime_checkable
-class Timed(Protocol):
-    """A module that counts how its interrupts keep their time."""
-
-    @property
-    def timing(self) -> InterruptTiming: ...  # noqa: D102
 
 
 class DriveInterrupts:

@@ -7,7 +7,6 @@ while a rack is stopped, and rest without its power.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.types import Value
@@ -41,6 +40,35 @@ class _Feed:
         return found if self._scale is None else self._scale.counts_of(found)[0]
 
 
+class _Round:
+    """The feeds of one plant that are written together."""
+
+    def __init__(
+        self,
+        plant: DrivePlant,
+        feeds: Sequence[_Feed],
+        inputs: ProcessInputs,
+        operations: Operations,
+        observers: Observers,
+    ) -> None:
+        self._plant, self._feeds, self._inputs = plant, feeds, inputs
+        self._memory, self._operations, self._observers = inputs.memory, operations, observers
+
+    def write(self, now_ns: int, _: int) -> None:
+        """Write what the instruments show now, where it differs from what is there."""
+        plant, memory = self._plant, self._memory
+        plant.advance(now_ns)
+        if not self._operations.powered:
+            return
+        memory.now_ns = now_ns
+        for feed in self._feeds:
+            view, element = feed.view, feed.element
+            value = memory.accepted(view, feed.value(plant), element)
+            if memory.read_now(view, element) != value:
+                self._inputs.write(view, element, value, feed.writer)
+        self._observers.tell_writes()
+
+
 class PlantFeeds:
     """The feeds of one rack."""
 
@@ -53,7 +81,7 @@ class PlantFeeds:
         scheduler: Scheduler,
     ) -> None:
         """Take what is fed by these plants; nothing is posted yet."""
-        self._plants, self._memory, self._inputs, self._scheduler = plants, memory, inputs, scheduler
+        self._plants, self._inputs, self._scheduler = plants, inputs, scheduler
         writers = {item.name: item.id for item in writers_of(config) if item.kind is WriterKind.PLANT}
         self._groups: dict[tuple[str, int], list[_Feed]] = {}
         for item in (feed for feed in config.feeds if feed.plant in plants):
@@ -65,26 +93,5 @@ class PlantFeeds:
         scheduler = self._scheduler
         for (name, every_ns), feeds in self._groups.items():
             key = EventKey(EventClass.IO, _AFTER_MODULES, f"{name} {every_ns:014}")
-            act = partial(self._feed, self._plants[name], feeds, operations, observers)
+            act = _Round(self._plants[name], feeds, self._inputs, operations, observers).write
             scheduler.every(every_ns, -(-scheduler.now_ns // every_ns) * every_ns, key, act)
-
-    def _feed(
-        self,
-        plant: DrivePlant,
-        feeds: Sequence[_Feed],
-        operations: Operations,
-        observers: Observers,
-        now_ns: int,
-        _: int,
-    ) -> None:
-        plant.advance(now_ns)
-        if not operations.powered:
-            return
-        memory = self._memory
-        memory.now_ns = now_ns
-        for feed in feeds:
-            view, element = feed.view, feed.element
-            value = memory.accepted(view, feed.value(plant), element)
-            if memory.read_now(view, element) != value:
-                self._inputs.write(view, element, value, feed.writer)
-        observers.tell_writes()

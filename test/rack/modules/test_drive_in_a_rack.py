@@ -10,7 +10,7 @@ from itertools import cycle
 import pytest
 
 from automax_ros.rack.loader import load
-from automax_ros.rack.modules.drive_interrupts import Timed
+from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.reader import read_for_rack
