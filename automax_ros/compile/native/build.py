@@ -12,7 +12,9 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Sequence
+import threading
+import weakref
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -30,8 +32,10 @@ A task of 2,000 lines, 800,000 characters, takes 5 s and not 15, and scans as qu
 LIMIT_S = 120.0
 """Time that the compiler has for one text, s (decision): a task of 2,000 lines takes a few."""
 _USUAL = ("cc", "gcc", "clang")
-_RUNNING: set[subprocess.Popen[str]] = set()
-"""The compilers that are under way, on any thread."""
+_RUNNING: dict[subprocess.Popen[str], threading.Thread] = {}
+"""The compilers that are under way, and the threads that wait for them."""
+_ABANDONED: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+"""Threads that nobody waits for any more."""
 _MESSAGE = 400
 """Characters of what the compiler says that are passed on."""
 
@@ -85,7 +89,7 @@ def level_of(text: str) -> str:
 def key_of(text: str, compiler: Compiler, options: Sequence[str] = ()) -> str:
     """Return the SHA-256 of all that a library depends on: text, options, compiler, machine, C library."""
     parts = (text, *FLAGS, *options, compiler.path, compiler.version, platform.machine(), *platform.libc_ver())
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    return hashlib.sha256(os.fsencode("\0".join(parts))).hexdigest()
 
 
 def build(text: str, compiler: Compiler, options: Sequence[str] = (), limit_s: float = LIMIT_S) -> bytes:
@@ -98,13 +102,17 @@ def build(text: str, compiler: Compiler, options: Sequence[str] = (), limit_s: f
         made = Path(folder, "made.so")
         command = [compiler.path, *FLAGS, *options, "-x", "c", "-", "-o", str(made), "-lm"]
         _run(command, _environment(compiler.search, folder), text, limit_s)
+        if not made.is_file():
+            raise NotNative(f"{compiler.path} has written no library")
         return made.read_bytes()
 
 
-def end_running() -> None:
-    """End the compilers that run on other threads: whoever has asked for them waits no more."""
-    for process in list(_RUNNING):
-        _kill(process)
+def abandon(threads: Iterable[threading.Thread]) -> None:
+    """End the compilers that these threads wait for, and each that they will start: nobody waits for the threads."""
+    _ABANDONED.update(threads)
+    for process, thread in list(_RUNNING.items()):
+        if thread in _ABANDONED:
+            _kill(process)
 
 
 def python_options() -> tuple[str, ...]:
@@ -142,7 +150,9 @@ def _run(command: Sequence[str], environment: dict[str, str], text: str, limit_s
         )
     except OSError as error:
         raise NotNative(f"{command[0]} cannot be run: {error.strerror or error}") from error
-    _RUNNING.add(process)
+    thread = _RUNNING[process] = threading.current_thread()
+    if thread in _ABANDONED:
+        _kill(process)
     try:
         said, complaints = process.communicate(text, limit_s)
     except BaseException as error:
@@ -152,7 +162,7 @@ def _run(command: Sequence[str], environment: dict[str, str], text: str, limit_s
             raise NotNative(f"{command[0]} has not ended within {limit_s:g} s") from error
         raise
     finally:
-        _RUNNING.discard(process)
+        del _RUNNING[process]
     if process.returncode:
         lines = complaints.strip().splitlines() or [f"exit code {process.returncode}"]
         told = next((line for line in lines if "error" in line), lines[0])

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import os
-from collections.abc import Mapping
+import queue
+import threading
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native.build import LIMIT_S, end_running, library
+from automax_ros.compile.native.build import LIMIT_S, abandon, library
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.source import NotNative
 
@@ -74,17 +77,7 @@ class NativeForms:
         """Return tasks as they are to run, by the same names; several are built at a time. Nothing is raised."""
         if self.mode is NativeMode.OFF or not tasks:
             return {name: NativeOutcome(task, why=self.why_off) for name, task in tasks.items()}
-        from concurrent.futures import ThreadPoolExecutor
-
-        pool = ThreadPoolExecutor(min(len(tasks), os.cpu_count() or 1))
-        try:
-            outcomes = dict(zip(tasks, pool.map(self.form, tasks.values()), strict=True))
-        except BaseException:  # Ctrl-C, say: the compilers would go on for as long as they take
-            pool.shutdown(wait=False, cancel_futures=True)
-            end_running()
-            raise
-        pool.shutdown()
-        return outcomes
+        return _side_by_side(self.form, tasks)
 
     def library(self, text: str, worthwhile_ns: int) -> Path | None:
         """Return the library of a C text that helps a run of at least this time; None where it is not to be had."""
@@ -116,6 +109,39 @@ class NativeForms:
         period = compiled.program.period_ns
         scans, lines = self.expected_ns // period if period else 0, len(compiled.program.scan)
         return scans * lines * LINE_NS >= WORTHWHILE_NS + lines * WORTHWHILE_LINE_NS
+
+
+def _side_by_side(
+    form: Callable[[CompiledTask], NativeOutcome], tasks: Mapping[str, CompiledTask]
+) -> dict[str, NativeOutcome]:
+    """Return what becomes of each task. Ctrl-C waits for no thread, and no thread keeps the program from its end."""
+    waiting = list(reversed(list(tasks.items())))
+    found: queue.SimpleQueue[tuple[str, NativeOutcome | BaseException]] = queue.SimpleQueue()
+
+    def work() -> None:
+        with contextlib.suppress(IndexError):  # of the empty list
+            while True:
+                name, task = waiting.pop()
+                try:
+                    found.put((name, form(task)))
+                except BaseException as fault:
+                    found.put((name, fault))
+
+    threads = [threading.Thread(target=work, daemon=True) for _ in range(min(len(tasks), os.cpu_count() or 1))]
+    made: dict[str, NativeOutcome] = {}
+    try:
+        for thread in threads:
+            thread.start()
+        while len(made) < len(tasks):
+            name, outcome = found.get()
+            if isinstance(outcome, BaseException):
+                raise outcome
+            made[name] = outcome
+    except BaseException:  # Ctrl-C, say: the compilers would go on for as long as they take
+        waiting.clear()
+        abandon(threads)
+        raise
+    return {name: made[name] for name in tasks}
 
 
 IN_PYTHON = NativeForms()

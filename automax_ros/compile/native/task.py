@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Generator, Sequence
 from functools import lru_cache, partial
@@ -40,7 +41,7 @@ class NativeTask:
         places = [compiled.latched.index(name) for name in compiled.written]
         written = tuple((place, compiled.latched_views[place]) for place in places)
         latched = tuple(zip(kinds, compiled.latched_views, strict=True))
-        code = host.Code(str(path), slots.fields, latched, written, ScanTooLong)
+        code = host.Code(os.fsencode(path), slots.fields, latched, written, ScanTooLong)
         self.compiled, self.source = compiled, source
         self.scans: Scans = partial(code.scans, compiled.scans)
         self.scans_forced: Scans = partial(code.scans_forced, _forced_in_python(compiled))

@@ -1,5 +1,6 @@
 import ctypes
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.compile.native import build
+from automax_ros.compile.native import build, native_form
 from automax_ros.compile.native.build import find_compiler, key_of, library, python_options
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.source import NotNative
 
+from ..support import compiled_of, lines
 from .support import compiler_of
 
 ANSWER = "int answer(void) { return 42; }\n"
@@ -101,6 +103,25 @@ def test_a_compiler_that_fails_is_quoted_and_leaves_nothing(cache, monkeypatch, 
     monkeypatch.delenv("CC")
     with pytest.raises(NotNative, match=r"fails: .*error"):
         library("int answer(void) { return }\n", cache)
+
+
+def test_a_compiler_that_writes_nothing_is_told(cache, monkeypatch, tmp_path):
+    monkeypatch.setenv("CC", str(compiler_of(tmp_path, "exit 0")))
+    with pytest.raises(NotNative, match="cc has written no library"):
+        library(ANSWER, cache)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
+def test_names_of_folders_may_be_any_bytes(monkeypatch, tmp_path):
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff"))
+    folder.mkdir()
+    (folder / "gcc").symlink_to(shutil.which("gcc"))
+    monkeypatch.setenv("CC", str(folder / "gcc"))
+    compiled = compiled_of(lines("A% = A% + 1", declare="LOCAL A%"))
+    native = native_form(compiled, NativeCache(folder / "cache"))
+    state = compiled.layout.fresh()
+    assert native.columns(state, [], 3).done == 3
+    assert state == [3]
 
 
 def test_a_compiler_that_cannot_be_run_is_told(cache, monkeypatch, tmp_path):

@@ -4,6 +4,7 @@ import threading
 
 import pytest
 
+from automax_ros.compile.native.build import build, find_compiler
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.forms import IN_PYTHON, WORTHWHILE_LINE_NS, WORTHWHILE_NS, NativeForms, NativeMode
 
@@ -65,7 +66,40 @@ def test_ctrl_c_ends_the_compilers_too(compiled, monkeypatch, tmp_path):
         NativeForms(NativeMode.ON, cache=NativeCache(tmp_path / "cache")).made({"A": compiled})
     other.join()
     for thread in threading.enumerate():
-        if thread.name.startswith("ThreadPoolExecutor"):
+        assert thread is threading.main_thread() or thread.daemon  # no thread keeps the program from its end
+        if thread.name.endswith("(work)"):
             thread.join()
     with pytest.raises(ProcessLookupError):
         os.kill(started[0], 0)
+
+
+def test_ctrl_c_amid_a_translation_waits_for_nothing_and_starts_no_compiler(compiled, monkeypatch, tmp_path):
+    """A long task's translation takes seconds, which nobody waits for; no compiler is started after it."""
+    ran, goes_on, over = tmp_path / "ran", threading.Event(), threading.Event()
+    monkeypatch.setenv("CC", str(compiler_of(tmp_path, f"echo $$ >> {ran}; exec sleep 1000")))
+
+    def translating(*_, **__):
+        os.kill(os.getpid(), signal.SIGINT)
+        goes_on.wait()
+        try:
+            return build("int x;", find_compiler())
+        finally:
+            over.set()
+
+    monkeypatch.setattr("automax_ros.compile.native.task.native_form", translating)
+    with pytest.raises(KeyboardInterrupt):
+        NativeForms(NativeMode.ON, cache=NativeCache(tmp_path / "cache")).made({"A": compiled})
+    goes_on.set()
+    assert over.wait(60)
+    if ran.exists():  # it was started, and ended at once
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(ran.read_text()), 0)
+
+
+def test_what_goes_wrong_on_a_thread_is_raised(compiled, monkeypatch, tmp_path):
+    def fails(*_, **__):
+        raise RuntimeError("a fault of the translation")
+
+    monkeypatch.setattr("automax_ros.compile.native.task.native_form", fails)
+    with pytest.raises(RuntimeError, match="a fault of the translation"):
+        NativeForms(NativeMode.ON, cache=NativeCache(tmp_path / "cache")).made({"A": compiled, "B": compiled})

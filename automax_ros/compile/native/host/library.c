@@ -98,7 +98,7 @@ static PyObject *code_new(PyTypeObject *type, PyObject *arguments, PyObject *Py_
 {
     const char *path;
     PyObject *fields, *latched, *written, *too_long;
-    if (!PyArg_ParseTuple(arguments, "sO!O!O!O", &path, &PyTuple_Type, &fields, &PyTuple_Type, &latched, &PyTuple_Type,
+    if (!PyArg_ParseTuple(arguments, "yO!O!O!O", &path, &PyTuple_Type, &fields, &PyTuple_Type, &latched, &PyTuple_Type,
                           &written, &too_long))
         return NULL;
     Code *self = (Code *)type->tp_alloc(type, 0);
