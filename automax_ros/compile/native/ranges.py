@@ -90,8 +90,8 @@ class Range:
         if both == self or both.kind is None or both.kind is Kind.BOOL:
             return both
         steps = _REAL_STEPS if both.kind is Kind.REAL else _INTEGER_STEPS
-        low = self.low if both.low >= self.low else _beyond(steps, both.low)
-        high = self.high if both.high <= self.high else _beyond(steps, both.high)
+        low = self.low if both.low >= self.low else -_reaching(steps, -both.low)
+        high = self.high if both.high <= self.high else _reaching(steps, both.high)
         return Range(both.kind, low, high, both.never_nan)
 
 
@@ -105,10 +105,11 @@ _REAL_STEPS: tuple[float, ...] = (
 )  # fmt: skip
 
 
-def _beyond(steps: tuple[float, ...], bound: float) -> float:
-    """Return the first step that lies as far from 0 as a bound."""
-    found = next(step for step in steps if step >= abs(bound))
-    return found if bound >= 0 else -found
+def _reaching(steps: tuple[float, ...], bound: float) -> float:
+    """Return the least step, or step with its sign turned, that is not below an upper bound."""
+    if bound >= 0:
+        return next(step for step in steps if step >= bound)
+    return -next(step for step in reversed(steps) if step <= -bound)
 
 
 def exactly(value: float) -> Range:

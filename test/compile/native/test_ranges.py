@@ -7,6 +7,7 @@ import shutil
 import pytest
 
 from automax_ros.compile.native import NativeCache, native_form, translate
+from automax_ros.compile.native.ranges import INFINITE, Kind, Range
 
 from ..support import compiled_of, lines
 from .identity import assert_same
@@ -20,6 +21,57 @@ NAN = f"{'*'.join(['BIG'] * 19)}*0.0"
 def clamped(value: str) -> str:
     """An expression that looks as if it could only be ``value``."""
     return f"MAX(MIN({NAN}, {value}), {value})"
+
+
+@pytest.mark.parametrize("start", [-32768, -40, -1, 0, 1, 7])
+@pytest.mark.parametrize("stop", [-32767, -30, -1, 0, 3, 32767])
+@pytest.mark.parametrize("step", [-30000, -1, 1, 10000])
+def test_a_loop_is_native_wherever_it_counts(start: int, stop: int, step: int) -> None:
+    loop = (f"FOR A% = {start} TO {stop} STEP {step}", "D! = D! + A%", "NEXT A%")
+    assert "static int scan(" in translate(compiled_of(lines(*loop, declare="LOCAL A%, D!"))).text
+
+
+@needs_gcc
+def test_loops_from_below_zero_take_the_turns_that_they_take_in_python(tmp_path) -> None:
+    loops = [
+        (-10, -1, 1),
+        (-10, 10, 3),
+        (-32768, 32767, 10000),
+        (-1, -32768, -10000),
+        (-5, -5, 1),
+        (5, -5, -3),
+        (-3, -9, 1),
+    ]
+    statements = []
+    for number, (start, stop, step) in enumerate(loops):
+        statements += [f"FOR A% = {start} TO {stop} STEP {step}", f"S!({number}) = S!({number}) + A%", "NEXT A%"]
+    compiled = compiled_of(lines(*statements, declare="LOCAL A%, S!(9)"))
+    native = native_form(compiled, NativeCache(tmp_path / "cache"))
+    assert_same(native, 2, 3)
+    state = compiled.layout.fresh()
+    assert native.columns(state, [], 1).done == 1
+    assert state[1][:7] == [-55, -7, -19376, -60004, -5, 2, 0]
+
+
+@pytest.mark.parametrize("kind", [Kind.INT, Kind.REAL])
+def test_a_range_that_is_widened_holds_both_and_comes_to_an_end(kind: Kind) -> None:
+    bounds = [
+        sign * value for value in (0, 0.5, 1, 9, 32767, 32768, 40000, 2**31, 2**60, 1e200, INFINITE) for sign in (-1, 1)
+    ]
+    bounds = sorted(bound for bound in bounds if kind is Kind.REAL or bound % 1 != 0.5)
+    ranges = [Range(kind, low, high) for low in bounds for high in bounds if low <= high]
+    for first in ranges:
+        for second in ranges:
+            wider = first.widened(second)
+            assert wider.holds(first)
+            assert wider.holds(second)
+    present = Range(kind, -9, -9)
+    steps = 0
+    while present.high < INFINITE:
+        present, before = present.widened(Range(kind, -9, present.high + abs(present.high) / 2 + 1)), present
+        assert present.high > before.high
+        steps += 1
+    assert steps <= 20
 
 
 @needs_gcc
