@@ -63,9 +63,9 @@ class Frame:
     can_end: bool = False
     depth: int = 1
     loops: dict[int, Environment] = field(default_factory=dict)
+    temporaries: int = 0
     _kinds: dict[str, dict[Kind, str]] = field(default_factory=dict)
     _wide: set[str] = field(default_factory=set)
-    _temporaries: int = 0
 
     def emit(self, text: str) -> None:
         """Append a line."""
@@ -92,7 +92,12 @@ class Frame:
         self.returned.clear()
         self.has_grown = False
         self.touched.clear()
-        self._temporaries = 0
+        self.temporaries = 0
+
+    @property
+    def extent(self) -> tuple[int, int]:
+        """What grows while a function is translated, and lets statements come out otherwise than before."""
+        return len(self._wide), len(self.wide_fields)
 
     # Names
 
@@ -133,8 +138,8 @@ class Frame:
 
     def temporary(self, known: Range) -> str:
         """Return the name of a new local that holds a result."""
-        self._temporaries += 1
-        name = f"result{self._temporaries}_{'' if known.kind is None else known.kind.name[0].lower()}"
+        self.temporaries += 1
+        name = f"result{self.temporaries}_{'' if known.kind is None else known.kind.name[0].lower()}"
         self.locals[name] = c_type(known)
         return name
 

@@ -9,6 +9,7 @@ from typing import Any
 from automax_ros.compile.native.environment import Environment
 from automax_ros.compile.native.frame import Frame
 from automax_ros.compile.native.ranges import ANY_BOOL, Kind, Range
+from automax_ros.compile.native.repeated import Repeated
 from automax_ros.compile.native.source import NotNative
 from automax_ros.compile.native.statements import Body
 from automax_ros.compile.native.typed import Typed, bare
@@ -25,6 +26,12 @@ class ScanBody(Body):
         """Take the function, and what goes in and out."""
         super().__init__(frame)
         self._latched, self._written = latched, written
+        self._repeated = Repeated(frame, frozenset({CHANGES}))
+
+    def _one(self, statement: ast.stmt, known: Environment) -> Environment | None:
+        if self._depth > 1:
+            return super()._one(statement, known)
+        return self._repeated.carried_out(statement, known, super()._one)
 
     def _assign(self, statement: ast.Assign, known: Environment) -> Environment:
         target, value = statement.targets[0], statement.value

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Block, Platform
 from automax_ros.compile.compiler import CompiledTask, compile_program
-from automax_ros.compile.native import NativeCache, native_form
+from automax_ros.compile.native import NativeCache, native_form, translate
+from automax_ros.compile.native.repeated import Repeated
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
 
@@ -117,3 +118,23 @@ def test_random_tasks_are_the_same_in_c(tmp_path) -> None:
 @pytest.mark.usefixtures("without_strings")
 def test_many_random_tasks_are_the_same_in_c(tmp_path) -> None:
     check_tasks(1500, 600, 4, NativeCache(tmp_path / "cache"))
+
+
+@pytest.mark.usefixtures("without_strings")
+def test_what_comes_out_as_before_is_what_would_be_translated_again(monkeypatch) -> None:
+    """Statements that are not looked at again have the lines that they would get: the whole texts are the same."""
+    on_a_rack = [block for block in BLOCKS if block in ON_A_RACK]
+    compiled = [task for task in map(numeric_task, drawn(tasks(), 16, 5)) if task is not None]
+    compiled.append(
+        compiled_of(task_text([example for block in on_a_rack for example in drawn(with_its_structure(block), 1, 6)]))
+    )
+    quick = [translate(task) for task in compiled]
+    again: list[object] = []
+
+    def carried_out(_, statement, known, carry_out):
+        again.append(statement)
+        return carry_out(statement, known)
+
+    monkeypatch.setattr(Repeated, "carried_out", carried_out)
+    assert [translate(task) for task in compiled] == quick
+    assert len(again) > len({id(statement) for statement in again}), "some were translated several times"
