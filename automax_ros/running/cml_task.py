@@ -24,7 +24,8 @@ from automax_ros.running.drive_record import noted_command, noted_measured, note
 from automax_ros.running.drives import DriveAccess, DrivePort, Drives
 from automax_ros.running.error_log import LOG_NUMBERS
 from automax_ros.running.events import Events
-from automax_ros.running.scan_record import ScanRecord, Status, Steps
+from automax_ros.running.modeled_scan import Begun
+from automax_ros.running.scan_record import ScanRecord, Status
 from automax_ros.running.task import Task
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory
@@ -208,18 +209,24 @@ class CmlTask(Task):
         self._follow_end()
         return record
 
-    def scan_modeled(self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None) -> Steps:
-        """Execute one scan in steps; one that is given up leaves the loop as it was."""
+    def begin_steps(self, now_ns: int, skipped: int, form: ScanSteps | None) -> Begun:
+        """Begin a scan in steps: one that is given up leaves the loop as it is now."""
+        begun = super().begin_steps(now_ns, skipped, form)
         self._before = self.loop.numbers()
-        try:
-            record = yield from super().scan_modeled(now_ns, skipped, form)
-        except BaseException:
-            self.loop.take(self._before)
-            raise
-        finally:
-            self._before = None
+        return begun
+
+    def end_steps(self, outcome: Any) -> None:
+        """End the scan under way."""
+        super().end_steps(outcome)
+        self._before = None
         self._follow_end()
-        return record
+
+    def give_up_steps(self) -> None:
+        """Leave task and loop as the scan under way found them."""
+        super().give_up_steps()
+        before, self._before = self._before, None
+        if before is not None:
+            self.loop.take(before)
 
     def why_not_forced(self, name: str, scope: Scope) -> str | None:
         """Return why a variable cannot be forced: an output of the loop, or a local that its faults look at (52.0).

@@ -15,6 +15,7 @@ from automax_ros.blocks.instance import Instance
 from automax_ros.blocks.rules import AtLeast, Contiguous, Needs, NumberTrue
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, type_of_name
+from automax_ros.running.memory import CommonMemory
 
 from .block_model import SIZE, TICKS, Model, ModelBlock, Programmed
 from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_and_record, task_of
@@ -330,23 +331,32 @@ def test_a_block_that_holds_looks_at_a_bad_subscript_only_when_it_writes_and_onc
     assert logged(task) == [(40, 7026), (40, 7026)]
 
 
-def test_a_block_that_holds_neither_reads_nor_writes_what_it_holds(monkeypatch):
+class ReadMemory(CommonMemory):
+    """Knows what was read past the latch."""
+
+    def __init__(self, views):
+        super().__init__(views)
+        self.touched = []
+
+    def read_now(self, view, element=0):
+        self.touched.append((view, element))
+        return super().read_now(view, element)
+
+
+def test_a_block_that_holds_neither_reads_nor_writes_what_it_holds():
     """Equal values are written all the same when it updates."""
     text = """10 COMMON EN@, T%(3)
 20 CALL SCAN_LOOP(TICKS=4)
 30 CALL MOVE(ENABLE=EN@, INPUT1=5, OUTPUT1=T%(1))
 40 END
 """
-    task, memory = task_of(text)
-    touched = []
-    read_now = memory.read_now
-    monkeypatch.setattr(memory, "read_now", lambda *given: touched.append(given) or read_now(*given))
+    task, memory = task_of(text, ReadMemory)
     task.run()
     memory.keep_log()
     for number, enable in enumerate([False, True, True, False]):
         memory.write_from_outside(memory.view("EN@"), enable, OTHER)
         task.scan(number)
-    assert touched == []
+    assert memory.touched == []
     assert [entry.value for entry in memory.drain() if entry.writer != OTHER] == [5, 5]
 
 
