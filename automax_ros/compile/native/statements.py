@@ -20,6 +20,9 @@ from automax_ros.compile.native.typed import Typed, bare, c_type, whole_text
 _PASSING = re.compile(r"(b\d+_\w+|t\d+|over|dropped)$")
 """Locals of one block or statement."""
 
+MOST_TURNS = 200
+"""Translations of a loop, each for a wider range of what it begins with; each name takes a few."""
+
 
 class Body:
     """Translates the statements of one function; ``ends`` are the loops around a statement, the inmost last."""
@@ -191,7 +194,7 @@ class Body:
         frame, kept = self.frame, self.frame.loops.get(id(statement))
         top = known if kept is None else known.joined(kept)
         begin = len(frame.lines)
-        while True:
+        for _ in range(MOST_TURNS):
             loop = _Loop()
             self._loops.append(loop)
             del frame.lines[begin:]
@@ -210,6 +213,8 @@ class Body:
                 if after is not None:
                     wider[name] = frame.pinned(name, top[name].widened(after))
             top = wider
+        else:
+            raise NotNative("a loop in which a value has no bounds")
         frame.loops[id(statement)] = top
         return joined(leaves, loop.broken)
 

@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from automax_ros.compile.native import NativeCache, native_form, translate
+from automax_ros.compile.native import NativeCache, NotNative, native_form, translate
 from automax_ros.compile.native.ranges import INFINITE, Kind, Range
 
 from ..support import compiled_of, lines
@@ -29,6 +29,13 @@ def clamped(value: str) -> str:
 def test_a_loop_is_native_wherever_it_counts(start: int, stop: int, step: int) -> None:
     loop = (f"FOR A% = {start} TO {stop} STEP {step}", "D! = D! + A%", "NEXT A%")
     assert "static int scan(" in translate(compiled_of(lines(*loop, declare="LOCAL A%, D!"))).text
+
+
+def test_a_loop_that_comes_to_no_end_is_given_up(monkeypatch) -> None:
+    monkeypatch.setattr("automax_ros.compile.native.ranges._reaching", lambda _, bound: bound)
+    loop = ("FOR A% = -10 TO B%", "D! = D! + A%", "NEXT A%")
+    with pytest.raises(NotNative, match="line 50: a loop in which a value has no bounds"):
+        translate(compiled_of(lines(*loop, declare="LOCAL A%, B%, D!")))
 
 
 @needs_gcc
