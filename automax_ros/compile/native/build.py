@@ -29,6 +29,8 @@ LONG_TEXT = 200_000
 
 A task of 2,000 lines, 800,000 characters, takes 5 s and not 15, and scans as quickly within a few percent.
 """
+MOST_TEXT = 4_000_000
+"""Characters of a text that is compiled (decision): a task of 10,000 lines, and 1 GB of memory for the compiler."""
 LIMIT_S = 120.0
 """Time that the compiler has for one text, s (decision): a task of 2,000 lines takes a few."""
 _USUAL = ("cc", "gcc", "clang")
@@ -72,8 +74,10 @@ def library(text: str, cache: NativeCache, options: Sequence[str] = (), limit_s:
     """Return the library of a C text: from the cache, or built and kept there.
 
     Raises:
-        NotNative: no compiler, it fails or takes longer than ``limit_s``, or the cache is not safe.
+        NotNative: no compiler, it fails or takes longer than ``limit_s``, the text is too long, or the cache not safe.
     """
+    if len(text) > MOST_TEXT:
+        raise NotNative(f"its C text would have {len(text):,} characters, more than {MOST_TEXT:,}")
     compiler = find_compiler(limit_s)
     options = (level_of(text), *options)
     key = key_of(text, compiler, options)

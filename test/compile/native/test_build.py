@@ -105,6 +105,12 @@ def test_a_compiler_that_fails_is_quoted_and_leaves_nothing(cache, monkeypatch, 
         library("int answer(void) { return }\n", cache)
 
 
+def test_a_text_that_is_too_long_is_not_given_to_a_compiler(cache):
+    with pytest.raises(NotNative, match="its C text would have 4,000,032 characters, more than 4,000,000"):
+        library(ANSWER + " " * 4_000_000, cache)
+    assert files_of(cache) == []
+
+
 def test_a_compiler_that_writes_nothing_is_told(cache, monkeypatch, tmp_path):
     monkeypatch.setenv("CC", str(compiler_of(tmp_path, "exit 0")))
     with pytest.raises(NotNative, match="cc has written no library"):
