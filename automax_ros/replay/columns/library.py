@@ -120,12 +120,15 @@ class ColumnLibrary:
             OSError: it cannot be loaded.
         """
         self._library = ctypes.CDLL(str(path))
+        self._columns = np.empty((5, 0), np.int64)
+        self._definitions = np.empty(_MOST_DEFINITIONS, np.int64)
 
     def table(self, data: Buffer) -> ChunkTable | None:
         """Return where the messages of a chunk stand, None where they have to be read one by one."""
-        room = min(len(data) // MESSAGE_HEAD, MOST_MESSAGES)
-        columns = np.empty((5, room), np.int64)
-        definitions, defined = np.empty(_MOST_DEFINITIONS, np.int64), ctypes.c_int64()
+        if self._columns.shape[1] < min(len(data) // MESSAGE_HEAD, MOST_MESSAGES):
+            self._columns = np.empty((5, min(2 * len(data) // MESSAGE_HEAD, MOST_MESSAGES)), np.int64)
+        columns, definitions, defined = self._columns, self._definitions, ctypes.c_int64()
+        room = columns.shape[1]
         found = self._count(
             "automax_records",
             *(_address(np.frombuffer(data, np.uint8), np.uint8), ctypes.c_int64(len(data)), ctypes.c_int64(room)),
@@ -134,7 +137,7 @@ class ColumnLibrary:
         )
         if found <= 0:
             return None
-        numbers, places, lengths, log_times, stamps = columns[:, :found]
+        numbers, places, lengths, log_times, stamps = columns[:, :found].copy()
         told = tuple(definition_at(data, place) for place in definitions[: defined.value].tolist())
         return ChunkTable(numbers, places, lengths, log_times.view(np.uint64), stamps.view(np.uint64), told)
 
