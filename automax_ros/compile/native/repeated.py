@@ -1,7 +1,7 @@
 """Statements of a scan that come out as they did before, when the scan is translated once more.
 
 A scan is translated until no state is left that was not thought of. From one time to the next little changes: most
-statements find their names as they found them before, and have the same lines and leave the same behind.
+statements find their names as they found them before, and come to the same lines and the same ranges.
 """
 
 from __future__ import annotations

@@ -71,6 +71,7 @@ def test_every_block_is_the_same_in_c(on_a_rack: bool, tmp_path) -> None:
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
 def test_every_block_is_the_same_in_c_however_it_is_programmed(block: Block, tmp_path) -> None:
     for number in range(4):

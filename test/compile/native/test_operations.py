@@ -287,6 +287,7 @@ def test_operations_give_python_s_bits(built) -> None:
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("seed", range(2))
 def test_operations_give_python_s_bits_for_many_values(built, seed) -> None:
     assert differences([*ONE, *TWO, *THREE], built, 10_000, 2 + seed) == []
