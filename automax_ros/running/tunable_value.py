@@ -13,7 +13,7 @@ def tunable_value(symbol: Symbol, name: str, value: object) -> int | float:
     """Return what a tunable, which ``name`` tells in messages, would hold if it were set to a value.
 
     Raises:
-        KeyError: it is no tunable.
+        KeyError: it cannot be tuned.
         ValueError: the value lies outside its limits or is not of its type.
     """
     if symbol.tuning is None:
