@@ -70,6 +70,16 @@ def find_compiler(limit_s: float = LIMIT_S) -> Compiler:
     raise NotNative(missing)
 
 
+def require_tools(limit_s: float = LIMIT_S) -> None:
+    """Look for all that a native task is built with.
+
+    Raises:
+        NotNative: there is no compiler, or ``Python.h`` is missing.
+    """
+    find_compiler(limit_s)
+    python_options()
+
+
 def library(text: str, cache: NativeCache, options: Sequence[str] = (), limit_s: float = LIMIT_S) -> Path:
     """Return the library of a C text: from the cache, or built and kept there.
 

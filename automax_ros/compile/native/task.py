@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, Scans
-from automax_ros.compile.native.build import LIMIT_S, library, python_options
+from automax_ros.compile.native.build import LIMIT_S, library, python_options, require_tools
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.columns import Columns
 from automax_ros.compile.native.executed import BesideLatch, Column, Executed
@@ -70,9 +70,9 @@ def native_form(
         NotNative: the task cannot be native, or not here, and why.
     """
     try:
-        host = host_module(cache, limit_s)  # first, since it says in no time what is missing here
+        require_tools(limit_s)  # first, since translating a long task takes some seconds
         source = kept_translation(compiled, cache) if translator is None else translator(compiled)
-        return NativeTask(compiled, source, library(source.text, cache, limit_s=limit_s), host)
+        return NativeTask(compiled, source, library(source.text, cache, limit_s=limit_s), host_module(cache, limit_s))
     except (OSError, ImportError) as error:
         raise NotNative(f"native code cannot be loaded: {error}; is the cache's folder mounted noexec?") from error
 

@@ -2,6 +2,7 @@
 
 import gc
 import sys
+import sysconfig
 import weakref
 
 import pytest
@@ -353,3 +354,15 @@ def test_objects_of_cells_are_given_back(compiled, cache):
     del scans
     cells[0] = 0
     assert sys.getrefcount(first) == before[0]
+
+
+def test_without_a_compiler_nothing_is_translated(compiled, cache, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(NotNative, match="CC names no-such-compiler, which is not there"):
+        native_form(compiled, cache, lambda _: pytest.fail("translated"))
+
+
+def test_without_python_h_nothing_is_translated(compiled, cache, monkeypatch, tmp_path):
+    monkeypatch.setattr(sysconfig, "get_path", lambda _: str(tmp_path))
+    with pytest.raises(NotNative, match=r"Python\.h is missing"):
+        native_form(compiled, cache, lambda _: pytest.fail("translated"))

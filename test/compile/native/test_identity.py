@@ -125,7 +125,7 @@ def test_many_random_tasks_are_the_same_in_c(tmp_path) -> None:
 def test_what_comes_out_as_before_is_what_would_be_translated_again(monkeypatch) -> None:
     """Statements that are not looked at again have the lines that they would get: the whole texts are the same."""
     on_a_rack = [block for block in BLOCKS if block in ON_A_RACK]
-    compiled = [task for task in map(numeric_task, drawn(tasks(), 16, 5)) if task is not None]
+    compiled = [task for task in map(numeric_task, drawn(tasks(), 8, 5)) if task is not None]
     compiled.append(
         compiled_of(task_text([example for block in on_a_rack for example in drawn(with_its_structure(block), 1, 6)]))
     )
