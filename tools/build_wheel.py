@@ -6,8 +6,11 @@ tools/build_wheel.py [FOLDER]     without FOLDER it goes to dist/. Plain `pip wh
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
+import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -29,9 +32,15 @@ def tag() -> str:
 
 
 def plain_wheel(folder: Path) -> Path:
-    """Build the wheel of Python alone, with this environment's setuptools."""
+    """Build the wheel of Python alone, with this environment's setuptools.
+
+    What setuptools collects goes below ``folder``: a build/ that is there may hold modules that were removed since.
+    """
+    settings = folder / "build.cfg"
+    settings.write_text(f"[build]\nbuild_base = {folder / 'build'}\n", encoding="utf-8")
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]
-    subprocess.run([*command, "--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)], check=True)
+    command += ["--no-build-isolation", "--wheel-dir", str(folder), str(ROOT)]
+    subprocess.run(command, check=True, env={**os.environ, "DIST_EXTRA_CONFIG": str(settings)})
     return next(folder.glob("*.whl"))
 
 
@@ -68,6 +77,8 @@ def main() -> int:
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="automax_wheel") as temporary:
         modules = Path(temporary) / "modules"
+        with contextlib.suppress(FileNotFoundError):  # what is installed is taken over where it is still fresh
+            shutil.copytree(Path(sysconfig.get_path("platlib")) / compiled.FOLDER, modules)
         build_compiled.main(["--folder", str(modules)])
         if not list(modules.glob("*/*")):
             print("error: nothing was compiled; `pip wheel .` makes the wheel of Python alone", file=sys.stderr)

@@ -38,6 +38,7 @@ _SCANS = (
     "running/scheduler.py",
     "running/task.py",
     "running/task_io.py",
+    "running/views.py",
     "rack/observers.py",
     "rack/scheduled_task.py",
 )
@@ -50,6 +51,7 @@ _RECORDING = (
     "wire/task_messages.py",
     "wire/write_messages.py",
     "bags/chunk_builder.py",
+    "bags/mcap_output.py",
     "bags/recorder.py",
     "bags/recording.py",
     "bags/writer.py",

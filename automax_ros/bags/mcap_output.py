@@ -117,18 +117,23 @@ class McapOutput:
         if not chunk.index:
             return
         data = chunk.data
+        first_time, last_time = chunk.first_time, chunk.last_time
         packed = Chunk(
             compression=self._compression,
             data=self._compress(data),
-            message_start_time=chunk.first_time,
-            message_end_time=chunk.last_time,
+            message_start_time=first_time,
+            message_end_time=last_time,
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        self.add_packed_chunk(packed, chunk)
+        self._add(packed, chunk, first_time, last_time)
 
     def add_packed_chunk(self, packed: Chunk, chunk: ChunkBuilder) -> None:
         """Write a chunk as it is, with the index that ``chunk`` has of it."""
+        self._add(packed, chunk, chunk.first_time, chunk.last_time)
+
+    def _add(self, packed: Chunk, chunk: ChunkBuilder, first_time: int, last_time: int) -> None:
+        """Write a chunk and its index, whose messages have these log times at most."""
         start = self._output.tell()
         length = self._write(record_bytes(packed))
         offset = start + length
@@ -142,7 +147,7 @@ class McapOutput:
             indexes.append(struct.pack(f"<{len(entries)}Q", *entries))
             length_of_indexes += _INDEX_HEAD.size + size
         self._write(b"".join(indexes))
-        self._count(chunk)
+        self._count(chunk, first_time, last_time)
         self.statistics.chunk_count += 1
         ChunkIndex(
             message_start_time=packed.message_start_time,
@@ -180,12 +185,12 @@ class McapOutput:
         crc = zlib.crc32(footer[:-4], zlib.crc32(data))
         self._write(data + footer[:-4] + struct.pack("<I", crc) + MAGIC)
 
-    def _count(self, chunk: ChunkBuilder) -> None:
+    def _count(self, chunk: ChunkBuilder, first_time: int, last_time: int) -> None:
         total = self.statistics
         if not total.message_count:
-            total.message_start_time, total.message_end_time = chunk.first_time, chunk.last_time
-        total.message_start_time = min(total.message_start_time, chunk.first_time)
-        total.message_end_time = max(total.message_end_time, chunk.last_time)
+            total.message_start_time, total.message_end_time = first_time, last_time
+        total.message_start_time = min(total.message_start_time, first_time)
+        total.message_end_time = max(total.message_end_time, last_time)
         counts = total.channel_message_counts
         for channel, entries in chunk.index.items():
             count = len(entries) * 8 // _INDEX_BYTES

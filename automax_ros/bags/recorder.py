@@ -74,12 +74,12 @@ class Recorder(Recording):
     def _sink(self, topic: Topic) -> Take:
         """Return what records a topic."""
         channel = self._writer.channel(topic.name, topic.type_name, topic.qos)
-        write = self._writer.write
+        writer = self._writer
 
         def take(stamp: int, payload: bytes) -> None:
             if self.failure is None:
                 try:
-                    write(channel, stamp, payload)
+                    writer.write(channel, stamp, payload)
                 except RecordingError as error:
                     self.failure = error
 

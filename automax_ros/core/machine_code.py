@@ -16,6 +16,6 @@ else:
         """Return a decorator that leaves a class as it is: mypyc has read the arguments already.
 
         ``allow_interpreted_subclasses=True`` on a class that a plain one inherits from: without it the methods that
-        the plain one overrides would not be called.
+        the plain one overrides would not be called. ``native_class=False`` on one that inherits from a plain class.
         """
         return lambda kind: kind

@@ -14,6 +14,7 @@ from operator import itemgetter
 from typing import NamedTuple, Protocol
 
 from automax_ros.core.kinds import WriteKind
+from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Latched, Value
 
@@ -151,6 +152,7 @@ class MemoryValueError(ValueError):
     """A value from outside does not fit the variable it is meant for."""
 
 
+@mypyc_attr(native_class=False)
 class CellLatch(partial[Latched]):
     """A latch of a plan over ``cells``: native scans, which know the plan's views, read the cells themselves."""
 
