@@ -57,10 +57,27 @@ _RECORDING = (
     "bags/writer.py",
 )
 """What each message of a recording goes through."""
+_DRIVES = (
+    "running/cml_task.py",
+    "running/drive_record.py",
+    "running/drives.py",
+    "running/image.py",
+    "running/memory.py",
+    "running/process_inputs.py",
+    "rack/modules/drive_controller.py",
+    "rack/modules/drive_digital.py",
+    "rack/modules/drive_interrupts.py",
+    "rack/modules/drive_switches.py",
+    "rack/modules/drive_voltage.py",
+    "rack/modules/io_module.py",
+    "rack/plants/feeding.py",
+    "rack/plants/sampling.py",
+)
+"""What each interrupt of a 57C406 goes through, to the registers, and the instruments that look at a plant."""
 
 GROUPS = (
     Group("drive", folders=("drive",), without=tuple(f"drive/{name}.py" for name in _COLD)),
-    Group("scans", files=(*_SCANS, *_RECORDING)),
+    Group("scans", files=(*_SCANS, *_RECORDING, *_DRIVES)),
 )
 """What runs as machine code. ``sum`` of floating-point numbers must not stand in it (decision): Python 3.12 and later
 round once, at the end, where C rounds after each addition."""
