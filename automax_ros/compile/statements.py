@@ -93,12 +93,15 @@ class StatementLowering:
                 self._lower_simple(statement)
 
     def _straight_if(self, statement: If) -> None:
+        line = self.emitter.line
         condition = self._condition(statement.condition, statement)
         with self.emitter.suite() as then:
             self._branch(statement.then)
         with self.emitter.suite() as otherwise:
             self._branch(statement.otherwise)
-        self.emitter.emit(build.when(condition, then, otherwise))
+        whole = build.when(condition, then, otherwise)
+        self.emitter.emit(whole)
+        whole.lineno = line  # that of its test, whose temporaries belong to the line
 
     def _branch(self, statements: tuple[Statement, ...]) -> None:
         """Emit a branch of an IF; where the way through may repeat, it counts its own statements."""

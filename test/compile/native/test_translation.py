@@ -45,6 +45,17 @@ def test_what_computes_with_numbers_is_native(value: str) -> None:
     assert "static int scan(" in translate(compiled_of(lines(f"A% = {value}", declare="LOCAL A%, B%, R"))).text
 
 
+@pytest.mark.parametrize("test", ["KA% > 3", "A% > KA%", "KX@", "A% / B% > 1", "T%(A%) = 2", "SQRT(R) > 1.0 AND KX@"])
+def test_a_test_may_read_commons_and_elements_however_long_its_branches_are(test: str) -> None:
+    text = lines(
+        "9 COMMON KA%, KX@",
+        f"30 IF {test} THEN", "40 A% = B% * 7", "50 ELSE", "60 A% = B% - 1", "70 END_IF", "80 B% = A%",
+        declare="LOCAL A%, B%, R, T%(3)",
+    )  # fmt: skip
+    compiled = compiled_of("\n".join(sorted(text.splitlines(), key=lambda line: int(line.split()[0]))) + "\n")
+    assert "static int scan(" in translate(compiled).text
+
+
 def test_limits_are_those_of_types_and_of_what_scans_leave() -> None:
     text = lines(
         "CALL COUNTER(INPUT_PLUS=A%, INPUT_MINUS=B%, RESET=X@, OUTPUT=C%)",
