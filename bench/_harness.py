@@ -36,8 +36,9 @@ def task_of(text: str, target: Platform = Platform.AUTOMAX) -> tuple[Task, Commo
 
 def scan_ns(task: Task, vary: Callable[[int], None] = lambda _: None, scans: int = 300) -> float:
     """Return the time of one scan in ns: the best of many short runs; ``vary`` changes inputs and is not counted."""
-    whole = min(_run_ns(lambda number: (vary(number), task.scan(0)), scans) for _ in range(REPEATS))
-    return whole - min(_run_ns(vary, scans) for _ in range(REPEATS))
+    scan = task.scan
+    whole = min(_run_ns(lambda number: (vary(number), scan(0)), scans) for _ in range(REPEATS))
+    return whole - min(_run_ns(lambda number: (vary(number), None), scans) for _ in range(REPEATS))
 
 
 def _run_ns(action: Callable[[int], object], count: int) -> float:

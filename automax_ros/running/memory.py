@@ -52,11 +52,10 @@ class CommonMemory(Image):
             self._commit_each(changes, writer)
             return
         plain, cells = self._plain, self._cells
-        for view, _ in changes:
-            if not plain[view]:
-                self._commit_each(changes, writer)
-                return
         for view, value in changes:
+            if not plain[view]:
+                self._commit_each(changes, writer)  # those before it once more: nothing else depends on a plain cell
+                return
             cells[view] = value
         first = self.sequence + 1
         self.sequence += len(changes)
