@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.native.executed import BesideLatch
 from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeOutcome
-from automax_ros.compile.native.task import NativeTask
 from automax_ros.compile.scan_io import StateValues
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
@@ -20,6 +20,11 @@ from automax_ros.replay.columns.execution import ColumnForm, Executed, PythonCol
 from automax_ros.replay.columns.library import ColumnLibrary, library_text
 from automax_ros.running.backplane import Backplane
 from automax_ros.wire.cdr_columns import Ints
+
+if TYPE_CHECKING:
+    from automax_ros.compile.native.task import (
+        NativeTask,
+    )  # it takes a tenth of a second, and only native tasks need it
 
 WORTHWHILE_NS = 600 * NS_PER_S
 """Recorded time from which on the library of a replay by columns is built or looked for (decision).

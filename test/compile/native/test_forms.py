@@ -1,3 +1,4 @@
+import ctypes
 import os
 import signal
 import threading
@@ -42,6 +43,20 @@ def test_auto_builds_what_pays(compiled, tmp_path):
     assert short.why == "a run this short gains nothing by it (--native on)"
     assert NativeForms(NativeMode.AUTO, enough, cache).form(compiled).native is not None
     assert NativeForms(NativeMode.AUTO, None, cache).form(compiled).native is not None
+
+
+def test_what_helps_besides_tasks_is_built_where_it_pays(tmp_path, monkeypatch):
+    text, cache = "int helps(void) { return 7; }", NativeCache(tmp_path / "cache")
+    assert IN_PYTHON.library(text, 0) is None
+    assert NativeForms(NativeMode.AUTO, 999, cache).library(text, 1000) is None
+    assert not (tmp_path / "cache").exists()
+    made = NativeForms(NativeMode.AUTO, 1000, cache).library(text, 1000)
+    assert ctypes.CDLL(str(made)).helps() == 7
+    assert NativeForms(NativeMode.AUTO, None, cache).library(text, 1000) == made
+    assert NativeForms(NativeMode.ON, 0, cache).library(text, 1000) == made
+    assert NativeForms(NativeMode.ON, 0, cache).library("no C", 1000) is None
+    monkeypatch.setenv("CC", "nowhere-to-be-found")
+    assert NativeForms(NativeMode.ON, 0, cache).library(text, 1000) is None
 
 
 def test_a_run_without_native_scans_says_why(compiled):
