@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -24,8 +25,8 @@ from automax_ros.bags.unpacking import Buffer
 
 Bytes = NDArray[np.uint8]
 _CHANNELS = 1 << 16
-TableOf = Callable[[Buffer], ChunkTable | None]
-"""Finds where the messages of an unpacked chunk stand; None where they have to be read one by one."""
+TableOf = Callable[[Buffer, Sequence[int]], ChunkTable | None]
+"""Finds where the messages of unpacked chunks stand, a chunk up to each end; None where one has to be looked at."""
 _TWO_NUMBERS = struct.Struct("<HH")
 """What a schema or channel begins with: its own number, and in a channel that of its schema."""
 
@@ -104,8 +105,7 @@ class _BlockFile:
         self._is_known = np.zeros(_CHANNELS, bool)
         self._buffer = BlockBuffer()
         self._data: Bytes = np.empty(0, np.uint8)
-        self._tables: list[tuple[int, ChunkTable]] = []
-        self._messages = 0
+        self._chunks: list[tuple[int, WholeChunk]] = []
 
     @property
     def position(self) -> int:
@@ -116,29 +116,55 @@ class _BlockFile:
         """Return what the file holds; what was read before an error is handed out first."""
         try:
             for record in self._file.chunks(indexed=self._table_of is None, room=self._buffer.room):
-                table = None
                 if isinstance(record, WholeChunk):
                     data, begin = self._buffer.taken()
-                    table = self._table(record)
                     if data is not self._data:
                         yield from self._kept()
                         self._data = data
-                if table is not None:
-                    self._tables.append((begin, table))
-                    self._messages += len(table.places)
-                    if self._messages < MOST_MESSAGES:
-                        continue
-                yield from self._kept()
-                if table is None:
+                    self._chunks.append((begin, record))
+                else:
+                    yield from self._kept()
                     yield from self._one_by_one(record)
         except BagError:
             yield from self._kept()
             raise
         yield from self._kept()
 
+    def _kept(self) -> Iterator[MessageBlock | BagMessage]:
+        """Return the chunks kept so far, as one block if they are as they should be, and forget them."""
+        chunks, self._chunks = self._chunks, []
+        whole = self._whole_table(chunks)
+        if whole is not None:
+            yield from self._block([(chunks[0][0], whole)])
+            return
+        tables: list[tuple[int, ChunkTable]] = []
+        for begin, chunk in chunks:
+            table = self._table(chunk)
+            if table is not None:
+                tables.append((begin, table))
+                if sum(len(known.places) for _, known in tables) < MOST_MESSAGES:
+                    continue
+            yield from self._block(tables)
+            tables = []
+            if table is None:
+                yield from self._one_by_one(chunk)
+        yield from self._block(tables)
+
+    def _whole_table(self, chunks: Sequence[tuple[int, WholeChunk]]) -> ChunkTable | None:
+        """Return where the messages of chunks stand that follow each other; None where each has to be looked at."""
+        if self._table_of is None or not chunks:
+            return None
+        begin = chunks[0][0]
+        ends = [place - begin + len(chunk.data) for place, chunk in chunks]
+        return self._admitted(self._table_of(self._data[begin : begin + ends[-1]].data, ends))
+
     def _table(self, chunk: WholeChunk) -> ChunkTable | None:
         """Return where the messages of a chunk stand; None where they have to be read one by one."""
-        table = chunk.table() if self._table_of is None else self._table_of(chunk.data)
+        table = chunk.table() if self._table_of is None else self._table_of(chunk.data, [len(chunk.data)])
+        return self._admitted(table)
+
+    def _admitted(self, table: ChunkTable | None) -> ChunkTable | None:
+        """Return a table whose messages can all be read, and take over what it tells; else None."""
         if table is None or not self._is_defined(table):
             return None
         if not self._begun:
@@ -205,20 +231,16 @@ class _BlockFile:
             self._kinds[number] = self._kind_of[made.type_name]
         return True
 
-    def _kept(self) -> Iterator[MessageBlock]:
-        """Return the chunks kept so far as one block, and forget them."""
-        if not self._tables:
+    def _block(self, tables: Sequence[tuple[int, ChunkTable]]) -> Iterator[MessageBlock]:
+        """Return the chunks whose messages these tables tell as a block."""
+        if not tables:
             return
-        tables = [table for _, table in self._tables]
-        starts = np.concatenate([table.starts + begin for begin, table in self._tables])
-        numbers = np.concatenate([table.numbers for table in tables])
-        lengths = np.concatenate([table.lengths for table in tables])
-        log_times = np.concatenate([table.log_times for table in tables])
-        stamps = np.concatenate([table.stamps for table in tables])
-        self._tables, self._messages = [], 0
-        columns = self._kinds[numbers], numbers, starts, lengths, log_times, stamps
-        wanted = columns[0] >= 0
-        if not wanted.all():
+        starts = _joined([table.starts + begin for begin, table in tables])
+        numbers, lengths = (_joined([getattr(table, name) for _, table in tables]) for name in ("numbers", "lengths"))
+        log_times, stamps = (_joined([getattr(table, name) for _, table in tables]) for name in ("log_times", "stamps"))
+        columns: tuple[NDArray[Any], ...] = self._kinds[numbers], numbers, starts, lengths, log_times, stamps
+        if (columns[0] < 0).any():
+            wanted = np.flatnonzero(columns[0] >= 0)
             columns = tuple(column[wanted] for column in columns)
         if len(columns[0]):
             yield MessageBlock(self._source, self._data, *columns)
@@ -234,3 +256,7 @@ class _BlockFile:
             channel = self._source.channel(raw, self._types)
             if channel.wanted:
                 yield channel.decoded(raw)
+
+
+def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Container
 from typing import Any, BinaryIO
 
 PIECE_BYTES = 1 << 18
@@ -42,6 +43,16 @@ class CheckedStream:
                 return ()
         self._at += layout.size
         return layout.unpack_from(self._buffer, self._at - layout.size)
+
+    def pass_over(self, head: struct.Struct, kinds: Container[int]) -> None:
+        """Pass over records of some kinds, of which a head tells kind and length, as far as they are read whole."""
+        at, buffer = self._at, self._buffer
+        while at + head.size <= len(buffer):
+            kind, length = head.unpack_from(buffer, at)
+            if kind not in kinds or at + head.size + length > len(buffer):
+                break
+            at += head.size + length
+        self._at = at
 
     def skip(self, length: int) -> int:
         """Pass over the next bytes; return how many there were."""

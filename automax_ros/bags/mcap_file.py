@@ -166,6 +166,7 @@ class McapFile:
                 opcode, length = self._next_head(stream)
                 if opcode in without:
                     self._skip(stream, length)
+                    stream.pass_over(RECORD_HEAD, without)
                     continue
                 crc = stream.crc(RECORD_HEAD.size) if opcode == Opcode.DATA_END else 0
                 content = self._read(stream, length)

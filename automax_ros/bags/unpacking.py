@@ -32,6 +32,7 @@ class Unpacker:
     def __init__(self, path: Path, stored_bytes: int) -> None:
         self._path = path
         self._left = FREE_BYTES + MAX_RATIO * stored_bytes
+        self._zstd = zstandard.ZstdDecompressor()
 
     def unpacked(self, chunk: Chunk) -> bytes:
         """Return what a chunk holds.
@@ -52,7 +53,7 @@ class Unpacker:
         """
         self._admit(chunk.uncompressed_size)
         place = room(chunk.uncompressed_size)
-        if _is_in(place, chunk):
+        if self._is_in(place, chunk):
             self._check(chunk, place)
         else:
             data = self._decompressed(chunk)
@@ -113,19 +114,18 @@ class Unpacker:
         stated = zstandard.get_frame_parameters(data).content_size
         if stated not in (size, zstandard.CONTENTSIZE_UNKNOWN):
             raise self._damaged(f"a chunk holds {stated} bytes and should hold {size}")
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size) if size else b""
+        return self._zstd.decompress(data, max_output_size=size) if size else b""
+
+    def _is_in(self, place: memoryview, chunk: Chunk) -> bool:
+        """Decompress a sound zstd frame that states its size into its place; FALSE if it is anything else."""
+        if chunk.compression != "zstd" or not len(place):
+            return False
+        with contextlib.suppress(zstandard.ZstdError):
+            if zstandard.get_frame_parameters(chunk.data).content_size == len(place):
+                with self._zstd.stream_reader(chunk.data) as reader:
+                    # The second read comes to the end of the frame, and to its checksum.
+                    return reader.readinto(place) == len(place) and not reader.read(1)
+        return False
 
     def _damaged(self, message: str) -> BagError:
         return BagError("AMX6813", self._path, message, DAMAGED_HINT)
-
-
-def _is_in(place: memoryview, chunk: Chunk) -> bool:
-    """Decompress a sound zstd frame that states its size into its place; FALSE if it is anything else."""
-    if chunk.compression != "zstd" or not len(place):
-        return False
-    with contextlib.suppress(zstandard.ZstdError):
-        if zstandard.get_frame_parameters(chunk.data).content_size == len(place):
-            with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
-                # The second read comes to the end of the frame, and to its checksum.
-                return reader.readinto(place) == len(place) and not reader.read(1)
-    return False

@@ -4,17 +4,22 @@
 
 enum { SCHEMA = 3, CHANNEL = 4, MESSAGE = 5, RECORD_HEAD = 9, MESSAGE_HEAD = 31, MOST_FIELDS = 32 };
 
-/* Finds the records of a chunk. Of each message it sets channel, place, bytes of the message itself, log time and time
+/* Finds the records of chunks that follow each other, each up to one of the `ends`. Of each message it sets channel, place, bytes of the message itself, log time and time
  * of sending, in `columns` with room for `room` of them, and the places of definitions. Returns how many messages there
  * are, -1 where other records stand among them, one is cut off, or there is no room for all of them. */
 int64_t automax_records(
-    const uint8_t *data, int64_t size, int64_t room, int64_t *columns, int64_t definition_room, int64_t *definitions,
-    int64_t *defined
+    const uint8_t *data, const int64_t *ends, int64_t chunks, int64_t room, int64_t *columns, int64_t definition_room,
+    int64_t *definitions, int64_t *defined
 ) {
-    int64_t found = 0;
+    int64_t found = 0, chunk = 0;
     *defined = 0;
-    for (int64_t place = 0; place < size;) {
+    for (int64_t place = 0; chunk < chunks;) {
         uint64_t length;
+        int64_t size = ends[chunk];
+        if (place == size) {
+            chunk++;
+            continue;
+        }
         uint16_t channel;
         if (size - place < RECORD_HEAD) return -1;
         memcpy(&length, data + place + 1, sizeof length);

@@ -123,15 +123,18 @@ class ColumnLibrary:
         self._columns = np.empty((5, 0), np.int64)
         self._definitions = np.empty(_MOST_DEFINITIONS, np.int64)
 
-    def table(self, data: Buffer) -> ChunkTable | None:
-        """Return where the messages of a chunk stand, None where they have to be read one by one."""
+    def table(self, data: Buffer, ends: Sequence[int]) -> ChunkTable | None:
+        """Return where the messages of chunks stand, each up to one of the ends; None where a record is another one."""
+        if not 0 <= min(ends) <= max(ends) == len(data):
+            raise ValueError("chunks that do not end with their bytes")
         if self._columns.shape[1] < min(len(data) // MESSAGE_HEAD, MOST_MESSAGES):
-            self._columns = np.empty((5, min(2 * len(data) // MESSAGE_HEAD, MOST_MESSAGES)), np.int64)
+            self._columns = np.empty((5, min(len(data) // MESSAGE_HEAD, MOST_MESSAGES)), np.int64)
         columns, definitions, defined = self._columns, self._definitions, ctypes.c_int64()
         room = columns.shape[1]
         found = self._count(
             "automax_records",
-            *(_address(np.frombuffer(data, np.uint8), np.uint8), ctypes.c_int64(len(data)), ctypes.c_int64(room)),
+            *(_address(np.frombuffer(data, np.uint8), np.uint8), _address(np.array(ends, np.int64), np.int64)),
+            *(ctypes.c_int64(len(ends)), ctypes.c_int64(room)),
             *(_address(columns, np.int64), ctypes.c_int64(_MOST_DEFINITIONS), _address(definitions, np.int64)),
             ctypes.byref(defined),
         )

@@ -220,7 +220,7 @@ def test_commits_are_compared_as_numpy_compares_them(library, data, count):
 def test_chunks_are_taken_apart_as_their_indexes_tell(library):
     chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)]
     for chunk in chunks:
-        expected, found = chunk.table(), library.table(chunk.data)
+        expected, found = chunk.table(), library.table(chunk.data, [len(chunk.data)])
         assert expected is not None
         assert found.definitions == expected.definitions
         for name in ("numbers", "places", "starts", "lengths", "log_times", "stamps"):
@@ -229,16 +229,39 @@ def test_chunks_are_taken_apart_as_their_indexes_tell(library):
     assert chunks
 
 
+def test_chunks_that_follow_each_other_are_taken_apart_at_once(library):
+    chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)][:5]
+    data = b"".join(chunk.data for chunk in chunks)
+    ends = np.cumsum([len(chunk.data) for chunk in chunks]).tolist()
+    tables = [library.table(chunk.data, [len(chunk.data)]) for chunk in chunks]
+    found = library.table(data, ends)
+    begins = [0, *ends]
+    assert found.places.tolist() == [
+        place + begin for table, begin in zip(tables, begins, strict=False) for place in table.places.tolist()
+    ]
+    assert found.log_times.tolist() == [time for table in tables for time in table.log_times.tolist()]
+    first = tables[0].places.tolist()
+    assert library.table(data, [first[-1], *ends]).places.tolist() == found.places.tolist()
+    assert library.table(data, [ends[0] - 1, *ends]) is None  # a record over the end of its chunk
+    assert library.table(data, [ends[1], ends[0], *ends[1:]]) is None
+    with pytest.raises(ValueError, match="do not end"):
+        library.table(data, [len(data) + 1])
+
+
 def test_other_records_and_cut_off_ones_are_left_to_the_reader(library):
     chunks = [item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk)]
-    data = chunks[0].data
-    places = library.table(data).places.tolist()
+    data = bytes(chunks[0].data)
+
+    def table(part: bytes):
+        return library.table(part, [len(part)])
+
+    places = table(data).places.tolist()
     for cut in (1, 8, 9, 30, len(data) - places[-1] - 1):
-        assert library.table(data[: places[-1] + cut]) is None
-    assert len(library.table(data[: places[-1]]).places) == len(places) - 1
+        assert table(data[: places[-1] + cut]) is None
+    assert len(table(data[: places[-1]]).places) == len(places) - 1
     for opcode in (0, 1, 6, 0x0F, 0x80, 0xFF):
-        assert library.table(data[: places[9]] + bytes([opcode]) + data[places[9] + 1 :]) is None
-    assert library.table(b"") is None
+        assert table(data[: places[9]] + bytes([opcode]) + data[places[9] + 1 :]) is None
+    assert table(b"") is None
 
 
 def test_damaged_recordings_tell_the_same_messages_and_the_same_error(library, tmp_path: Path):
