@@ -177,10 +177,9 @@ class _BlockFile:
         """Take over what a chunk defines; return whether its channels stand before their messages and can be read."""
         if not table.definitions and self._is_known[table.numbers].all():
             return True
-        numbers, firsts = np.unique(table.numbers, return_index=True)
         unknown = [
-            (number, int(table.places[first]))
-            for number, first in zip(numbers.tolist(), firsts.tolist(), strict=True)
+            (number, int(table.places[np.argmax(table.numbers == number)]))
+            for number in np.flatnonzero(np.bincount(table.numbers)).tolist()
             if not self._is_known[number]
         ]
         if not unknown and not table.definitions:
