@@ -135,10 +135,10 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
         run([*compiler.link, *(f"{file}.o" for file in [*facts["c"], *facts["runtime"]]), "-o", library], work)
         for file in facts["shims"].values():
             run([*compiler.link, f"{file}.o", "-o", f"{file[:-2]}{suffix}"], work)
-        lines = [f"group\t{group.name}", f"library\t{facts['library']}\t{name}/{library}"]
+        lines = [f"group\t{group.name}", f"library\t{facts['library']}\t{placed(work, name, library)}"]
         for module in sorted(facts["modules"]):
             shim = facts["shims"][module.rpartition(".")[0]]
-            lines.append(f"module\t{module}\t{name}/{shim[:-2]}{suffix}")
+            lines.append(f"module\t{module}\t{placed(work, name, f'{shim[:-2]}{suffix}')}")
         sources = sorted([*facts["modules"].values(), *facts["needs"].values()])
         lines += [
             f"source\t{Path(file).relative_to(PACKAGE.name).as_posix()}\t{digests[ROOT / file]}" for file in sources
@@ -150,6 +150,11 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
             shutil.copy(path, target)
         (target / compiled.INDEX).write_text("\n".join(lines) + "\n", encoding="utf-8")
     return lines
+
+
+def placed(work: Path, folder: str, file: str) -> str:
+    """Return where a library will be, and its bytes, as the index has them."""
+    return f"{folder}/{file}\t{(work / file).stat().st_size}"
 
 
 def write_index(folder: Path, lines: list[str]) -> None:

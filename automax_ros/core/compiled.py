@@ -18,7 +18,7 @@ from types import ModuleType
 
 FOLDER = "automax_ros_compiled"
 INDEX = "index.txt"
-VERSION = "1"
+VERSION = "2"
 VARIABLE = "AUTOMAX_COMPILED"
 OFF = ("off", "0", "no", "false")
 
@@ -26,6 +26,7 @@ OFF = ("off", "0", "no", "false")
 class CompiledGroup:
     """Modules that are loaded together: ``libraries`` by name of module, ``sources`` with what their content was.
 
+    ``sizes`` has the bytes of each library: one that was copied by half would end the process when it is loaded.
     ``stale`` is empty as long as the group may be used, otherwise it says why not; None before the first of its modules
     was asked for.
     """
@@ -34,15 +35,16 @@ class CompiledGroup:
         self.name = name
         self.modules: list[str] = []
         self.libraries: dict[str, str] = {}
+        self.sizes: dict[str, int] = {}
         self.sources: dict[str, str] = {}
         self.stale: str | None = None
 
     def fresh(self, package: str) -> bool:
         """Whether the sources below the folder ``package`` are those that were compiled; looked at once."""
         if self.stale is None:
-            missing = (f"{file} is missing" for file in set(self.libraries.values()) if not os.path.isfile(file))
+            harmed = (_harmed(file, size) for file, size in self.sizes.items())
             changed = (_changed(package, file, digest) for file, digest in self.sources.items())
-            self.stale = next(missing, "") or next(filter(None, changed), "")
+            self.stale = next(filter(None, harmed), "") or next(filter(None, changed), "")
         return not self.stale
 
     def loads(self) -> bool:
@@ -138,7 +140,7 @@ def read_index(folder: str) -> list[CompiledGroup]:
         return []
     try:
         return _groups(folder, lines[1:])
-    except IndexError:
+    except (IndexError, ValueError):
         return []  # it was not written to its end
 
 
@@ -147,11 +149,12 @@ def _groups(folder: str, lines: Sequence[list[str]]) -> list[CompiledGroup]:
     for line in lines:
         if line[0] == "group":
             groups.append(CompiledGroup(line[1]))
-        elif line[0] == "library":
-            groups[-1].libraries[line[1]] = os.path.join(folder, line[2])
-        elif line[0] == "module":
-            groups[-1].modules.append(line[1])
-            groups[-1].libraries[line[1]] = os.path.join(folder, line[2])
+        elif line[0] in ("library", "module"):
+            if line[0] == "module":
+                groups[-1].modules.append(line[1])
+            file = os.path.join(folder, line[2])
+            groups[-1].libraries[line[1]] = file
+            groups[-1].sizes[file] = int(line[3])
         elif line[0] == "source":
             groups[-1].sources[line[1]] = line[2]
     return groups
@@ -178,6 +181,15 @@ def _folders(package: str) -> tuple[str, ...]:
         os.path.join(os.path.dirname(package), FOLDER),
         os.path.join(sysconfig.get_path("platlib"), FOLDER),
     )
+
+
+def _harmed(file: str, size: int) -> str:
+    """Why a library is not what was built; empty if it is."""
+    try:
+        found = os.path.getsize(file)
+    except OSError:
+        return f"{file} is missing"
+    return "" if found == size else f"{file} has {found} bytes of {size}"
 
 
 def _changed(package: str, file: str, digest: str) -> str:

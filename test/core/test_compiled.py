@@ -15,6 +15,7 @@ from automax_ros.core import compiled
 PACKAGE = Path(automax_ros.__path__[0])
 HEAD = "\t".join(("automax_ros compiled", compiled.VERSION, EXTENSION_SUFFIXES[0]))
 TEXTS = {"drive/motor.py": b"MOTOR = 1\n", "core/types.py": b"TYPE = 1\n"}
+LIBRARY = b"no machine code"
 
 
 @pytest.fixture
@@ -29,13 +30,13 @@ def package(tmp_path):
 
 def index(folder, head=HEAD):
     folder.mkdir(exist_ok=True)
-    lines = [head, "group\tdrive", "library\tautomax_drive__mypyc\tdrive-1/library.so"]
-    lines.append("module\tautomax_ros.drive.motor\tdrive-1/shims.so")
+    lines = [head, "group\tdrive", f"library\tautomax_drive__mypyc\tdrive-1/library.so\t{len(LIBRARY)}"]
+    lines.append(f"module\tautomax_ros.drive.motor\tdrive-1/shims.so\t{len(LIBRARY)}")
     lines += [f"source\t{name}\t{compiled.source_digest(text)}" for name, text in TEXTS.items()]
     (folder / compiled.INDEX).write_text("\n".join(lines) + "\n")
     (folder / "drive-1").mkdir(exist_ok=True)
     for library in ("library.so", "shims.so"):
-        (folder / "drive-1" / library).write_bytes(b"no machine code")
+        (folder / "drive-1" / library).write_bytes(LIBRARY)
     return compiled.read_index(str(folder))
 
 
@@ -74,6 +75,15 @@ def test_without_its_libraries_the_python_file_runs(package, library):
     (package.parent / compiled.FOLDER / "drive-1" / library).unlink()
     assert found.find_spec("automax_ros.drive.motor") is None
     assert found.groups[0].stale.endswith(f"{library} is missing")
+
+
+@pytest.mark.parametrize("library", ["library.so", "shims.so"])
+def test_a_library_that_was_copied_by_half_is_never_loaded(package, library):
+    """It would end the process without a word."""
+    found = finder(package)
+    (package.parent / compiled.FOLDER / "drive-1" / library).write_bytes(LIBRARY[:7])
+    assert found.find_spec("automax_ros.drive.motor") is None
+    assert found.groups[0].stale.endswith(f"{library} has 7 bytes of 15")
 
 
 def test_with_a_library_that_cannot_be_loaded_the_python_file_runs_and_it_is_told(package, monkeypatch):
