@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from sweep.helpers import LOOP, RACK
 
-from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.writer import BagWriter
+from automax_ros.bags.data_file import DataFile
 from automax_ros.rack.rack import Rack
 
 from .support import Automax, Result
@@ -151,10 +150,13 @@ def test_ctrl_c_ends_a_run_that_is_recorded(sweep, automax, monkeypatch: pytest.
 
 
 def test_a_disk_that_is_full_is_told(sweep, monkeypatch: pytest.MonkeyPatch):
-    def refuse(*_: object) -> None:
-        raise RecordingError("AMX6801", "bag", "cannot be written: No space left on device")
+    def full(self: DataFile, data: bytes) -> int:
+        if self.tell() > 5_000:
+            raise OSError(28, "No space left on device")
+        return original(self, data)
 
-    monkeypatch.setattr(BagWriter, "write", refuse)
+    original = DataFile.write
+    monkeypatch.setattr(DataFile, "write", full)
     result = sweep("--vary", "LOOP.KP=1.3", "--record", "bag")
     assert result.code == 2
     assert "No space left on device" in result.err
