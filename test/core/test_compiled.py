@@ -79,7 +79,7 @@ def test_without_its_libraries_the_python_file_runs(package, library):
 
 @pytest.mark.parametrize("library", ["library.so", "shims.so"])
 def test_a_library_that_was_copied_by_half_is_never_loaded(package, library):
-    """It would end the process without a word."""
+    """It would end the process, and nothing would say why."""
     found = finder(package)
     (package.parent / compiled.FOLDER / "drive-1" / library).write_bytes(LIBRARY[:7])
     assert found.find_spec("automax_ros.drive.motor") is None
