@@ -47,7 +47,7 @@ def test_a_recording_in_blocks_has_the_messages_of_a_recording_in_order():
 def test_damaged_recordings_tell_the_same_messages_and_the_same_error(tmp_path: Path):
     data = (GOLDEN / "scans_0.mcap").read_bytes()
     outcomes = set()
-    for number in range(5 * len(CHANGES)):
+    for number in range(2 * len(CHANGES)):
         (tmp_path / "bag").mkdir(exist_ok=True)
         (tmp_path / "bag" / "metadata.yaml").write_bytes((GOLDEN / "metadata.yaml").read_bytes())
         changed = CHANGES[number % len(CHANGES)](bytearray(data), random.Random(f"blocks {number}"))

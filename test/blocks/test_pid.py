@@ -153,7 +153,7 @@ def programs(draw):
     return literals, rows
 
 
-@settings(repeatable, max_examples=800)
+@settings(repeatable, max_examples=400)
 @given(programs())
 def test_scan_by_scan_against_the_model(program):
     literals, rows = program

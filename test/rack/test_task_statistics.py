@@ -49,13 +49,19 @@ def test_counts_and_times_of_each_window_and_of_all(windows) -> None:
 
 
 class Host:
-    """A clock that each look and each scan moves on, and that stands where it is told to."""
+    """A clock that stands where it is told to; its stopwatch finds that each scan takes 0.4 ms."""
 
     def __init__(self) -> None:
         self.now_ns = 5 * NS_PER_S
         self.looks = 0
 
     def __call__(self) -> int:
+        return self.now_ns
+
+    def stopwatch(self) -> int:
+        self.looks += 1
+        if self.looks % 2 == 0:
+            self.now_ns += 400_000
         return self.now_ns
 
     def wait(self, seconds: float) -> None:
@@ -65,15 +71,7 @@ class Host:
 def test_execution_and_lateness_are_those_of_the_host(tmp_path) -> None:
     """Each scan takes 0.4 ms; one begins 1.5 ms late, one misses two deadlines and begins 2 ms after the third."""
     host = Host()
-    rack = Rack(build(tmp_path, YAML, SPEED=SPEED).config, stopwatch=host)
-    (task,) = rack.tasks
-    scan = task.scan
-
-    def slow(now_ns, skipped):
-        host.now_ns += 400_000
-        return scan(now_ns, skipped)
-
-    task.scan = slow
+    rack = Rack(build(tmp_path, YAML, SPEED=SPEED).config, stopwatch=host.stopwatch)
     pacer = Pacer(rack.scheduler, clock=host, wait=host.wait)
     pacer.begin()
     rack.start()

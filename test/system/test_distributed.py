@@ -84,7 +84,7 @@ def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_do
     rack = copied(tmp_path)
     with Distributed(rack) as run, Line() as line:
         line.until_it_scans()
-        for name, seat in (("processor_2", 2), ("udc_10", 10), ("common_memory", 0)):
+        for name, seat in (("processor_2", 2), ("common_memory", 0)):
             before, life = dict(line.values), line.processes[seat].process
             run.kill(name)
             line.until_new(seat, life)
@@ -95,11 +95,11 @@ def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_do
     assert (ended.code, ended.err.count("Traceback")) == (0, 0), ended
     report = run.report
     deaths = {name: told["deaths"] for name, told in report["processes"].items()}
-    assert deaths == dict.fromkeys(SEATS, 0) | {"processor_2": 1, "udc_10": 1, "common_memory": 1}
+    assert deaths == dict.fromkeys(SEATS, 0) | {"processor_2": 1, "common_memory": 1}
     for name, told in report["processes"].items():
         assert told["told"]
         assert not RING_COMMONS & set(told["differs"]), name
-    for name in ("processor_2", "udc_10", "common_memory"):
+    for name in ("processor_2", "common_memory"):
         assert f"{name} was ended by SIGKILL: it is started again in " in ended.out
     for ring in (1, 3, 4):
         halted = report["commons"][f"N_{ring}!"]

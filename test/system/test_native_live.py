@@ -103,6 +103,7 @@ def test_a_live_rack_scans_natively(ros_domain_id, rack):
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.soak
 def test_each_process_of_a_distributed_rack_scans_natively(ros_domain_id, rack):
     """Each process builds its own tasks, at the same time as the others, in one cache."""
     ended, bag = lived(rack, "--distributed")

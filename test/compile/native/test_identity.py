@@ -67,7 +67,7 @@ def check_blocks(blocks: list[Block], each: int, number: int, stretches: int, ca
 @pytest.mark.parametrize("on_a_rack", [True, False], ids=["on a rack", "on a UDC"])
 def test_every_block_is_the_same_in_c(on_a_rack: bool, tmp_path) -> None:
     blocks = [block for block in BLOCKS if (block in ON_A_RACK) is on_a_rack]
-    check_blocks(blocks, 2, 1, 15, NativeCache(tmp_path / "cache"))
+    check_blocks(blocks, 1, 1, 15, NativeCache(tmp_path / "cache"))
 
 
 @pytest.mark.soak
