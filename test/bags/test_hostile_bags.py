@@ -19,7 +19,7 @@ from automax_ros.wire.stream import RackStream
 from .live_racks import build
 
 ROOT = Path(__file__).parents[2]
-MUTANTS = 110
+MUTANTS = 220
 MEMORY_MB = 500
 COMMANDS = {"export", "bag repair", "bag info", "replay"}
 
