@@ -47,7 +47,7 @@ _T = TypeVar("_T")
 USUAL_DURATION_NS = 10 * NS_PER_S
 """How long a run takes without ``--duration`` (decision)."""
 _FEW = 16
-"""Fewer runs than these are done by this process alone unless ``--jobs`` is given: others take a second to begin."""
+"""Fewer runs than these are done by this process alone unless ``--jobs`` is given (decision: they end as soon)."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,7 +1,6 @@
-"""Pieces done by processes of this machine, each a fresh interpreter that gets one piece after the other.
+"""Pieces done by processes of this machine, each of which gets one piece after the other.
 
-Not by concurrent.futures: when one process dies its pool gives up all of them and cannot say which piece it was, and
-its processes execute the main script again, which not every script bears.
+Not by concurrent.futures: when one process dies its pool gives up all of them and cannot say which piece it was.
 """
 
 from __future__ import annotations
@@ -9,18 +8,15 @@ from __future__ import annotations
 import multiprocessing
 import multiprocessing.connection
 import pickle
-import subprocess
-import sys
 from collections import deque
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 
 from automax_ros.pieces.piece import MOST_TRIES, Done, Piece, PieceFault, death_of
+from automax_ros.pieces.processes import begin
 
 _POLL_S = 0.1
 """How often ``should_stop`` is asked."""
-_PROGRAM = "import sys; sys.path[:] = sys.argv[2:]; from automax_ros.pieces.worker import work; work(int(sys.argv[1]))"
-"""What a worker executes: nothing is imported from the folder in which it begins, only from where we import."""
 
 
 def in_processes(
@@ -76,25 +72,19 @@ def _take_from(
 
 
 def _begin(workers: dict[Connection, _Worker]) -> None:
-    worker = _Worker()
+    worker = _Worker(list(workers))
     workers[worker.end] = worker
 
 
 class _Worker:
     """A process that does one piece after the other; ``task`` is the piece under way and its try."""
 
-    def __init__(self) -> None:
+    def __init__(self, ends: list[Connection]) -> None:
+        """Begin it; ``ends`` are those of the connections to others."""
         self.end, other = multiprocessing.Pipe()
         self.task: tuple[int, int] | None = None
         with other:
-            # A session of its own: Ctrl-C at the terminal comes to us alone, and we end it.
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _PROGRAM, str(other.fileno()), *sys.path],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                pass_fds=(other.fileno(),),
-                start_new_session=True,
-            )
+            self._process = begin(other, [self.end, *ends])
 
     def give(self, pieces: Sequence[Piece], number: int, tries: int) -> None:
         """Let it do a piece; one that has died by now is found out when it is listened to."""
@@ -117,9 +107,9 @@ class _Worker:
 
     def kill(self) -> int:
         """End it at once; return its exit code, negative for a signal."""
-        self._process.kill()
+        code = self._process.kill()
         self.end.close()
-        return self._process.wait()
+        return code
 
 
 def _ending(code: int) -> str:

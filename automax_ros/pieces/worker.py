@@ -11,10 +11,10 @@ from multiprocessing.connection import Connection
 from automax_ros.pieces.piece import fault_of, result_of
 
 
-def work(number: int) -> None:
-    """Do the pieces that come over the connection of a file number; return when its other end is closed."""
-    threading.Thread(target=_end_when_alone, args=(number,), daemon=True).start()
-    with Connection(number) as end:
+def work(end: Connection) -> None:
+    """Do the pieces that come over a connection; return when its other end is closed."""
+    threading.Thread(target=_end_when_alone, args=(end.fileno(),), daemon=True).start()
+    with end:
         while True:
             try:
                 end.send_bytes(_answer(end.recv_bytes()))

@@ -7,11 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from weakref import WeakValueDictionary
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.replay.engine import Replay, ReplayOptions, Run
 from automax_ros.replay.joining import Carried
 from automax_ros.replay.totals import Totals
+
+_AT_HAND: WeakValueDictionary[bytes, Replay] = WeakValueDictionary()
+"""Replays that were packed here: a copy of this process has them ready, with their tasks compiled."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,9 @@ class PartResult:
 def packed(replay: Replay) -> bytes:
     """Return a replay as it is handed to other processes."""
     bag = replay.bag.resolve()
-    return pickle.dumps((bag, dict(replay.new), replay.options, (replay.rack, replay.facts)))
+    what = pickle.dumps((bag, dict(replay.new), replay.options, (replay.rack, replay.facts)))
+    _AT_HAND[what] = replay
+    return what
 
 
 def replay_part(what: bytes, part: Part) -> PartResult:
@@ -62,7 +68,7 @@ def replay_part(what: bytes, part: Part) -> PartResult:
     Raises:
         BagError: it cannot be read, or does not hold what the replay needs.
     """
-    replay = _unpacked(what)
+    replay = _AT_HAND.get(what) or _unpacked(what)
     files = len(replay.reader.files)
     base, entry = begun(replay, part.first)
     run = _run(replay, part)

@@ -35,6 +35,10 @@ class Blueprint:
         """Return that of a rack as it is installed."""
         return cls(rack.config.text, str(rack.config.path), tuple(rack.sources.items()), native)
 
+    def prepare(self) -> None:
+        """Compile the tasks, so that copies of this process need not."""
+        _installation(self)
+
     def rack(self, plants: Mapping[PlantNumber, str]) -> Rack:
         """Return a new rack with some other numbers of its plants.
 

@@ -48,6 +48,8 @@ def run_sweep(
     def rows_of(done: Done) -> list[Row]:
         return list(_rows(done, firsts[done.piece.name]))
 
+    if where.scheduler is None:
+        plan.blueprint.prepare()
     found = run_pieces(pieces, where, lambda done: on_rows(rows_of(done)), should_stop)
     return [row for done in found for row in rows_of(done)]
 

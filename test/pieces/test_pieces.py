@@ -129,11 +129,17 @@ def test_an_error_of_the_one_who_is_told_ends_all(tmp_path):
     assert is_gone(int((tmp_path / "7").read_text()))
 
 
+THREADS = {
+    "alone": "",
+    "thread": "import threading; threading.Thread(target=time.sleep, args=(600,), daemon=True).start()",
+    "thread unknown to threading": "import _thread; _thread.start_new_thread(time.sleep, (600,))",
+}
 PROGRAM = """
-import sys
+import sys, time
 sys.path.append(sys.argv[2])
 from automax_ros.pieces import Piece, Where, run_pieces
 from pieces import works
+{thread}
 try:
     run_pieces([Piece(str(n), works.long, (sys.argv[1], n)) for n in range(2)], Where(2))
 except KeyboardInterrupt:
@@ -141,12 +147,21 @@ except KeyboardInterrupt:
 """
 
 
+def program(text, *arguments):
+    return [sys.executable, "-c", text, *arguments, str(ROOT / "test")]
+
+
+@pytest.mark.parametrize("thread", ["alone", "thread"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_no_worker_outlives_the_one_that_gives_it_pieces(tmp_path, number):
+def test_no_worker_outlives_the_one_that_gives_it_pieces(tmp_path, number, thread):
     """Not even one that was killed; and a script without a guard of its own is not executed by its workers."""
-    command = [sys.executable, "-c", PROGRAM, str(tmp_path), str(ROOT / "test")]
     with subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        program(PROGRAM.format(thread=THREADS[thread]), str(tmp_path)),
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     ) as process:
         wait_until(lambda: len([file for file in tmp_path.iterdir() if file.read_text()]) == 2)
         os.killpg(process.pid, number)
@@ -154,6 +169,28 @@ def test_no_worker_outlives_the_one_that_gives_it_pieces(tmp_path, number):
     assert errors == ""
     assert output == ("interrupted\n" if number == signal.SIGINT else "")
     wait_until(lambda: all(is_gone(int(file.read_text())) for file in tmp_path.iterdir()))
+
+
+COPIED = """
+import atexit, sys, time
+sys.path.append(sys.argv[1])
+from automax_ros.pieces import Piece, Where, run_pieces
+from pieces import works
+works.marks.append(7)
+{thread}
+atexit.register(print, "at its end")
+print("begun")
+print([item.result for item in run_pieces([Piece(str(n), works.marked, (n,)) for n in range(4)], Where(2))])
+"""
+
+
+@pytest.mark.parametrize(("thread", "mark"), list(zip(THREADS, ("[7]", "[]", "[]"), strict=True)))
+def test_workers_are_copies_only_where_no_other_thread_runs(thread, mark):
+    """What the process itself does at its end, and has not printed yet, its copies do not."""
+    command = program(COPIED.format(thread=THREADS[thread]))
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S, check=True)
+    assert done.stdout == f"begun\n[{', '.join([mark] * 4)}]\nat its end\n"
+    assert done.stderr == ""
 
 
 def test_no_module_is_taken_from_the_folder_in_which_a_worker_begins(tmp_path, monkeypatch):

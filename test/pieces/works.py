@@ -5,6 +5,13 @@ import signal
 import time
 from pathlib import Path
 
+marks: list[int] = []
+"""What the process under test has put down: a copy of it has the same, a fresh interpreter has nothing."""
+
+
+def marked(_: int) -> list[int]:
+    return marks
+
 
 def squared(number: int) -> int:
     return number * number
