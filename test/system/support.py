@@ -16,6 +16,8 @@ RACKS = Path(__file__).parent / "racks"
 TYPES = RACKS / "types" / "rack.yaml"
 STUCK = RACKS / "stuck" / "rack.yaml"
 COMMAND = (sys.executable, "-m", "automax_ros.cli.main")
+MOST_SHOWN = 100
+"""Lines of a program's output that are shown where its test fails."""
 PATIENCE_S = 60.0
 """How long a condition may take on a busy machine before a test gives up."""
 
@@ -52,7 +54,11 @@ class Automax:
     def __enter__(self) -> "Automax":
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *error: object) -> None:
+        if error and error[0] is not None:
+            print(
+                f"{' '.join(map(str, self.process.args))} has said:", *self.out[-MOST_SHOWN:], *self.err[-MOST_SHOWN:]
+            )
         self.process.terminate()  # a process that is killed leaves its shared memory behind
         try:
             self.process.wait(10.0)
@@ -124,6 +130,9 @@ class Client:
     To find a running rack takes it up to 3 s, so tests share one and ``forget`` what they have subscribed to.
     """
 
+    patience_s = PATIENCE_S
+    """How long a condition may take."""
+
     def __init__(self, name: str = "client") -> None:
         from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
@@ -162,16 +171,21 @@ class Client:
 
     def until(self, condition: Callable[[], bool], what: str = "") -> None:
         """Serve the node until a condition is true."""
-        deadline = time.monotonic() + PATIENCE_S
+        deadline = time.monotonic() + self.patience_s
         while not condition():
             assert time.monotonic() < deadline, f"it never came true: {what or condition}"
             self.executor.spin_once(timeout_sec=0.05)
+            self.look()
+
+    def look(self) -> None:
+        """Take what comes by looking, if anything does, rather than by callbacks."""
 
     def spin(self, seconds: float) -> None:
         """Serve the node for a while: where nothing must happen, there is no condition to wait for."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self.executor.spin_once(timeout_sec=0.02)
+            self.look()
 
     def first(self, kind: Any, topic: str) -> Any:
         """Return what waits for late joiners on a latched topic."""
@@ -181,11 +195,14 @@ class Client:
 
     def send(self, kind: Any, topic: str, *messages: Any) -> None:
         """Publish messages once somebody listens."""
+        from rclpy.duration import Duration
+
         publisher = self.node.create_publisher(kind, topic, 10)
         self.until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
         for message in messages:
             publisher.publish(message)
-        publisher.wait_for_all_acked()
+        # A reader of a process that was killed stands in the graph for up to 20 s.
+        assert publisher.wait_for_all_acked(Duration(seconds=self.patience_s)), f"{topic} was not taken"
         self.node.destroy_publisher(publisher)
 
     def result(self, future: Any) -> Any:

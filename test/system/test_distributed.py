@@ -46,7 +46,7 @@ def recorded(bag: Path) -> list[Scan]:
     return [item.message for item in BagReader(bag).messages(types={NAMES[Scan]})]
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
     """The same stimuli give each scan the same inputs at the same rack time; at rest all images hold the same."""
     rack = copied(tmp_path, more=STOP)
@@ -79,7 +79,7 @@ def test_scans_are_those_of_one_process(ros_domain_id, tmp_path):
     assert seen_by(recorded(bag), config, line.began_ns).items() <= alone.items()
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_domain_id, tmp_path):
     rack = copied(tmp_path)
     with Distributed(rack) as run, Line() as line:
@@ -106,7 +106,7 @@ def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_do
         assert 0 < halted <= report["tasks"][f"RING_{ring}"]["scans"], "each scan of a life counts once"
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_stop_all_when_a_process_is_lost(ros_domain_id, tmp_path):
     rack = copied(tmp_path, rule="stop_all")
     with Distributed(rack, "--no-restart") as run, Line() as line:
