@@ -6,15 +6,23 @@ dispatches nothing. So it is tried once at the start, and replaced where it fail
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 _TRIAL_PERIOD_S = 0.001
 _TRIAL_LIMIT_S = 0.2
+_ANSWER_S = 0.5
+"""An executor that has not begun a task after this time is not spun, or by the thread that asks."""
+_PASS_S = 10.0
+"""Longest wait for one that is spun: it may be at a long callback."""
 
 
 def make_executor(context: Context) -> Any:
@@ -59,3 +67,24 @@ def dispatches(executor: Any, context: Context) -> bool:
         timer.cancel()
         executor.remove_node(node)
         node.destroy_node()
+
+
+def take_out(executor: Any, nodes: Iterable[Node], *, spun: bool = True) -> None:
+    """Take nodes out of an executor, and wait until a thread that spins it has let go of them: they may be destroyed.
+
+    Nothing is waited for where nobody spins it, which takes half a second to see unless ``spun`` says so.
+
+    rclpy's executors go on with the nodes that they have found at the beginning of a pass, and what is destroyed
+    meanwhile ends their thread by ``InvalidHandle``. A task is begun in a pass that found the nodes before or after
+    they were taken out; a second one, made when the first is done, in a later pass.
+    """
+    for node in nodes:
+        executor.remove_node(node)
+    if not spun:
+        return
+    with suppress(AttributeError, InvalidHandle):  # of an executor that was shut down
+        for limit_s in (_ANSWER_S, _PASS_S):
+            begun = threading.Event()
+            executor.create_task(begun.set)
+            if not begun.wait(limit_s):
+                return

@@ -110,7 +110,7 @@ class LiveRack:
     def close(self) -> None:
         """Stop the tasks, send what is still to be sent, destroy the nodes, and end ROS unless the caller does."""
         with self._process.resting():
-            self.nodes.close()
+            self.nodes.close(spun=False)
         self._leave()
 
     def _leave(self) -> None:

@@ -29,6 +29,7 @@ from automax_ros.core.types import Value
 from automax_ros.nodes.bus import RackBus, Seating
 from automax_ros.nodes.clock import RackClock
 from automax_ros.nodes.door import Door
+from automax_ros.nodes.executor import take_out
 from automax_ros.nodes.facts import run_facts
 from automax_ros.nodes.guarded_node import SIM_TIME, follows_clock
 from automax_ros.nodes.herald import Herald
@@ -272,8 +273,12 @@ class RackNodes:
         self._begin()
         self._pacer.run(until_ns, on_idle, should_stop)
 
-    def close(self) -> None:
-        """Stop the tasks, send what is still to be sent, and leave the graph; a second time this does nothing."""
+    def close(self, *, spun: bool = True) -> None:
+        """Stop the tasks, send what is still to be sent, and leave the graph; a second time this does nothing.
+
+        Args:
+            spun: whether a thread may be spinning the executor meanwhile, which then lets go of the nodes first.
+        """
         if self._closed:
             return
         self._closed = True
@@ -288,9 +293,10 @@ class RackNodes:
                 self._send_last()
         if self._desk is not None:
             self._desk.close()
-        for node in (*self.nodes, *self._own):
-            if self._executor is not None:
-                self._executor.remove_node(node)
+        nodes = (*self.nodes, *self._own)
+        if self._executor is not None:
+            take_out(self._executor, nodes, spun=spun)
+        for node in nodes:
             node.destroy_node()
         self._door.close()
 

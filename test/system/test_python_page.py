@@ -16,7 +16,11 @@ EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read
 SIMULATED, OPERATED, REAL_TIME, IN_ROS, TWO_RACKS = EXAMPLES
 
 
-def ran(program: str, domain: int) -> str:
+LEAVES = re.compile(r"\[WARN\] \[[0-9.]+\] \[line1\.network_5\]: network PAPER: code C: nothing comes from drops 3\n")
+"""What the line says of the winder where that leaves the network long before the line does."""
+
+
+def ran(program: str, domain: int, may_say: re.Pattern[str] | None = None) -> str:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     result = subprocess.run(
         [sys.executable, "-c", program],
@@ -27,7 +31,8 @@ def ran(program: str, domain: int) -> str:
         timeout=100,
         check=False,
     )
-    assert (result.returncode, result.stderr) == (0, "")
+    said = result.stderr if may_say is None else may_say.sub("", result.stderr, count=1)
+    assert (result.returncode, said) == (0, "")
     return result.stdout
 
 
@@ -57,4 +62,4 @@ def test_a_rack_in_a_process_and_executor_of_its_user(ros_domain_id):
 @pytest.mark.timeout(110)
 def test_two_racks_in_one_process_and_an_executor_with_threads(ros_domain_id):
     """What the winder knows of the line came over their network; the executor's thread has ended."""
-    assert int(ran(TWO_RACKS, ros_domain_id)) > 10
+    assert int(ran(TWO_RACKS, ros_domain_id, LEAVES)) > 10
