@@ -33,8 +33,11 @@ from compiled_groups import GROUPS, PACKAGE, ROOT, Group
 sys.path.insert(0, str(ROOT))
 from automax_ros.core import compiled
 
-FLAGS = ("-O2", "-ffp-contract=off", "-fno-fast-math", "-fwrapv", "-fPIC", "-DNDEBUG", "-g0", "-w")
-"""Nothing that changes a result: no fused multiply-add, no reordered sums, integers wrap as in Python's own build."""
+FLAGS = ("-O2", "-ffp-contract=off", "-fno-fast-math", "-fwrapv", "-fPIC", "-fvisibility=hidden", "-DNDEBUG", "-g0", "-w")
+"""Nothing that changes a result: no fused multiply-add, no reordered sums, integers wrap as in Python's own build. What
+is hidden is called directly, and may be inlined."""
+PART_BYTES = 600_000
+"""C that is compiled at once: headers are read a few times, modules are inlined in each other, all cores have work."""
 TOOLS = ("build_compiled.py", "compiled_translate.py")
 NICE = 5
 
@@ -127,12 +130,12 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
         work = Path(temporary)
         facts = translated(group, work)
         include = [f"-I{work}", f"-I{sysconfig.get_path('include')}"]
-        objects = sorted([*facts["c"], *facts["runtime"], *facts["shims"].values()],
-                         key=lambda file: -(work / file).stat().st_size)  # fmt: skip
+        library_parts = parts(work, [*facts["c"], *facts["runtime"]])
+        objects = [*library_parts, *facts["shims"].values()]
         list(pool.map(lambda file: run([*compiler.compile, *include, "-c", file, "-o", f"{file}.o"], work), objects))
         suffix = EXTENSION_SUFFIXES[0]
         library = f"{facts['library']}{suffix}"
-        run([*compiler.link, *(f"{file}.o" for file in [*facts["c"], *facts["runtime"]]), "-o", library], work)
+        run([*compiler.link, *(f"{file}.o" for file in library_parts), "-o", library], work)
         for file in facts["shims"].values():
             run([*compiler.link, f"{file}.o", "-o", f"{file[:-2]}{suffix}"], work)
         lines = [f"group\t{group.name}", f"library\t{facts['library']}\t{placed(work, name, library)}"]
@@ -150,6 +153,21 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
             shutil.copy(path, target)
         (target / compiled.INDEX).write_text("\n".join(lines) + "\n", encoding="utf-8")
     return lines
+
+
+def parts(work: Path, files: Sequence[str]) -> list[str]:
+    """Write files that include about PART_BYTES of C each, in the order of ``files``; return their names."""
+    divided: list[list[str]] = []
+    size = PART_BYTES
+    for file in files:
+        if size >= PART_BYTES:
+            divided.append([])
+            size = 0
+        divided[-1].append(file)
+        size += (work / file).stat().st_size
+    for number, part in enumerate(divided):
+        (work / f"part_{number}.c").write_text("".join(f'#include "{file}"\n' for file in part), encoding="utf-8")
+    return [f"part_{number}.c" for number in range(len(divided))]
 
 
 def placed(work: Path, folder: str, file: str) -> str:

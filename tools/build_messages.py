@@ -58,10 +58,11 @@ def source_fingerprint() -> str:
     for path in sorted([*definitions, *tools]):
         content = path.read_bytes()
         digest.update(f"{path.name} {len(content)} ".encode() + content)
+    # pip may be at work on other packages: one that is not whole yet has no name.
     versions = sorted(
         f"{name} {distribution.version}"
         for distribution in metadata.distributions()
-        if (name := distribution.metadata["Name"]).startswith(("ros-", "numpy"))
+        if (name := distribution.metadata["Name"] or "").startswith(("ros-", "numpy"))
     )
     if not any(version.startswith("ros-rosidl-generator-py ") for version in versions):
         raise BuildError(f"no ROS 2 wheels in {PREFIX}: run `make setup` and start this with .venv/bin/python")

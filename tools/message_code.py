@@ -5,12 +5,15 @@ The generators are those of the distribution, taken from PyPI; nothing is comput
 """
 
 import contextlib
+import copy
 import io
 import json
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 # rclpy loads the C type support, which finds the one of its middleware by name at run time.
 TYPE_SUPPORTS = ["rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"]
@@ -46,11 +49,35 @@ class Interfaces:
 
 def generate(package: Interfaces) -> None:
     """Write the code of all generators under `package.output`, on all cores."""
+    _parse_once()
     _write_share(package)
     generators = [_generate_c, _generate_fastrtps, _generate_introspection, _generate_dispatch, _generate_python]
-    with ProcessPoolExecutor() as pool:
+    # Forked: each process has what is parsed already.
+    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
         for job in [pool.submit(_quietly, generator, package) for generator in generators]:
             job.result()
+
+
+def _parse_once() -> None:
+    """Let the generators share the trees of the .idl files: each reads every file, which takes longer than its own work.
+
+    To be called before a generator is imported: they take the parser's function by its name.
+    """
+    from rosidl_parser import parser
+
+    if hasattr(parser.parse_idl_file, "trees"):
+        return
+    parse = parser.parse_idl_file
+    trees: dict[Path, Any] = {}
+
+    def parse_idl_file(locator: Any, png_file: str | None = None) -> Any:
+        path = locator.get_absolute_path()
+        if path not in trees:
+            trees[path] = parse(locator, png_file)
+        return copy.deepcopy(trees[path])
+
+    parse_idl_file.trees = trees  # type: ignore[attr-defined]
+    parser.parse_idl_file = parse_idl_file
 
 
 def _write_share(package: Interfaces) -> None:

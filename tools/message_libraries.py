@@ -5,6 +5,7 @@ import shlex
 import shutil
 import subprocess
 import sysconfig
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,15 @@ class Library:
     uses: tuple[str, ...]  # the package's own libraries, by suffix
     ros: tuple[str, ...]  # ROS libraries
     extension: bool = False  # a Python extension module rather than a library
+    alone: str = ""  # what cannot be compiled together with others: its names of file scope are those of others too
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What one call of the compiler compiles: sources of one library, one after the other."""
+
+    text: Path
+    object: Path
 
 
 def _each(pattern: str) -> tuple[str, ...]:
@@ -33,7 +43,9 @@ def _each(pattern: str) -> tuple[str, ...]:
 
 # In the order of linking: each is linked against those before it.
 LIBRARIES = {
-    "rosidl_generator_c": Library("rosidl_generator_c", _each("detail/*.c"), (), ("rosidl_runtime_c", "rcutils")),
+    "rosidl_generator_c": Library(
+        "rosidl_generator_c", _each("detail/*.c"), (), ("rosidl_runtime_c", "rcutils"), alone="__description.c"
+    ),
     "rosidl_typesupport_c": Library(
         "rosidl_typesupport_c", _each("*.cpp"), ("rosidl_generator_c",), ("rosidl_typesupport_c", "rosidl_runtime_c")
     ),
@@ -61,6 +73,8 @@ LIBRARIES = {
     ),
 }
 
+# Small enough that two cores and more share the work.
+PART_BYTES = 250_000
 COMPILERS = {".c": ("CC", "gcc", "-std=gnu11"), ".cpp": ("CXX", "g++", "-std=c++17")}
 
 
@@ -71,12 +85,12 @@ def build_libraries(package: Interfaces) -> list[Path]:
         BuildError: a compiler or Python's headers are missing, or the compiler reports an error.
     """
     check_tools()
-    jobs = [(library, source) for library in LIBRARIES.values() for source in _sources(package, library)]
+    units = {suffix: _units(package, suffix, library) for suffix, library in LIBRARIES.items()}
     flags = _include_flags(package)
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        for job in [pool.submit(_compile, package, library, source, flags) for library, source in jobs]:
+        for job in [pool.submit(_compile, unit, flags) for each in units.values() for unit in each]:
             job.result()
-    return [_link(package, suffix, library) for suffix, library in LIBRARIES.items()]
+    return [_link(package, suffix, library, units[suffix]) for suffix, library in LIBRARIES.items()]
 
 
 def check_tools() -> None:
@@ -122,20 +136,41 @@ def _include_flags(package: Interfaces) -> list[str]:
     return own + [f"-isystem{path}" for path in foreign]
 
 
-def _object(package: Interfaces, library: Library, source: Path) -> Path:
-    name = "__".join(source.relative_to(package.code(library.generator)).parts)
-    return package.output / "objects" / library.generator / f"{name}.o"
+def _units(package: Interfaces, suffix: str, library: Library) -> list[Unit]:
+    """Divide a library's sources into what is compiled at once, so that headers are read a few times, not a hundred."""
+    folder = package.output / "objects" / suffix
+    folder.mkdir(parents=True, exist_ok=True)
+    sources = _sources(package, library)
+    alone = [source for source in sources if library.alone and source.name.endswith(library.alone)]
+    units = [Unit(source, folder / f"{source.parent.parent.name}__{source.name}.o") for source in alone]
+    for number, part in enumerate(_parts([source for source in sources if source not in alone])):
+        text = folder / f"part_{number}{part[0].suffix}"
+        text.write_text("".join(f'#include "{source.resolve()}"\n' for source in part))
+        units.append(Unit(text, text.with_suffix(".o")))
+    return units
 
 
-def _compile(package: Interfaces, library: Library, source: Path, flags: list[str]) -> None:
-    target = _object(package, library, source)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    standard = COMPILERS[source.suffix][2]
+def _parts(sources: Sequence[Path]) -> list[list[Path]]:
+    """Divide sources in their order into parts of about PART_BYTES."""
+    parts: list[list[Path]] = []
+    size = PART_BYTES
+    for source in sources:
+        if size >= PART_BYTES:
+            parts.append([])
+            size = 0
+        parts[-1].append(source)
+        size += source.stat().st_size
+    return parts
+
+
+def _compile(unit: Unit, flags: list[str]) -> None:
+    standard = COMPILERS[unit.text.suffix][2]
     # -O1: the messages are a few dozen bytes each; -O2 gains nothing measurable and takes twice as long.
-    _run([*_compiler(source.suffix), standard, "-O1", "-fPIC", "-w", *flags, "-c", str(source), "-o", str(target)])
+    command = [*_compiler(unit.text.suffix), standard, "-O1", "-fPIC", "-w", *flags]
+    _run([*command, "-c", str(unit.text), "-o", str(unit.object)])
 
 
-def _link(package: Interfaces, suffix: str, library: Library) -> Path:
+def _link(package: Interfaces, suffix: str, library: Library, units: Sequence[Unit]) -> Path:
     libraries = package.output / "lib"
     libraries.mkdir(exist_ok=True)
     if library.extension:
@@ -144,7 +179,7 @@ def _link(package: Interfaces, suffix: str, library: Library) -> Path:
     else:
         target = libraries / f"lib{package.name}__{suffix}.so"
         dependencies = [f"{name}__{suffix}" for name in package.dependencies]
-    objects = [str(_object(package, library, source)) for source in _sources(package, library)]
+    objects = [str(unit.object) for unit in units]
     needed = [*(f"{package.name}__{own}" for own in library.uses), *dependencies, *library.ros]
     folders = [f"-L{libraries}", f"-L{package.prefix / 'lib'}", *_search_at_link_time(package.prefix)]
     names = [f"-l{name}" for name in needed]

@@ -42,6 +42,31 @@ fingerprint() {
     } | sha256sum
 }
 
+# pip is told not to compile: it does so on one core, and compiles tests that nobody imports.
+install() {
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile "$@"
+}
+
+# What the messages are built with: a line each of setup.cfg.
+needed_by_messages() {
+    "$venv/bin/python" - <<'END'
+from configparser import RawConfigParser
+
+parser = RawConfigParser()
+parser.read("setup.cfg", encoding="utf-8")
+extras = parser["options.extras_require"]
+for text in (parser["options"]["install_requires"], extras["ros"], extras["build"]):
+    print(text.strip())
+END
+}
+
+# Programs start in half the time, also where Python is told not to write what it has compiled. Not all that others
+# wrote can be compiled: that does not matter.
+compile_python() {
+    "$venv/bin/python" -m compileall -qq -j 0 -x '/tests?/' "$venv/lib" || true
+    "$venv/bin/python" -m compileall -q -j 0 automax_ros
+}
+
 # The hot modules as machine code: built again when their sources have changed, left out where plain Python is wanted.
 compile_ahead() {
     [ "${AUTOMAX_COMPILED-}" = off ] || "$venv/bin/python" tools/build_compiled.py ||
@@ -75,9 +100,17 @@ if ! supported "$venv/bin/python" || ! grep -qs "$venv/bin" "$venv/bin/pip"; the
 fi
 rm -f "$stamp"
 echo "installing dependencies into .venv (about a minute the first time) ..."
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[ros,build,plot,docs,test]'
+needed_by_messages >"$venv/needed.txt"
+install -r "$venv/needed.txt"
+# The messages are compiled while pip, which mostly waits, brings the rest. An interrupted setup lets pip end what it has
+# begun: half a package would look like a whole one. pip holds the lock until then.
+trap wait EXIT
+install --use-pep517 --editable '.[ros,build,plot,docs,test]' &
+rest=$!
 "$venv/bin/python" tools/build_messages.py
-# Programs start in half the time, also where Python is told not to write what it has compiled.
-"$venv/bin/python" -m compileall -q -j 0 automax_ros
+wait "$rest"
+# Once more, should the rest have brought another version of what they were built with: quick where it has not.
+"$venv/bin/python" tools/build_messages.py
+compile_python
 echo "$current" >"$stamp"
 compile_ahead
