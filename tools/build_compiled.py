@@ -33,7 +33,10 @@ from compiled_groups import GROUPS, PACKAGE, ROOT, Group
 sys.path.insert(0, str(ROOT))
 from automax_ros.core import compiled
 
-FLAGS = ("-O2", "-ffp-contract=off", "-fno-fast-math", "-fwrapv", "-fPIC", "-fvisibility=hidden", "-DNDEBUG", "-g0", "-w")
+FLAGS = (
+    *("-O2", "-ffp-contract=off", "-fno-fast-math", "-fwrapv"),
+    *("-fPIC", "-fvisibility=hidden", "-DNDEBUG", "-g0", "-w"),
+)
 """Nothing that changes a result: no fused multiply-add, no reordered sums, integers wrap as in Python's own build. What
 is hidden is called directly, and may be inlined."""
 PART_BYTES = 600_000

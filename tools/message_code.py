@@ -59,7 +59,7 @@ def generate(package: Interfaces) -> None:
 
 
 def _parse_once() -> None:
-    """Let the generators share the trees of the .idl files: each reads every file, which takes longer than its own work.
+    """Let the generators share the trees of the .idl files: reading these takes each longer than its own work.
 
     To be called before a generator is imported: they take the parser's function by its name.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import json
+import re
 from pathlib import Path
 from types import ModuleType
 
@@ -84,6 +85,46 @@ def test_services_are_built_with_the_fields_of_their_definitions(path: Path) -> 
     for part, text in zip((service.Request, service.Response), path.read_text().split("---"), strict=True):
         lines = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
         assert list(part.get_fields_and_field_types()) == [name for _, name in lines]
+
+
+def test_each_generator_gets_a_copy_of_what_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A generator that changes its tree changes no other's, and the file is read once."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    parser, definition = (
+        importlib.import_module("rosidl_parser.parser"),
+        importlib.import_module("rosidl_parser.definition"),
+    )
+    read: list[object] = []
+
+    def parse(locator: object, png_file: str | None = None) -> list[object]:
+        read.append(locator)
+        return [str(locator.get_absolute_path())]
+
+    monkeypatch.setattr(parser, "parse_idl_file", parse)
+    importlib.import_module("message_code")._parse_once()
+    places = [definition.IdlLocator(tmp_path, f"msg/{name}.idl") for name in ("One", "Two", "One")]
+    trees = [parser.parse_idl_file(place) for place in places]
+    trees[0].append("changed")
+    assert trees[1:] == [[str(tmp_path / "msg" / "Two.idl")], [str(tmp_path / "msg" / "One.idl")]]
+    assert read == places[:2]
+
+
+@pytest.mark.parametrize("name", ["message_libraries", "build_compiled"])
+def test_parts_that_are_compiled_at_once_have_each_source_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    tool = importlib.import_module(name)
+    monkeypatch.setattr(tool, "PART_BYTES", 100)
+    sizes = {"a.c": 60, "b.c": 60, "c.c": 10, "d.c": 200, "e.c": 5}
+    for file, size in sizes.items():
+        (tmp_path / file).write_text("x" * size)
+    if name == "message_libraries":
+        found = [[path.name for path in part] for part in tool._parts([tmp_path / file for file in sizes])]
+    else:
+        texts = [(tmp_path / part).read_text() for part in tool.parts(tmp_path, list(sizes))]
+        found = [re.findall(r'#include "(.*)"', text) for text in texts]
+    assert found == [["a.c", "b.c"], ["c.c", "d.c"], ["e.c"]]
 
 
 @pytest.mark.soak
