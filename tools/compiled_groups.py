@@ -34,13 +34,16 @@ _COLD = ("steady", "drive_case", "drive_rules", "gain_rules", "nameplate", "limi
 """What a drive's tools ask once: compiling takes longer than it saves."""
 
 _SCANS = (
+    "running/processor_time.py",
     "running/scan_record.py",
+    "running/scan_under_way.py",
     "running/scheduler.py",
     "running/task.py",
     "running/task_io.py",
     "running/views.py",
     "rack/observers.py",
     "rack/scheduled_task.py",
+    "rack/task_statistics.py",
 )
 """What each scan goes through."""
 _RECORDING = (

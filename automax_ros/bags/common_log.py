@@ -60,7 +60,7 @@ class CommonLog:
         """
         own = self.facts.table
         if (table.rack, table.run_id) != (own.rack, own.run_id):
-            text = f"holds more than one run: of {own.rack[:40]} and {table.rack[:40]}"
+            text = f"holds more than one run: of {_run_text(own)} and of {_run_text(table)}"
             raise BagError("AMX6822", self._bag, text)
 
     def take(self, message: CommonImage | CommonWrite) -> list[Entry] | None:
@@ -187,6 +187,11 @@ class WatchedValues:
         shown.update(changed)
         self._told.clear()
         return changed
+
+
+def _run_text(table: VariableTable) -> str:
+    """Return which run a table of variables is of: two racks, or runs of one, may have the same name."""
+    return f"{table.rack[:40]} (run {table.run_id}, its table at {seconds_text(table.stamp)} s)"
 
 
 def variables_of(bag: Path, table: VariableTable) -> dict[str, Variable]:

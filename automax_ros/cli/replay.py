@@ -107,7 +107,9 @@ def _replayed(replay: Replay, where: Where, arguments: argparse.Namespace) -> Re
     for source, diagnostics in replay.warnings:
         print_diagnostics(diagnostics, source, sys.stderr)
     with share_shown("replay") as show:
-        report = replay_side_by_side(replay, where, show)
+        notes: list[str] = []
+        report = replay_side_by_side(replay, where, show, notes.append)
+    sys.stderr.writelines(f"automax replay: {note}\n" for note in notes)
     if arguments.verbose:
         sys.stderr.writelines(f"{text}\n" for text in replay.native)
     if arguments.json:

@@ -15,16 +15,19 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from automax_ros.pieces.attempt import Answer, Refusal, attempt
-from automax_ros.pieces.connecting import client_of
+from automax_ros.pieces.connecting import client_of, within
 from automax_ros.pieces.faults import ClusterFault
 from automax_ros.pieces.installation import Installation, installation
 from automax_ros.pieces.piece import Done, Piece, PieceFault, death_of, fault_of
 
 WITHOUT_WORKERS_S = 300
 """How long a cluster may be without any worker, s (decision): some begin workers only when there is work."""
+SAME_S = 60
+"""How long all workers together may take to tell what is installed there, s (decision)."""
 _POLL_S = 0.1
 _LOOK_S = 2.0
 _SAME = "install the same version on all machines, and start the workers again"
+_SAME_MACHINE = "let all machines have the same Python, NumPy and C library, on processors of one kind"
 _LOGGERS = ("distributed.client", "distributed.core", "distributed.comm", "distributed.batched", "distributed.utils")
 
 
@@ -89,9 +92,15 @@ class _Cluster:
         """Make sure that each worker that is there has the installation that we have.
 
         Raises:
-            ClusterFault: one has another, or none.
+            ClusterFault: one has another, or none, or does not answer.
         """
-        for worker, found in self._client.run(installation, on_error="return").items():
+        try:
+            answers = within(SAME_S, lambda: self._client.run(installation, on_error="return"))
+        except TimeoutError:
+            what = f"not every worker of the cluster has told within {SAME_S} s what is installed there"
+            hint = "one hangs, or its machine does: end it; what is not there is not asked"
+            raise ClusterFault("AMX7941", self._scheduler, what, hint) from None
+        for worker, found in answers.items():
             if found != self._own:
                 raise self._unlike(worker, found)
 
@@ -149,11 +158,25 @@ class _Cluster:
                 self._client.cancel(futures, force=True)
 
     def _unlike(self, worker: str, found: object) -> ClusterFault:
-        if isinstance(found, Installation):
+        if not isinstance(found, Installation):
+            what = f"worker {worker} cannot import automax_ros as it is here: {found}"
+        elif (found.version, found.sources) != (self._own.version, self._own.sources):
             what = f"worker {worker} has automax_ros {found}, here is {self._own}"
         else:
-            what = f"worker {worker} cannot import automax_ros as it is here: {found}"
+            return ClusterFault("AMX7940", self._scheduler, _other_machine(worker, found, self._own), _SAME_MACHINE)
         return ClusterFault("AMX6854", self._scheduler, what, _SAME)
+
+
+def _other_machine(worker: str, found: Installation, own: Installation) -> str:
+    """Say in what a worker with the same sources differs."""
+    if found.python != own.python:
+        return f"worker {worker} has {found.python}, here is {own.python}"
+    if found.numpy != own.numpy:
+        return f"worker {worker} has NumPy {found.numpy}, here is {own.numpy}"
+    return (
+        f"worker {worker} computes sine, exponential or the like with other last bits than this machine "
+        f"(results {found.results[:12]}, here {own.results[:12]})"
+    )
 
 
 def _fault(piece: Piece, error: Exception) -> PieceFault:

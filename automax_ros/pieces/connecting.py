@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from concurrent import futures
-from typing import Any
+from typing import Any, TypeVar
 
 from automax_ros.pieces.faults import ClusterFault
 
+_T = TypeVar("_T")
 CONNECT_S = 10
 """How long a scheduler may take to answer, s (decision)."""
 _MORE_S = 5
@@ -41,6 +43,27 @@ def client_of(scheduler: str) -> Any:
             continue
     what = "the Dask scheduler was not asked: this machine is too busy for Dask to begin a thread within 10 s"
     raise ClusterFault("AMX6852", scheduler, what, "give the command again when less is going on here")
+
+
+def within(seconds: float, ask: Callable[[], _T]) -> _T:
+    """Return what a question to a cluster brings; of Dask's own questions some wait for ever.
+
+    Raises:
+        TimeoutError: there is no answer within the time.
+    """
+    answer: futures.Future[_T] = futures.Future()
+    threading.Thread(target=_answer, args=(ask, answer), daemon=True).start()
+    try:
+        return answer.result(seconds)
+    except futures.TimeoutError as error:
+        raise TimeoutError from error
+
+
+def _answer(ask: Callable[[], _T], answer: futures.Future[_T]) -> None:
+    try:
+        answer.set_result(ask())
+    except BaseException as error:
+        answer.set_exception(error)
 
 
 def _begin(kind: Any, scheduler: str, begun: futures.Future[Any]) -> None:

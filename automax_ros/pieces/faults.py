@@ -7,7 +7,10 @@ from automax_ros.core.text import printable
 
 
 class ClusterFault(Fault):
-    """Pieces cannot be handed to a cluster: ``code`` is AMX6851 to AMX6854, ``place`` the scheduler's address."""
+    """Pieces cannot be handed to a cluster: ``place`` is the scheduler's address.
+
+    ``code`` is AMX6851 to AMX6854, AMX7940 or AMX7941.
+    """
 
     def __init__(self, code: str, place: str, message: str, hint: str) -> None:
         super().__init__(printable(message), printable(hint), code=code, place=printable(place))

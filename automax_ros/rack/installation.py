@@ -176,7 +176,10 @@ class Installation:
     def _compile(self, task: str, program: Program) -> CompiledTask:
         modeled = self._config.execution is Timing.MODELED
         costs = cost_model(self._module(task)) if modeled else CostModel(Model.NONE)
-        return compile_program(program, self._views, costs)
+        compiled = compile_program(program, self._views, costs)
+        if modeled:  # the form that is executed: else it would be compiled amid the task's first scan
+            _ = compiled.burst_steps if program.kind is TaskKind.BASIC else compiled.scan_steps
+        return compiled
 
     def _module(self, task: str) -> ModuleConfig:
         return next(module for module, item in self._config.placed_tasks if item.name == task)

@@ -10,7 +10,7 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.task_statistics import TaskStatistics
 from automax_ros.rack.triggers import Due, MakeTrigger
 from automax_ros.running.execution import Execution, Ideal, Steps
-from automax_ros.running.modeled_scan import Progress
+from automax_ros.running.scan_under_way import Progress
 from automax_ros.running.scheduler import Scheduler
 from automax_ros.running.task import OVERLAP, ScanRecord, Status, Task
 

@@ -24,11 +24,16 @@ LEAST_PART_BYTES = 16 << 20
 
 They are handed out in their order: the first one that differs ends the work, and the last is the shortest as a rule.
 """
+ONE_PART = "the recording is one part, so it is replayed here: a cluster does the files of a split recording"
 Progress = Callable[[float], None]
 
 
-def replay_side_by_side(replay: Replay, where: Where, on_progress: Progress | None = None) -> ReplayReport:
+def replay_side_by_side(
+    replay: Replay, where: Where, on_progress: Progress | None = None, on_note: Callable[[str], None] = lambda _: None
+) -> ReplayReport:
     """Replay a recording; its files side by side where there are several, and where that is worth it.
+
+    ``on_note`` is told where a cluster was named and is not used: one part is executed here (decision).
 
     Raises:
         BagError: the recording cannot be read, or not by a worker of the cluster, or does not hold what is needed.
@@ -36,6 +41,8 @@ def replay_side_by_side(replay: Replay, where: Where, on_progress: Progress | No
     """
     parts = [] if where.scheduler is None and where.processes == 1 else parts_of(replay)
     if len(parts) < 2:
+        if where.scheduler is not None:
+            on_note(ONE_PART)
         return replay.run(on_progress)
     return _SideBySide(replay, parts, on_progress or (lambda _: None)).run(where)
 

@@ -24,8 +24,8 @@ from automax_ros.running.drive_record import noted_command, noted_measured, note
 from automax_ros.running.drives import DriveAccess, DrivePort, Drives
 from automax_ros.running.error_log import LOG_NUMBERS
 from automax_ros.running.events import Events
-from automax_ros.running.modeled_scan import Begun
 from automax_ros.running.scan_record import ScanRecord, Status
+from automax_ros.running.scan_under_way import Begun
 from automax_ros.running.task import Task
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.views import Memory

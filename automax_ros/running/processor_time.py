@@ -9,7 +9,7 @@ from automax_ros.running.execution import Job, Place, Steps
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False)
 class _Frame:
     """A job under way: ``remaining_ns`` of execution before its next step; ``steps`` None before its first."""
 
@@ -141,11 +141,15 @@ class ProcessorTime:
         """Go on with what is first when it has had its time, unless it goes on by itself."""
         if self._frames and not self._going:
             self._since_ns = now_ns
-            event, self._spare = self._spare or ScheduledEvent(self._key, self._goes_on), None
+            event = self._spare
+            self._spare = None
+            if event is None:
+                event = ScheduledEvent(self._key, self._goes_on)
             self._event = self._scheduler.post(now_ns + self._frames[0].remaining_ns, event)
 
     def _goes_on(self, now_ns: int, _: int) -> None:
-        self._event, self._spare = None, self._event
+        self._spare = self._event
+        self._event = None
         self._frames[0].remaining_ns = 0
         self._go(now_ns)
 

@@ -15,16 +15,9 @@ from automax_ros.language.syntax.tree import Scope
 from automax_ros.running.backplane import NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.events import Events
-from automax_ros.running.modeled_scan import (
-    Begun,
-    HeardMemory,
-    Progress,
-    ScanUnderWay,
-    add_error,
-    cleared_errors,
-    scan_in_steps,
-)
+from automax_ros.running.modeled_scan import scan_in_steps
 from automax_ros.running.scan_record import ScanRecord, Status, Steps
+from automax_ros.running.scan_under_way import Begun, HeardMemory, Progress, ScanUnderWay, add_error, cleared_errors
 from automax_ros.running.snapshot import snapshot_layout
 from automax_ros.running.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
 from automax_ros.running.tunable_value import tunable_value

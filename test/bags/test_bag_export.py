@@ -169,9 +169,16 @@ def test_a_gap_in_the_write_log(tmp_path: Path) -> None:
     assert failure(tmp_path, [*LOG[:3], LOG[5]]) == "AMX6823 writes 2 to 3 are missing before 0.01 s"
 
 
-@pytest.mark.parametrize("other", [TABLE._replace(run_id=1), TABLE._replace(rack="LINE2")])
-def test_two_runs_in_one_recording(tmp_path: Path, other: VariableTable) -> None:
-    assert failure(tmp_path, [LOG[0], LOG[0], (VARIABLES, other)]).startswith("AMX6822")
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        (TABLE._replace(run_id=1, stamp=2_500_000_000), "LINE1 (run 1, its table at 2.5 s)"),
+        (TABLE._replace(rack="LINE2"), "LINE2 (run 77, its table at 0 s)"),
+    ],
+)
+def test_two_runs_in_one_recording(tmp_path: Path, other: VariableTable, told: str) -> None:
+    found = failure(tmp_path, [LOG[0], LOG[0], (VARIABLES, other)])
+    assert found == f"AMX6822 holds more than one run: of LINE1 (run 77, its table at 0 s) and of {told}"
 
 
 @pytest.mark.parametrize(

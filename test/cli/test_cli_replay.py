@@ -50,6 +50,15 @@ def test_difference_is_1_and_tells_scan_time_values_and_line(automax, bag):
     assert row.split()[:9] == ["SPEED", "OUT%", "(counts)", "130", "38", "0.2035", "26", "27", "+18"]
 
 
+def test_a_cluster_that_is_not_used_is_told(automax, bag):
+    result, alone = automax("replay", bag, "--scheduler", "tcp://127.0.0.1:1"), automax("replay", bag)
+    assert (result.code, result.out) == (0, alone.out)
+    assert result.err == (
+        "automax replay: the recording is one part, so it is replayed here: "
+        "a cluster does the files of a split recording\n"
+    )
+
+
 def test_json(automax, bag):
     result = automax("replay", bag, "--task", f"SPEED={automax.write('SPEED.BLK', STRONGER)}", "--json")
     data = json.loads(result.out)

@@ -1,10 +1,13 @@
 """Pieces done by a Dask cluster: a real scheduler and real workers, which die, and are of another version."""
 
 import gc
+import platform
+import re
 import signal
 import socket
 import sys
 
+import numpy as np
 import pytest
 
 pytest.importorskip("distributed", reason="needs automax_ros[cluster]")
@@ -101,20 +104,54 @@ def test_a_worker_killed_from_outside_costs_a_second_try(tmp_path):
         assert found.workers[0].wait() == -signal.SIGKILL
 
 
-@pytest.mark.parametrize(
-    ("before", "message"),
-    [
-        ("import automax_ros; automax_ros.__version__ = '0.0.9'", r"has automax_ros 0\.0\.9 \(sources [0-9a-f]{12}\)"),
-        ("sys.modules['automax_ros'] = None", "cannot import automax_ros as it is here"),
-    ],
-)
-def test_a_worker_of_another_version_is_refused(tmp_path, before, message):
+OTHERS = {
+    "version": (
+        "import automax_ros; automax_ros.__version__ = '0.0.9'",
+        "AMX6854",
+        r"has automax_ros 0\.0\.9 \(sources [0-9a-f]{12}\)",
+        "the same version",
+    ),
+    "none": ("sys.modules['automax_ros'] = None", "AMX6854", "cannot import automax_ros as it is here", "same version"),
+    "python": (
+        "import platform; platform.python_version = lambda: '3.99.1'",
+        "AMX7940",
+        rf"has CPython 3\.99\.1, here is CPython {re.escape(platform.python_version())}\n",
+        "the same Python",
+    ),
+    "numpy": (
+        "import numpy; numpy.__version__ = '1.0.1'",
+        "AMX7940",
+        rf"has NumPy 1\.0\.1, here is {re.escape(np.__version__)}\n",
+        "the same Python, NumPy",
+    ),
+    "arithmetic": (
+        "import math; sine = math.sin; math.sin = lambda x: math.nextafter(sine(x), 2.0) if x == 1.0 else sine(x)",
+        "AMX7940",
+        r"with other last bits than this machine \(results [0-9a-f]{12}, here [0-9a-f]{12}\)",
+        "C library",
+    ),
+}
+"""What a worker has that is unlike ours: code and text of the error, and what it says to do."""
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_a_worker_of_another_installation_is_refused(tmp_path, other):
+    before, code, message, hint = OTHERS[other]
     with cluster(tmp_path, 0) as found:
         found.worker(before)
         with pytest.raises(ClusterFault, match=message) as caught:
             run_pieces(squares(3), Where(scheduler=found.address))
-        assert caught.value.code == "AMX6854"
-        assert "the same version" in str(caught.value.hint)
+    assert caught.value.code == code
+    assert hint in str(caught.value.hint)
+
+
+def test_a_worker_that_hangs_before_it_tells_what_it_has_is_not_waited_for_for_ever(tmp_path, monkeypatch):
+    monkeypatch.setattr("automax_ros.pieces.cluster.SAME_S", 1)
+    with cluster(tmp_path, 2) as found:
+        found.workers[1].send_signal(signal.SIGSTOP)
+        with pytest.raises(ClusterFault, match="not every worker of the cluster has told within 1 s") as caught:
+            run_pieces(squares(3), Where(scheduler=found.address))
+    assert caught.value.code == "AMX7941"
 
 
 def test_a_worker_of_another_version_is_refused_when_it_comes_late(tmp_path):

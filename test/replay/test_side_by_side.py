@@ -384,3 +384,14 @@ def test_small_files_are_put_together(monkeypatch, plain):
 
 def test_one_file_is_one_part(tmp_path):
     assert parts_of(prepared(recorded(tmp_path, seconds=0.2))) == []
+
+
+def test_a_cluster_that_is_not_used_is_told(monkeypatch, plain):
+    """Nobody is at the address: one part is replayed here, as one job does it, and several are not."""
+    monkeypatch.setattr(side_by_side, "LEAST_PART_BYTES", 1 << 30)
+    replay, notes = prepared(plain), []
+    nowhere = Where(scheduler="tcp://127.0.0.1:1")
+    assert replay_side_by_side(replay, nowhere, on_note=notes.append) == replay.run(None)
+    assert notes == [side_by_side.ONE_PART]
+    assert replay_side_by_side(replay, Where(2), on_note=notes.append) == replay.run(None)
+    assert len(notes) == 1
