@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+
+from rclpy.node import Node
 
 from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.executor import make_executor
@@ -38,12 +40,21 @@ class RosProcess:
 
     @contextmanager
     def resting(self) -> Iterator[None]:
-        """Serve nothing while the block lasts: nodes come and go only then."""
+        """Serve nothing while the block lasts: nodes come and go only then.
+
+        Where nodes have gone another executor serves those that stay: EventsExecutor crashes where it is spun with
+        events of publishers that have left it, for it lets go of the last one without the interpreter's lock
+        (https://github.com/ros2/rclpy/issues/1644). They come when other processes leave the graph just then.
+        """
         spun = self._thread is not None
         self._rest()
+        before = set(self.executor.get_nodes())
         try:
             yield
         finally:
+            staying = set(self.executor.get_nodes())
+            if before - staying:
+                self._renew_executor(staying)
             if spun and self._guard is not None:
                 self.spin(self._guard)
 
@@ -52,6 +63,12 @@ class RosProcess:
         self._rest()
         self.executor.shutdown()
         self.context.try_shutdown()
+
+    def _renew_executor(self, nodes: Iterable[Node]) -> None:
+        self.executor.shutdown()
+        self.executor = type(self.executor)(context=self.context)
+        for node in nodes:
+            self.executor.add_node(node)
 
     def _rest(self) -> None:
         self._rests = True
