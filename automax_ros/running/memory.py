@@ -10,13 +10,14 @@ the write log, if anybody has asked for the log.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Container, Iterable, Sequence
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.machine_code import mypyc_attr
 from automax_ros.core.types import Value
 from automax_ros.running.image import Image
-from automax_ros.running.views import MemoryValueError, ViewSpec, Write, WriteGroup, fitting
+from automax_ros.running.views import CellCommit, MemoryValueError, ViewSpec, Write, WriteGroup, fitting
 
 FORCING = "FORCINGSTATUS@"
 """The pre-defined common that is TRUE while anything is forced (2.4.6)."""
@@ -32,7 +33,7 @@ class CommonMemory(Image):
     def __init__(self, views: Sequence[ViewSpec]) -> None:
         """Make the memory as it is at installation: everything 0, nothing forced."""
         super().__init__(views)
-        self.sequence = 0
+        self._sequence = 0
         self._forced: set[tuple[int, int]] = set()
         self._under: dict[tuple[int, int], Value] = {}
         self._locals_forced = False
@@ -42,6 +43,26 @@ class CommonMemory(Image):
         self._plain = [not spec.is_array and view not in self._shared for view, spec in enumerate(self.specs)]
         """Whether a write of a view writes its cell and nothing else."""
         self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
+        self._gate = array("q", (1, 0))
+
+    @property
+    def sequence(self) -> int:
+        """How many writes have taken effect: the number of the last one in the write log."""
+        return self._sequence + self._gate[1]
+
+    def committing(self) -> CellCommit | None:
+        """Return where native scans may store what blocks changed, as ``commit`` would; None: ``commit`` is overridden.
+
+        They may while nothing is forced and nobody has asked for the log, which needs to know of each value.
+        """
+        overridden = type(self).commit is not CommonMemory.commit
+        return None if overridden else CellCommit(self._cells, self._plain, self._gate)
+
+    def _set_gate(self) -> None:
+        """Let native scans store values themselves from now on, or not, and count those that they have stored."""
+        gate = self._gate
+        self._sequence += gate[1]
+        gate[0], gate[1] = not self._forced and self._log is None and self._causes is None, 0
 
     def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
         """Write what a scan's blocks changed: pairs of view and value, already within the view's type.
@@ -57,8 +78,8 @@ class CommonMemory(Image):
                 self._commit_each(changes, writer)  # those before it once more: nothing else depends on a plain cell
                 return
             cells[view] = value
-        first = self.sequence + 1
-        self.sequence += len(changes)
+        first = self._sequence + 1
+        self._sequence += len(changes)
         if self._log is not None and changes:
             self._log.append(WriteGroup(first, self.now_ns, writer, WriteKind.COMMIT, 0, changes))
 
@@ -102,12 +123,14 @@ class CommonMemory(Image):
         self._forced.discard((view, element))
         self._store(view, element, fit, writer, WriteKind.FORCE)
         self._forced.add((view, element))
+        self._set_gate()
         self._forces_changed(writer)
 
     def release(self, view: int, element: int = 0, writer: int = 0) -> None:
         """End a force; the value stays until the next write (semantics, Scan, memory, tasks)."""
         if (view, element) in self._forced:
             self._forced.remove((view, element))
+            self._set_gate()
             self._under.pop((view, element), None)
             self._store(view, element, self.read_now(view, element), writer, WriteKind.RELEASE)
             self._forces_changed(writer)
@@ -118,6 +141,7 @@ class CommonMemory(Image):
         ``under`` is what ``under_forces`` gave.
         """
         self._forced = set(forced)
+        self._set_gate()
         known = {(view, element): value for view, element, value in under}
         self._under = {key: known.get(key, self.read_now(*key)) for key in self._forced}
         for changed in self._force_watchers:
@@ -165,6 +189,7 @@ class CommonMemory(Image):
         """Begin to keep the write log; whoever asks must ``take_writes`` or ``drain`` it."""
         if self._log is None:
             self._log = []
+            self._set_gate()
 
     def take_writes(self) -> list[WriteGroup]:
         """Return what was logged since it was last taken, oldest first."""
@@ -185,6 +210,7 @@ class CommonMemory(Image):
         """
         if self._causes is None:
             self._causes = []
+            self._set_gate()
 
     def take_causes(self) -> list[Write]:
         """Return these writes since they were last taken, oldest first."""
@@ -225,19 +251,19 @@ class CommonMemory(Image):
             self._cells[view] = value
         else:
             array[element] = value
-        self.sequence += 1
+        self._sequence += 1
         if self._log is not None:
-            self._log.append(WriteGroup(self.sequence, self.now_ns, writer, kind, element, ((view, value),)))
+            self._log.append(WriteGroup(self._sequence, self.now_ns, writer, kind, element, ((view, value),)))
         if self._causes is not None:
-            self._causes.append(Write(self.sequence, self.now_ns, writer, kind, view, element, value))
+            self._causes.append(Write(self._sequence, self.now_ns, writer, kind, view, element, value))
         if entries:
             # What shares registers with a forced view is not forced itself.
             told = WriteKind.OUTSIDE if kind in (WriteKind.FORCE, WriteKind.RELEASE) else kind
             for other, place, shown in entries:
                 self._put(other, place, shown)
-                self.sequence += 1
+                self._sequence += 1
                 if self._log is not None:
-                    self._log.append(WriteGroup(self.sequence, self.now_ns, writer, told, place, ((other, shown),)))
+                    self._log.append(WriteGroup(self._sequence, self.now_ns, writer, told, place, ((other, shown),)))
         if entries is not None and self._watched:
             self._tell_watchers([(view, element), *(entry[:2] for entry in entries)])
 

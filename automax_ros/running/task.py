@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Generator, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.compile.layout import Layout
@@ -15,6 +15,7 @@ from automax_ros.language.syntax.tree import Scope
 from automax_ros.running.backplane import NO_MODULES, Backplane
 from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
 from automax_ros.running.events import Events
+from automax_ros.running.image import Image
 from automax_ros.running.modeled_scan import scan_in_steps
 from automax_ros.running.scan_record import ScanRecord, Status, Steps
 from automax_ros.running.scan_under_way import Begun, HeardMemory, Progress, ScanUnderWay, add_error, cleared_errors
@@ -30,7 +31,7 @@ OVERLAP = 7070
 EVENT_TIMEOUT = 7071
 PRINTED_LINES = 1000
 """Lines of PRINT that a task keeps."""
-_RUNNING = Status.RUNNING
+_RUNNING: Final = Status.RUNNING
 """A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
 
 
@@ -54,9 +55,9 @@ class Task:
     ) -> None:
         """Install the task: its state is as at installation (2.4.5)."""
         self.memory = memory
+        self._image: Image | None = memory if isinstance(memory, Image) else None
         self.writer, self.slot, self.priority = writer, slot, priority
-        self.backplane = backplane
-        self.events = Events() if events is None else events
+        self.backplane, self.events = backplane, Events() if events is None else events
         self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
         self._recording = False
         self._scans: Generator[bool, None, None] | None = None
@@ -76,8 +77,7 @@ class Task:
         self._state: StateValues = compiled.layout.fresh()
         self._arrays = [position for position, field in enumerate(compiled.layout.fields) if field.is_array]
         self.errors = ErrorLog()
-        self.status = Status.STOPPED
-        self.scan_number = 0
+        self.status, self.scan_number = Status.STOPPED, 0
         self._forced = any(map(self.memory.is_forced, self.written))
         self._under_way = None
         self._bind()
@@ -138,14 +138,19 @@ class Task:
         record, noting = None, self._noting
         if noting is not None:
             noting.record = record = ScanRecord(now_ns, self.scan_number, skipped)
-        self.memory.now_ns = now_ns
+        if self._image is not None:  # the same, known by its class: an attribute of machine code
+            self._image.now_ns = now_ns
+        else:
+            self.memory.now_ns = now_ns
         if self._scans is None:
             self.heed_forces()
             scans = self.compiled.scans_forced if self._forced else self.compiled.scans
             self._scans = scans(self._state, self._io)
         try:
-            if next(self._scans):
-                self.status = Status.ENDED
+            for stopped in self._scans:  # a scan; next() would be looked up each time
+                if stopped:
+                    self.status = Status.ENDED
+                break
         except BaseException as error:
             # The scans have stored the state and ended: the next one begins from it.
             self._scans = None
@@ -255,9 +260,8 @@ class Task:
         Raises:
             ValueError: it does not fit the layout.
         """
-        state, log = values[:-LOG_NUMBERS], values[-LOG_NUMBERS:]
-        restored = self.compiled.layout.restore(state)
-        self.errors.restore([int(number) for number in log])
+        restored = self.compiled.layout.restore(values[:-LOG_NUMBERS])
+        self.errors.restore([int(number) for number in values[-LOG_NUMBERS:]])
         self.state[:] = restored
 
     def value(self, name: str) -> Value | list[Value]:

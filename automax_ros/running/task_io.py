@@ -14,9 +14,10 @@ from automax_ros.running.backplane import BUS_ERROR, Backplane
 from automax_ros.running.error_log import ErrorLog
 from automax_ros.running.events import Events
 from automax_ros.running.image import Image
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.printing import format_print
 from automax_ros.running.scan_record import ScanRecord
-from automax_ros.running.views import LatchPlan
+from automax_ros.running.views import CellCommit, LatchPlan
 
 Call = Callable[[], Any]
 Hear = Callable[[Call], Any]
@@ -70,6 +71,29 @@ class ScanMemory(Protocol):
     def is_forced(self, view: int) -> bool: ...  # noqa: D102
 
 
+def register_read(
+    backplane: Backplane, read_now: Callable[[int, int], Value], slot: int, register: int
+) -> tuple[int, int]:
+    """Return a register's word as ``read_now`` has it and 0, or 0 and the bus error of one that does not answer."""
+    place = backplane.readable(slot, register)
+    if place is None:
+        return 0, BUS_ERROR
+    view, element = place
+    return cast(int, read_now(view, element)), 0
+
+
+def register_written(
+    backplane: Backplane, write_now: Callable[[int, Value, int], None], slot: int, register: int, value: int
+) -> int:
+    """Write a register's 16 bits by ``write_now``; return 0, or the bus error of one that does not take it."""
+    place = backplane.writable(slot, register)
+    if place is None:
+        return BUS_ERROR
+    view, element = place
+    write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
+    return 0
+
+
 @mypyc_attr(allow_interpreted_subclasses=True)
 class TaskIo:
     """What a compiled scan touches: common memory through one task, its error log and its printed lines.
@@ -83,12 +107,19 @@ class TaskIo:
             memory.latching(task.plan) if isinstance(memory, Image) else partial(memory.latch, task.plan)
         )
         self.read_now = memory.read_now
+        self._common = memory if isinstance(memory, CommonMemory) else None
+        self.cell_commit: CellCommit | None = None if self._common is None else self._common.committing()
         self._memory, self._writer, self._task = memory, task.writer, task
         self._backplane, self._hear = task.backplane, hear
 
     def commit(self, changes: list[tuple[int, Value]]) -> None:
         """Write back what blocks changed."""
-        if changes:
+        if not changes:
+            return
+        common = self._common
+        if common is not None:  # the same, known by its class: a call of machine code
+            common.commit(changes, self._writer)
+        else:
             self._memory.commit(changes, self._writer)
 
     def write_now(self, view: int, value: Value, element: int = 0) -> None:
@@ -122,19 +153,11 @@ class TaskIo:
 
     def io_read(self, slot: int, register: int) -> tuple[int, int]:
         """Return a register's word and 0, or 0 and the bus error of a register that does not answer."""
-        place = self._backplane.readable(slot, register)
-        if place is None:
-            return 0, BUS_ERROR
-        return cast(int, self.read_now(*place)), 0
+        return register_read(self._backplane, self.read_now, slot, register)
 
     def io_write(self, slot: int, register: int, value: int) -> int:
         """Write a register's word; return 0, or the bus error of a register that does not answer or take it."""
-        place = self._backplane.writable(slot, register)
-        if place is None:
-            return BUS_ERROR
-        view, element = place
-        self.write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
-        return 0
+        return register_written(self._backplane, self.write_now, slot, register, value)
 
     def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
         """Execute the current minor loop of a drive: a task that has none writes no outputs."""
@@ -151,6 +174,7 @@ class RecordingIo(TaskIo):
         self.record = ScanRecord(0, 0)
         self.latch = self._latch
         self.read_now = self._read_now
+        self.cell_commit = None  # what is committed is noted
         self._plan = task.plan
 
     def _latch(self) -> Latched:

@@ -7,6 +7,7 @@ such a bank, so that a word and its bits show the same registers.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -163,6 +164,18 @@ class CellLatch(partial[Latched]):
         """The cells that it latches, by view."""
         cells: list[Value] = self.args[0]
         return cells
+
+
+class CellCommit(NamedTuple):
+    """Where a commit may go without a call: native scans store what blocks changed into the cells themselves.
+
+    ``plain`` says of each view whether a write changes its cell and nothing else. ``gate`` is two integers of 64 bits:
+    1 while the cells are all that a commit changes, and how many values were stored in this way, which scans count.
+    """
+
+    cells: list[Value]
+    plain: list[bool]
+    gate: array[int]
 
 
 def latch_plan(views: Sequence[int]) -> LatchPlan:

@@ -16,7 +16,8 @@ from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.scan_io import ScanTooLong, StateValues
 from automax_ros.core.types import DataType, Latched, Value, type_of_name
 from automax_ros.replay.columns.entries import Entries
-from automax_ros.running.backplane import BUS_ERROR, Backplane
+from automax_ros.running.backplane import Backplane
+from automax_ros.running.task_io import register_read, register_written
 from automax_ros.wire.cdr_columns import Ints
 
 
@@ -200,21 +201,11 @@ class _ColumnIo:
 
     def io_read(self, slot: int, register: int) -> tuple[int, int]:
         """Return a register's word and 0, or 0 and the bus error."""
-        place = self._backplane.readable(slot, register)
-        if place is None:
-            return 0, BUS_ERROR
-        value = self.read_now(*place)
-        assert isinstance(value, int)
-        return value, 0
+        return register_read(self._backplane, self.read_now, slot, register)
 
     def io_write(self, slot: int, register: int, value: int) -> int:
         """Write a register's word; return 0 or the bus error."""
-        place = self._backplane.writable(slot, register)
-        if place is None:
-            return BUS_ERROR
-        view, element = place
-        self.write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
-        return 0
+        return register_written(self._backplane, self.write_now, slot, register, value)
 
     def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
         """Leave the scan to the path scan by scan."""

@@ -63,16 +63,46 @@ static int add_change(PyObject **changes, PyObject *view, automax_slot value, in
     return problem ? -1 : 0;
 }
 
+static int differs(automax_slot now, automax_slot before, int kind)
+{
+    return kind == AUTOMAX_REAL ? now.d != before.d : now.i != before.i;
+}
+
+/* Stores what differs from the latch into the cells: all that a commit does while the gate is open. The objects count
+ * as latched, since the next scan finds them there. */
+static int commit_cells(Scans *self)
+{
+    const Code *code = self->code;
+    for (Py_ssize_t k = 0; k < code->written_count; k++) {
+        Py_ssize_t place = code->written[k].latched;
+        const latched_spec *latched = &code->latched[place];
+        automax_slot now = self->out[k];
+        if (!differs(now, self->latched[place], latched->kind))
+            continue;
+        PyObject *value = object_of(now, latched->kind), *before = self->seen[place];
+        if (value == NULL || PyList_SetItem(self->cells, latched->view, Py_NewRef(value))) {
+            Py_XDECREF(value);
+            return -1;
+        }
+        self->latched[place] = now;
+        self->seen[place] = value;
+        Py_XDECREF(before);
+        ((int64_t *)self->gate.buf)[1]++;
+    }
+    return 0;
+}
+
 static int commit(Scans *self)
 {
+    if (self->gate.obj != NULL && ((const int64_t *)self->gate.buf)[0])
+        return commit_cells(self);
     const Code *code = self->code;
     PyObject *changes = NULL;
     for (Py_ssize_t k = 0; k < code->written_count; k++) {
         const written_spec *written = &code->written[k];
         int kind = code->latched[written->latched].kind;
         automax_slot before = self->latched[written->latched], now = self->out[k];
-        int differs = kind == AUTOMAX_REAL ? now.d != before.d : now.i != before.i;
-        if (differs && add_change(&changes, written->view, now, kind)) {
+        if (differs(now, before, kind) && add_change(&changes, written->view, now, kind)) {
             Py_XDECREF(changes);
             return -1;
         }
@@ -104,20 +134,61 @@ static PyObject *one_scan(Scans *self)
     return NULL;
 }
 
+/* Returns an attribute of the io, or NULL without an exception where it has none. */
+static PyObject *optional(PyObject *object, const char *name)
+{
+    PyObject *found = PyObject_GetAttrString(object, name);
+    if (found == NULL && PyErr_ExceptionMatches(PyExc_AttributeError))
+        PyErr_Clear();
+    return found;
+}
+
 /* Takes the latch of the io, and its cells where it has some. */
 static int bind_latch(Scans *self)
 {
     self->latch = PyObject_GetAttrString(self->io, "latch");
     if (self->latch == NULL)
         return -1;
-    self->cells = PyObject_GetAttrString(self->latch, "cells");
-    if (self->cells == NULL) {
-        if (!PyErr_ExceptionMatches(PyExc_AttributeError))
-            return -1;
-        PyErr_Clear();
-    } else if (!PyList_CheckExact(self->cells))
+    self->cells = optional(self->latch, "cells");
+    if (self->cells != NULL && !PyList_CheckExact(self->cells))
         Py_CLEAR(self->cells);
-    return 0;
+    return PyErr_Occurred() ? -1 : 0;
+}
+
+/* Whether all that the task writes are plain cells. */
+static int writes_plain(const Code *code, PyObject *plain)
+{
+    for (Py_ssize_t k = 0; k < code->written_count; k++) {
+        Py_ssize_t view = code->latched[code->written[k].latched].view;
+        if (!PyList_CheckExact(plain) || view >= PyList_GET_SIZE(plain) || PyList_GET_ITEM(plain, view) != Py_True)
+            return 0;
+    }
+    return 1;
+}
+
+/* Takes the gate of a commit where it may go into the cells that are latched. */
+static int take_gate(Scans *self, PyObject *commit)
+{
+    PyObject *cells, *plain, *gate;
+    if (!PyArg_ParseTuple(commit, "OOO", &cells, &plain, &gate))
+        return -1;
+    if (cells != self->cells || !writes_plain(self->code, plain))
+        return 0;
+    if (PyObject_GetBuffer(gate, &self->gate, PyBUF_WRITABLE))
+        return -1;
+    if (self->gate.len == 2 * (Py_ssize_t)sizeof(int64_t))
+        return 0;
+    PyErr_SetString(PyExc_ValueError, "the gate of a commit is not two integers of 64 bits");
+    return -1;
+}
+
+/* Looks whether a commit may go without a call (running/views.py, CellCommit). */
+static int bind_commit(Scans *self)
+{
+    PyObject *commit = self->cells == NULL ? NULL : optional(self->io, "cell_commit");
+    int problem = commit != NULL && commit != Py_None && take_gate(self, commit);
+    Py_XDECREF(commit);
+    return problem || PyErr_Occurred() ? -1 : 0;
 }
 
 static int begin(Scans *self)
@@ -125,7 +196,7 @@ static int begin(Scans *self)
     int misfit = load(self);
     if (!misfit) {
         self->stage = READY;
-        return bind_latch(self);
+        return bind_latch(self) || bind_commit(self) ? -1 : 0;
     }
     if (misfit < 0)
         return -1;
@@ -179,6 +250,7 @@ static int scans_traverse(Scans *self, visitproc visit, void *arg)
     Py_VISIT(self->io);
     Py_VISIT(self->latch);
     Py_VISIT(self->cells);
+    Py_VISIT(self->gate.obj);
     for (int k = 0; k < MEMBERS; k++)
         Py_VISIT(self->members[k]);
     for (Py_ssize_t k = 0; k < self->seen_count; k++)
@@ -196,6 +268,7 @@ static int scans_clear(Scans *self)
     Py_CLEAR(self->io);
     Py_CLEAR(self->latch);
     Py_CLEAR(self->cells);
+    PyBuffer_Release(&self->gate);
     for (int k = 0; k < MEMBERS; k++)
         Py_CLEAR(self->members[k]);
     for (Py_ssize_t k = 0; k < self->seen_count; k++)

@@ -55,6 +55,7 @@ typedef struct {
     Code *code;
     scan_function scan;
     PyObject *make_python, *python, *state, *io, *latch, *cells;
+    Py_buffer gate; /* of a commit into these cells without a call: obj is NULL where there is none */
     PyObject *members[MEMBERS];
     PyObject **seen; /* for each latched common the object that its slot was made of */
     Py_ssize_t seen_count;
