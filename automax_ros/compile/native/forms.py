@@ -28,6 +28,10 @@ adds to that (decision: twice what it takes at most to translate and build the t
 and 5 ms per line; what is kept from another run takes some hundredths).
 """
 
+_FAULT = "automax itself failed to make it native, please report this with the task's text"
+_MOST_WHY = 400
+"""Characters of a reason that quotes a fault."""
+
 
 class NativeMode(enum.Enum):
     """Whether tasks are made native: where it pays, wherever it can be, or never."""
@@ -90,7 +94,10 @@ class NativeForms:
             return None
 
     def form(self, compiled: CompiledTask) -> NativeOutcome:
-        """Return a task as it is to run: as it is given where it is not native."""
+        """Return a task as it is to run: as it is given where it is not native.
+
+        A fault of the translator itself costs the task its native form and nothing more, whatever the mode (decision).
+        """
         if self.mode is NativeMode.OFF:
             return NativeOutcome(compiled, why=self.why_off)
         if self.mode is NativeMode.AUTO and not self._pays(compiled):
@@ -101,6 +108,8 @@ class NativeForms:
             native = native_form(compiled, self.cache, limit_s=self.limit_s)
         except NotNative as reason:
             return NativeOutcome(compiled, why=str(reason))
+        except Exception as fault:
+            return NativeOutcome(compiled, why=f"{_FAULT}: {type(fault).__name__}: {fault}"[:_MOST_WHY])
         return NativeOutcome(compiled.with_scans(native.scans, native.scans_forced), native)
 
     def _pays(self, compiled: CompiledTask) -> bool:

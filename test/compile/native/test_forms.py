@@ -5,6 +5,7 @@ import threading
 
 import pytest
 
+from automax_ros.compile.native import task as task_module
 from automax_ros.compile.native.build import build, find_compiler
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.forms import IN_PYTHON, WORTHWHILE_LINE_NS, WORTHWHILE_NS, NativeForms, NativeMode
@@ -111,10 +112,32 @@ def test_ctrl_c_amid_a_translation_waits_for_nothing_and_starts_no_compiler(comp
             os.kill(int(ran.read_text()), 0)
 
 
-def test_what_goes_wrong_on_a_thread_is_raised(compiled, monkeypatch, tmp_path):
-    def fails(*_, **__):
-        raise RuntimeError("a fault of the translation")
+def test_an_end_asked_for_on_a_thread_is_raised(compiled, monkeypatch, tmp_path):
+    def ends(*_, **__):
+        raise SystemExit("the program is to end")
 
-    monkeypatch.setattr("automax_ros.compile.native.task.native_form", fails)
-    with pytest.raises(RuntimeError, match="a fault of the translation"):
+    monkeypatch.setattr("automax_ros.compile.native.task.native_form", ends)
+    with pytest.raises(SystemExit, match="the program is to end"):
         NativeForms(NativeMode.ON, cache=NativeCache(tmp_path / "cache")).made({"A": compiled, "B": compiled})
+
+
+@pytest.mark.parametrize("mode", [NativeMode.AUTO, NativeMode.ON])
+def test_a_fault_of_the_translator_leaves_its_task_in_python_and_asks_for_a_report(
+    compiled, monkeypatch, tmp_path, mode
+):
+    other = compiled_of(TASK.replace("SUMMER", "DIFFERENCE"))
+    kept = task_module.kept_translation
+
+    def fails(task, cache):
+        if task is compiled:
+            raise RecursionError("x" * 1000)
+        return kept(task, cache)
+
+    monkeypatch.setattr(task_module, "kept_translation", fails)
+    made = NativeForms(mode, cache=NativeCache(tmp_path / "cache")).made({"A": compiled, "B": other})
+    assert made["A"].compiled is compiled
+    assert made["A"].native is None
+    told = "TASK: in Python: automax itself failed to make it native, please report this with the task's text: "
+    assert made["A"].text.startswith(f"{told}RecursionError: xxx")
+    assert len(made["A"].text) < 450
+    assert made["B"].text == "TASK: native"
