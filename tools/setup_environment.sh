@@ -102,8 +102,8 @@ rm -f "$stamp"
 echo "installing dependencies into .venv (about a minute the first time) ..."
 needed_by_messages >"$venv/needed.txt"
 install -r "$venv/needed.txt"
-# The messages are compiled while pip, which mostly waits, brings the rest. An interrupted setup lets pip end what it has
-# begun: half a package would look like a whole one. pip holds the lock until then.
+# The messages are compiled while pip, which mostly waits, brings the rest. A setup that fails or is interrupted ends when
+# pip has ended too, which holds the lock until then: half a package would look like a whole one.
 trap wait EXIT
 install --use-pep517 --editable '.[ros,build,plot,docs,test]' &
 rest=$!
