@@ -107,41 +107,37 @@ def test_a_worker_killed_from_outside_costs_a_second_try(tmp_path):
 OTHERS = {
     "version": (
         "import automax_ros; automax_ros.__version__ = '0.0.9'",
-        "AMX6854",
         r"has automax_ros 0\.0\.9 \(sources [0-9a-f]{12}\)",
         "the same version",
     ),
-    "none": ("sys.modules['automax_ros'] = None", "AMX6854", "cannot import automax_ros as it is here", "same version"),
+    "none": ("sys.modules['automax_ros'] = None", "cannot import automax_ros as it is here", "same version"),
     "python": (
         "import platform; platform.python_version = lambda: '3.99.1'",
-        "AMX7940",
         rf"has CPython 3\.99\.1, here is CPython {re.escape(platform.python_version())}\n",
         "the same Python",
     ),
     "numpy": (
         "import numpy; numpy.__version__ = '1.0.1'",
-        "AMX7940",
         rf"has NumPy 1\.0\.1, here is {re.escape(np.__version__)}\n",
         "the same Python, NumPy",
     ),
     "arithmetic": (
         "import math; sine = math.sin; math.sin = lambda x: math.nextafter(sine(x), 2.0) if x == 1.0 else sine(x)",
-        "AMX7940",
         r"with other last bits than this machine \(results [0-9a-f]{12}, here [0-9a-f]{12}\)",
         "C library",
     ),
 }
-"""What a worker has that is unlike ours: code and text of the error, and what it says to do."""
+"""What a worker has that is unlike ours: text of the error, and what it says to do."""
 
 
 @pytest.mark.parametrize("other", OTHERS)
 def test_a_worker_of_another_installation_is_refused(tmp_path, other):
-    before, code, message, hint = OTHERS[other]
+    before, message, hint = OTHERS[other]
     with cluster(tmp_path, 0) as found:
         found.worker(before)
         with pytest.raises(ClusterFault, match=message) as caught:
             run_pieces(squares(3), Where(scheduler=found.address))
-    assert caught.value.code == code
+    assert caught.value.code == ("AMX6854" if other in {"version", "none"} else "AMX7940")
     assert hint in str(caught.value.hint)
 
 
