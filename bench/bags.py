@@ -11,7 +11,8 @@ from pathlib import Path
 from automax_ros.bags.export import export_csv
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
+from automax_ros.bags.storage import COMPRESSIONS, StorageOptions
+from automax_ros.bags.writer import BagWriter
 from automax_ros.core.types import DataType
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second

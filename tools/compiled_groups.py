@@ -42,6 +42,7 @@ _SCANS = (
     "running/task_io.py",
     "running/views.py",
     "rack/observers.py",
+    "rack/scan_end.py",
     "rack/scheduled_task.py",
     "rack/task_statistics.py",
 )

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from automax_ros.bags.info import bag_info
     from automax_ros.bags.reader import BagMessage, BagReader
     from automax_ros.bags.recorder import Recorder, RecordingOptions
-    from automax_ros.bags.writer import StorageOptions
+    from automax_ros.bags.storage import StorageOptions
 
 __all__ = [
     "BagError",
@@ -26,4 +26,4 @@ __all__ = [
     "export_csv",
 ]
 
-__getattr__ = face(__name__, "errors", "reader", "info", "recorder", "writer", "export")
+__getattr__ = face(__name__, "errors", "reader", "info", "recorder", "storage", "export")

@@ -25,30 +25,26 @@ _MESSAGE_CODE: Final = int(Opcode.MESSAGE)
 
 
 class ChunkBuilder:
-    """The records of an open chunk: ``size`` bytes. Its index tells for each channel where the messages stand."""
+    """The records of an open chunk: ``size`` bytes. Its index tells for each channel where the messages stand.
 
-    __slots__ = ("_parts", "index", "size")
+    ``first_time`` and ``last_time`` are the earliest and the latest log time; -1 without a message.
+    """
 
-    def __init__(self) -> None:
+    __slots__ = ("_parts", "first_time", "index", "last_time", "size")
+
+    def __init__(self, index: dict[int, list[int]] | None = None) -> None:
+        """Begin without records; with an ``index``, as one that has the index of a chunk elsewhere."""
         self._parts: list[bytes] = []
         self.size = 0
-        self.index: dict[int, list[int]] = {}
+        self.index: dict[int, list[int]] = {} if index is None else index
         """Log time and place of each message, one after the other, by the number of the channel."""
+        times = [time for entries in self.index.values() for time in entries[::2]] or [-1]
+        self.first_time, self.last_time = min(times), max(times)
 
     @property
     def data(self) -> bytes:
         """All records."""
         return b"".join(self._parts)
-
-    @property
-    def first_time(self) -> int:
-        """The earliest log time."""
-        return min(min(entries[::2]) for entries in self.index.values())
-
-    @property
-    def last_time(self) -> int:
-        """The latest log time."""
-        return max(max(entries[::2]) for entries in self.index.values())
 
     def add_record(self, record: McapRecord) -> None:
         """Add a schema or a channel."""
@@ -59,6 +55,12 @@ class ChunkBuilder:
     def add_message(self, channel: int, sequence: int, log_time: int, publish_time: int, payload: bytes) -> None:
         """Add a message."""
         length, place = len(payload), self.size
+        if not self.index:
+            self.first_time = self.last_time = log_time
+        elif log_time > self.last_time:
+            self.last_time = log_time
+        elif log_time < self.first_time:
+            self.first_time = log_time
         entries = self.index.get(channel)
         if entries is None:
             self.index[channel] = [log_time, place]

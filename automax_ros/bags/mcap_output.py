@@ -135,18 +135,19 @@ class McapOutput:
     def _add(self, packed: Chunk, chunk: ChunkBuilder, first_time: int, last_time: int) -> None:
         """Write a chunk and its index, whose messages have these log times at most."""
         start = self._output.tell()
-        length = self._write(record_bytes(packed))
+        record = record_bytes(packed)
+        length = len(record)
         offset = start + length
         offsets: dict[int, int] = {}
-        indexes: list[bytes] = []
+        parts = [record]
         length_of_indexes = 0
         for channel, entries in chunk.index.items():
             offsets[channel] = offset + length_of_indexes
             size = len(entries) * 8
-            indexes.append(_INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size))
-            indexes.append(struct.pack(f"<{len(entries)}Q", *entries))
+            parts.append(_INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size))
+            parts.append(struct.pack(f"<{len(entries)}Q", *entries))
             length_of_indexes += _INDEX_HEAD.size + size
-        self._write(b"".join(indexes))
+        self._write(b"".join(parts))
         self._count(chunk, first_time, last_time)
         self.statistics.chunk_count += 1
         ChunkIndex(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from textwrap import indent
 from typing import Any
 
 import yaml
@@ -14,6 +15,7 @@ from automax_ros.wire.qos import QosProfile
 VERSION = 9
 ROS_DISTRO = "jazzy"
 METADATA_FILE = "metadata.yaml"
+_ROOT = "rosbag2_bagfile_information"
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
@@ -51,6 +53,13 @@ class BagMetadata:
     files: Sequence[FileSummary]
     topics: Sequence[TopicSummary] = ()
     custom_data: Mapping[str, str] = field(default_factory=dict)
+
+    def document(self, alone: str | None = None) -> str:
+        """Return what stands in metadata.yaml; ``alone`` is the text of ``information``, if it was made before."""
+        if alone is None or any("\n" in text for text in self.custom_data.values()):
+            return yaml_text({_ROOT: self.information()})
+        # The same further in: making it again takes longer than a second of a rack.
+        return f"{_ROOT}:\n{indent(alone, '  ')}"
 
     def information(self) -> dict[str, Any]:
         """The fields of ``rosbag2_bagfile_information``, in the order in which rosbag2 writes them."""

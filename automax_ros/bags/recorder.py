@@ -8,7 +8,8 @@ from pathlib import Path
 import automax_ros
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.recording import Recording
-from automax_ros.bags.writer import BagWriter, StorageOptions
+from automax_ros.bags.storage import StorageOptions
+from automax_ros.bags.writer import BagWriter
 from automax_ros.rack.rack import Rack
 from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.wire.rack_files import files_of
@@ -51,7 +52,14 @@ class Recorder(Recording):
             "version": automax_ros.__version__,
             "fingerprint": f"{rack.fingerprint:016x}",
         }
-        super().__init__(BagWriter(folder, custom_data=provenance, options=options.storage), files_of(rack))
+        scheduler = rack.scheduler
+        writer = BagWriter(
+            folder,
+            custom_data=provenance,
+            options=options.storage,
+            keeps_pace=lambda: scheduler.zero_ns is not None,
+        )
+        super().__init__(writer, files_of(rack))
         self._rack, self._stream = rack, stream
         self._split_posted = False
         self._splits_by_size = options.storage.split_bytes > 0

@@ -1,16 +1,15 @@
 """Writes a recording: a folder with ``scans_0.mcap``, ... and ``metadata.yaml``, as rosbag2 makes them.
 
 The same messages give the same bytes: nothing depends on the folder's name, the host or the wall clock. Chunks end by
-size or with half a second, always between two instants. One reaches the operating system while the next is filled, so
-that a killed process loses a second at most and no instant by half.
+size or with half a second, always between two instants. One reaches the operating system while the next is filled, or
+before that, so that a killed process loses a second at most and no instant by half.
 """
 
 from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -34,55 +33,28 @@ from automax_ros.bags.metadata import (
     qos_text,
     yaml_text,
 )
+from automax_ros.bags.storage import COMPRESSIONS, StorageOptions
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.definitions import message_types, schema_text
 from automax_ros.wire.qos import QosProfile
 
+AT_ONCE_BYTES: Final = 1 << 16
+"""A chunk of up to so many bytes, uncompressed, is written by whoever fills it where no clock is kept pace with
+(decision): it takes 0.1 ms, and handing it to a thread takes longer than that."""
 CHUNK_BYTES: Final = 1 << 20
 """A chunk ends before the next instant when it holds more bytes than this, uncompressed."""
 LONGEST_CHUNK_BYTES: Final = 24 << 20
 """A chunk of more bytes than this ends even inside an instant, so that every reader takes it."""
-CHUNK_NS = NS_PER_S // 2
-"""A chunk ends with each of these times of the messages, ns (decision: one is open and one is being written, so a
-killed process loses a second at most)."""
 MAX_PAYLOAD_BYTES = 32 << 20
 """Longest message and longest attachment that is written, in bytes (decision: our own reader is sure to accept it)."""
 MAX_STAMP = (2**31 - 1) * NS_PER_S
 """Latest time of a message in nanoseconds: the seconds of a ROS time have 31 bits."""
-COMPRESSIONS = {"zstd": "zstd", "lz4": "lz4", "none": ""}
-"""How chunks can be compressed: the word for it, and what the file calls it."""
-MIN_SPLIT_BYTES = 1 << 16
-"""Smallest size to split a recording at (decision): a smaller file holds little but the facts at its beginning."""
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _MAX_TOPIC = 247
 
 
-@dataclass(frozen=True)
-class StorageOptions:
-    """How a recording is stored.
-
-    ``compression`` is a key of COMPRESSIONS. A file ends when it has ``split_bytes`` bytes, 0 for never. A chunk ends
-    each ``chunk_ns`` of the messages' time: a killed process loses two of them at most.
-    """
-
-    compression: str = "zstd"
-    split_bytes: int = 0
-    chunk_ns: int = CHUNK_NS
-
-    def __post_init__(self) -> None:
-        """Refuse what makes no sense.
-
-        Raises:
-            ValueError: an unknown compression, or a size or time out of range.
-        """
-        if self.compression not in COMPRESSIONS:
-            raise ValueError(f"{self.compression!r} is not a compression: there are {', '.join(COMPRESSIONS)}")
-        if self.split_bytes and self.split_bytes < MIN_SPLIT_BYTES:
-            raise ValueError(
-                f"files of {self.split_bytes} bytes are too small: at least {MIN_SPLIT_BYTES}, or 0 for no limit"
-            )
-        if self.chunk_ns <= 0:
-            raise ValueError(f"chunks of {self.chunk_ns} ns")
+def _always() -> bool:
+    return True
 
 
 class Channel:
@@ -101,7 +73,8 @@ class Channel:
 class BagWriter:
     """A recording being written; a context manager that finishes the files at its end.
 
-    ``custom_data`` goes into the metadata (provenance: hashes of program and YAML file, version).
+    ``custom_data`` goes into the metadata (provenance: hashes of program and YAML file, version). ``keeps_pace`` tells
+    whether whoever writes follows a clock and may not wait for a chunk to be compressed, however small.
 
     To begin a further file the caller asks ``split_due`` between two instants (or has reasons of its own), calls
     ``split`` and repeats the facts without which that file could not be read alone.
@@ -116,8 +89,10 @@ class BagWriter:
         *,
         custom_data: Mapping[str, str] | None = None,
         options: StorageOptions | None = None,
+        keeps_pace: Callable[[], bool] = _always,
     ) -> None:
         self.folder = folder
+        self._keeps_pace = keeps_pace
         self.custom_data = dict(custom_data or {})
         self._options = options or StorageOptions()
         self._channels: dict[str, Channel] = {}
@@ -125,6 +100,8 @@ class BagWriter:
         self._schemas: dict[str, int] = {}
         self._attachments: list[Attachment] = []
         self._files: list[FileSummary] = []
+        self._own_text = ""
+        """What the last file tells of itself."""
         self._counts_before: dict[str, int] = {}
         self._last_time = -1
         self._stamp: int | None = None
@@ -284,7 +261,7 @@ class BagWriter:
         try:
             self._finish_file()
             self._chunks.end()
-            text = yaml_text({"rosbag2_bagfile_information": self._metadata(self._files).information()})
+            text = self._metadata(self._files).document(self._own_text if len(self._files) == 1 else None)
             (self.folder / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
             self._finished += [self.folder / METADATA_FILE, self.folder]
         except OSError as error:
@@ -314,8 +291,8 @@ class BagWriter:
         start, end = statistics.message_start_time, statistics.message_end_time
         summary = FileSummary(self._file.path.name, start, end - start, statistics.message_count)
         self._files.append(summary)
-        own = self._metadata([summary]).information()
-        self._mcap.add_metadata(Metadata(name="rosbag2", metadata={"serialized_metadata": yaml_text(own)}))
+        self._own_text = own = yaml_text(self._metadata([summary]).information())
+        self._mcap.add_metadata(Metadata(name="rosbag2", metadata={"serialized_metadata": own}))
         self._mcap.finish()
         self._file.close()
         self._finished.append(self._file.path)
@@ -358,8 +335,13 @@ class BagWriter:
 
     def _end_chunk(self, *, wait: bool) -> None:
         """Let the open chunk be written; ``wait`` until it is: then the file may be asked for its size, or written."""
-        if self._chunk.index:
-            self._chunks.hand(partial(self._mcap.add_chunk, self._chunk))
+        chunk = self._chunk
+        if chunk.index:
+            if chunk.size <= AT_ONCE_BYTES and not self._keeps_pace():
+                self._chunks.settle()
+                self._mcap.add_chunk(chunk)
+            else:
+                self._chunks.hand(partial(self._mcap.add_chunk, chunk))
             self._chunk = ChunkBuilder()
         if wait or self._chunks.failed:
             self._chunks.settle()

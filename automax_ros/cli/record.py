@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.recording import LiveRecording
-from automax_ros.bags.writer import StorageOptions
+from automax_ros.bags.storage import StorageOptions
 from automax_ros.cli.rack_space import config_of, names_file, space_of
 from automax_ros.cli.record_options import split_seconds, storage_options
 from automax_ros.cli.recording_watch import DiskSync

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from automax_ros.bags.recorder import RecordingOptions
-from automax_ros.bags.writer import COMPRESSIONS, StorageOptions
+from automax_ros.bags.storage import COMPRESSIONS, StorageOptions
 from automax_ros.cli.numbers import option_number
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds

@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from automax_ros.bags.live.arrival import ArrivalOrder
 from automax_ros.bags.live.recording import LiveRecording
 from automax_ros.bags.live.topics import LiveTopics, TopicKind
-from automax_ros.bags.writer import StorageOptions
+from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.binding import MOST_TABLES, Binding

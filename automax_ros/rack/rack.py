@@ -31,6 +31,7 @@ from automax_ros.rack.plants.feeding import PlantFeeds
 from automax_ros.rack.plants.running import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
 from automax_ros.rack.rack_state import RackState
+from automax_ros.rack.scan_end import ScanEnd
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.settings import common_named
 from automax_ros.rack.task_statistics import TaskStatistics
@@ -46,10 +47,7 @@ from automax_ros.running.memory import CommonMemory
 from automax_ros.running.process_inputs import ProcessInputs
 from automax_ros.running.processor_time import ProcessorTime
 from automax_ros.running.scheduler import Scheduler
-from automax_ros.running.task import EVENT_TIMEOUT, ScanRecord, Status, Task
-
-_FAULTED = Status.FAULTED
-"""A name of its own, since it is asked for after each scan and an enumeration's member is slow to get."""
+from automax_ros.running.task import EVENT_TIMEOUT, Task
 
 
 class Rack:
@@ -103,7 +101,7 @@ class Rack:
             channels=self.channels,
             drives=self.drives,
             interrupts=self._interrupts,
-            after=self._after,
+            after=ScanEnd(self.observers, self.inputs, self._stop_all).ended,
             no_event=self._no_event,
             stopwatch=stopwatch,
         )
@@ -382,15 +380,8 @@ class Rack:
         if self.operations.powered:
             self.operations.stop_all(reason, code)
 
-    def _after(self, task: Task, record: ScanRecord | None) -> None:
-        if record is not None:
-            self.observers.scanned(task, record)
-        if self.inputs.frozen and self.inputs.scanned(task.name):
-            self.observers.tell_writes()
-        if task.status is _FAULTED:
-            last = task.errors.last
-            reason = f"task {task.name}: {last.describe() if last else 'fault'}"
-            self.operations.stop_all(reason, last.hardware if last else None, task.name)
+    def _stop_all(self, reason: str, code: str | None, task: str) -> None:
+        self.operations.stop_all(reason, code, task)
 
 
 def scans_per_second(rack: Rack) -> float:

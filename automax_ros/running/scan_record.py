@@ -19,6 +19,9 @@ class Status(enum.Enum):
 
 _FIELDS = ("commits", "duration_ns", "errors", "latched", "reads", "scan", "skipped", "time_ns", "writes")
 
+_KEPT = {"commits": "_commits", "errors": "_errors", "reads": "_reads", "writes": "_writes"}
+"""Where what is made when it is first asked for is kept."""
+
 
 class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
     """All that one scan saw and did; ``reads``, ``writes`` are (view, element, value), ``commits`` (view, value).
@@ -27,20 +30,67 @@ class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
     the scan's beginning to its end, the time in which it was suspended included.
     """
 
-    # Not a dataclass: every recorded scan makes one, and that takes twice as long.
-    __slots__ = _FIELDS
+    # Not a dataclass: every recorded scan makes one, and that takes twice as long. Few need any of the lists.
+    __slots__ = ("_commits", "_errors", "_reads", "_writes", "duration_ns", "latched", "scan", "skipped", "time_ns")
 
     def __init__(self, time_ns: int, scan: int, skipped: int = 0) -> None:
         """Begin the record of a scan that has seen and done nothing; ``skipped`` deadlines were missed before it."""
         self.time_ns = time_ns
         self.scan = scan
         self.latched: Latched = ()
-        self.reads: list[tuple[int, int, Value]] = []
-        self.writes: list[tuple[int, int, Value]] = []
-        self.commits: list[tuple[int, Value]] = []
-        self.errors: list[tuple[int, int]] = []
+        self._reads: list[tuple[int, int, Value]] | None = None
+        self._writes: list[tuple[int, int, Value]] | None = None
+        self._commits: list[tuple[int, Value]] | None = None
+        self._errors: list[tuple[int, int]] | None = None
         self.skipped = skipped
         self.duration_ns = 0
+
+    @property
+    def reads(self) -> list[tuple[int, int, Value]]:
+        """What was read of actual memory, in order."""
+        if self._reads is None:
+            self._reads = []
+        return self._reads
+
+    @property
+    def writes(self) -> list[tuple[int, int, Value]]:
+        """What was written to actual memory, in order."""
+        if self._writes is None:
+            self._writes = []
+        return self._writes
+
+    @property
+    def commits(self) -> list[tuple[int, Value]]:
+        """What blocks changed."""
+        if self._commits is None:
+            self._commits = []
+        return self._commits
+
+    @commits.setter
+    def commits(self, changes: list[tuple[int, Value]]) -> None:
+        self._commits = changes
+
+    @property
+    def errors(self) -> list[tuple[int, int]]:
+        """The run-time errors, (line, code), in order."""
+        if self._errors is None:
+            self._errors = []
+        return self._errors
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether there were run-time errors."""
+        return bool(self._errors)
+
+    @property
+    def has_commits(self) -> bool:
+        """Whether blocks changed anything."""
+        return bool(self._commits)
+
+    @property
+    def has_accesses(self) -> bool:
+        """Whether actual memory was read or written apart from latch and commit."""
+        return bool(self._reads) or bool(self._writes)
 
     def __eq__(self, other: object) -> bool:
         """Return whether another record says the same."""
@@ -60,7 +110,7 @@ class ScanRecord:  # noqa: PLW1641  # no hash: it changes while the scan goes on
 def _with_fields(*values: object) -> ScanRecord:
     record = ScanRecord(0, 0)
     for name, value in zip(_FIELDS, values, strict=True):
-        setattr(record, name, value)
+        setattr(record, _KEPT.get(name, name), value)
     return record
 
 

@@ -176,10 +176,17 @@ class RecordingIo(TaskIo):
         self.read_now = self._read_now
         self.cell_commit = None  # what is committed is noted
         self._plan = task.plan
+        self._image: Image | None = memory if isinstance(memory, Image) else None
+        self._latched = memory.latching(task.plan) if isinstance(memory, Image) else None
 
     def _latch(self) -> Latched:
-        self.record.time_ns = self._memory.now_ns
-        self.record.latched = latched = self._memory.latch(self._plan)
+        record, image, latch = self.record, self._image, self._latched
+        if image is None or latch is None:
+            record.time_ns = self._memory.now_ns
+            record.latched = latched = self._memory.latch(self._plan)
+        else:  # the same, known by its class: an attribute of machine code
+            record.time_ns = image.now_ns
+            record.latched = latched = latch()
         return latched
 
     def _read_now(self, view: int, element: int = 0) -> Value:

@@ -55,6 +55,8 @@ class _TaskStream:
         self.each_state: list[Take] = []
         self.next_full_ns = 0
         self.held: dict[str, Value] = {}
+        self.compiled = messages.compiled
+        self.holds = bool(messages.compiled.held)
 
 
 class RackStream:
@@ -231,7 +233,9 @@ class RackStream:
             if own < len(writes):
                 self._send_log(writes[own:] if own else writes)
             self._send_written(writes, now)
-        if full or not record.scan or ((stream.held or task.compiled.held) and stream.held != task.held):
+        if task.compiled is not stream.compiled:
+            stream.compiled, stream.holds = task.compiled, bool(task.compiled.held)
+        if full or not record.scan or ((stream.held or stream.holds) and stream.held != task.held):
             self._send_state(task, now)
         elif stream.each_state:
             self._send_state(task, now, stream.each_state)

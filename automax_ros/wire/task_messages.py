@@ -75,12 +75,12 @@ class TaskMessages:
             CdrError: a value does not fit its field.
         """
         before, latched = self._latched, record.latched
-        if full or before is None or not record.scan or record.errors:
+        if full or before is None or not record.scan or record.has_errors:
             return self._encode_scan(self.scan(record, stamp, full=full))
         self._latched = latched
-        if record.reads or record.writes:
+        if record.has_accesses:
             return self._in_length(record, stamp, before)
-        if latched != before or record.commits:
+        if latched != before or record.has_commits:
             return self._in_pattern(record, stamp, before)
         quiet = self._quiet
         if quiet is None:

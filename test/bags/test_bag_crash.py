@@ -20,7 +20,7 @@ from automax_ros.bags.live.topics import LiveTopics
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.bags.repair.repairing import RepairReport, repair
-from automax_ros.bags.writer import StorageOptions
+from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.wire.cdr import decode
 from automax_ros.wire.stream import RackStream

@@ -19,7 +19,8 @@ from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.bags.repair.contents import SCAN, WRITE
 from automax_ros.bags.repair.repairing import repair
 from automax_ros.bags.repair.rewriting import Found, kept
-from automax_ros.bags.writer import COMPRESSIONS, BagWriter, StorageOptions
+from automax_ros.bags.storage import COMPRESSIONS, StorageOptions
+from automax_ros.bags.writer import BagWriter
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr import encode
 from automax_ros.wire.messages import NAMES, CommonWrite, Int16, Scan, String

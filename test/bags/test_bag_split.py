@@ -14,7 +14,8 @@ from replay.reexecution import Reexecution
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.writer import COMPRESSIONS, MIN_SPLIT_BYTES, BagWriter, StorageOptions
+from automax_ros.bags.storage import COMPRESSIONS, MIN_SPLIT_BYTES, StorageOptions
+from automax_ros.bags.writer import BagWriter
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr import encode
 from automax_ros.wire.messages import Int16, String

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import threading
 import time
 from pathlib import Path
@@ -10,11 +11,12 @@ from pathlib import Path
 import pytest
 
 from automax_ros.bags.chunk_thread import ChunkThread
+from automax_ros.bags.data_file import DataFile
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.mcap_output import McapOutput
-from automax_ros.bags.writer import BagWriter
+from automax_ros.bags.writer import AT_ONCE_BYTES, BagWriter
 from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import Int16
+from automax_ros.wire.messages import Int16, String
 from automax_ros.wire.qos import VALUE
 
 INT16 = "std_msgs/msg/Int16"
@@ -139,3 +141,48 @@ def test_an_attachment_stands_after_the_chunk_under_way(tmp_path: Path, monkeypa
                 writer.write(channel, number * HALF, encode(Int16(number)))
                 writer.attach(f"{number}.txt", "text/plain", b"x" * number)
     assert (slow / "scans_0.mcap").read_bytes() == (tmp_path / "quick" / "scans_0.mcap").read_bytes()
+
+
+@pytest.mark.parametrize("size", [10, AT_ONCE_BYTES + 1])
+@pytest.mark.parametrize("pace", [True, False])
+def test_where_no_clock_is_kept_pace_with_small_chunks_are_written_at_once(
+    tmp_path: Path, size: int, *, pace: bool
+) -> None:
+    """And the file is the same: see below."""
+    before = recording_threads()
+    with BagWriter(tmp_path / "bag", keeps_pace=lambda: pace) as writer:
+        channel = writer.channel("/a", "std_msgs/msg/String", VALUE)
+        for number in range(4):
+            writer.write(channel, number * HALF, encode(String("x" * size)))
+        at_once = not pace and size < AT_ONCE_BYTES
+        assert recording_threads() == before + (not at_once)
+
+
+def test_who_writes_a_chunk_makes_no_difference_to_the_file(tmp_path: Path) -> None:
+    """Pace may be kept from one chunk to the next, as where a halted rack is stepped."""
+    paces = {"thread": [True], "at once": [False], "in turn": [True, False]}
+    for name, turns in paces.items():
+        pace = itertools.cycle(turns)
+        with BagWriter(tmp_path / name, keeps_pace=lambda pace=pace: next(pace)) as writer:
+            channel = writer.channel("/a", "std_msgs/msg/String", VALUE)
+            for number in range(12):
+                size = AT_ONCE_BYTES * 2 if number % 5 == 3 else number
+                writer.write(channel, number * HALF, encode(String("x" * size)))
+    files = {(tmp_path / name / "scans_0.mcap").read_bytes() for name in paces}
+    assert len(files) == 1
+    assert len({(tmp_path / name / "metadata.yaml").read_bytes() for name in paces}) == 1
+
+
+def test_a_chunk_that_fails_at_once_is_an_error_of_the_writer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    writer = BagWriter(tmp_path / "bag", keeps_pace=lambda: False)
+    channel = writer.channel("/a", INT16, VALUE)
+    writer.write(channel, 0, encode(Int16(1)))
+    monkeypatch.setattr(DataFile, "write", refuse)
+    with pytest.raises(RecordingError, match=r"AMX6801.*No space left"):
+        writer.write(channel, HALF, encode(Int16(1)))
+    with pytest.raises(RecordingError, match="after the recording was closed"):
+        writer.write(channel, HALF, encode(Int16(1)))
+    writer.close()

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.writer import StorageOptions
+from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.wire.stream import RackStream
 

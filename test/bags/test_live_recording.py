@@ -21,7 +21,7 @@ from automax_ros.bags.live.recording import MAX_PENDING, LiveRecording
 from automax_ros.bags.live.topics import LiveTopics
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder
-from automax_ros.bags.writer import StorageOptions
+from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.engine import replay

@@ -55,3 +55,24 @@ def test_its_text_tells_what_is_in_it():
         "ScanRecord(commits=[], duration_ns=0, errors=[], latched=(), reads=[], "
         "scan=1, skipped=0, time_ns=7, writes=[])"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "told"),
+    [
+        ("commits", (6, False), ("has_commits",)),
+        ("errors", (40, 7026), ("has_errors",)),
+        ("reads", (4, 0, 2.5), ("has_accesses",)),
+        ("writes", (5, 1, "text"), ("has_accesses",)),
+    ],
+)
+def test_it_tells_what_it_holds_without_making_a_list(name, entry, told):
+    made = ScanRecord(7, 1)
+    asked = ("has_commits", "has_errors", "has_accesses")
+    assert [getattr(made, word) for word in asked] == [False] * 3
+    assert getattr(made, name) == []
+    assert [getattr(made, word) for word in asked] == [False] * 3, "an empty list is nothing"
+    getattr(made, name).append(entry)
+    assert {word for word in asked if getattr(made, word)} == set(told)
+    assert getattr(made, name) == [entry]
+    assert made != ScanRecord(7, 1)

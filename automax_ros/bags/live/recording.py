@@ -18,8 +18,9 @@ from automax_ros.bags.live.provenance import lacking, provenance
 from automax_ros.bags.live.topics import LiveTopics
 from automax_ros.bags.live.tracks import Gap, TaskTrack, has_written, task_head
 from automax_ros.bags.recording import Recording
+from automax_ros.bags.storage import StorageOptions
 from automax_ros.bags.write_log import WriteLog
-from automax_ros.bags.writer import BagWriter, Channel, StorageOptions
+from automax_ros.bags.writer import BagWriter, Channel
 from automax_ros.core.kinds import WriterKind
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import WriteHead, image_head, operation_head, plant_stamp, scan_head, table_of, write_head

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from automax_ros.bags.errors import BagError, RecordingError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
-from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary, yaml_text
+from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary
 from automax_ros.bags.opening import NO_BAG_HINT, no_recording
 from automax_ros.bags.reader import MAX_METADATA_BYTES, BagReader, read_information
 from automax_ros.bags.repair.contents import FileContents, topics_of
@@ -341,7 +341,7 @@ def _write_metadata(target: Path, kept: list[FileReport], report: RepairReport, 
 
 
 def _metadata_text(files: list[FileSummary], topics: list[TopicSummary], custom: dict[str, str]) -> str:
-    return yaml_text({"rosbag2_bagfile_information": BagMetadata(files, topics, custom).information()})
+    return BagMetadata(files, topics, custom).document()
 
 
 def _refused(target: Path, error: OSError) -> RecordingError:

@@ -155,8 +155,7 @@ class Rewriting:
             self._add(found[:keep], self._loose)
             self._end_loose()
             return
-        builder = ChunkBuilder()
-        builder.index = index
+        builder = ChunkBuilder(index)
         if found:
             inner = frozenset((type(record), record.id) for record in definitions_in(piece.data))
             self._define(index, inner)
