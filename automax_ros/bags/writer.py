@@ -39,7 +39,7 @@ from automax_ros.wire.definitions import message_types, schema_text
 from automax_ros.wire.qos import QosProfile
 
 AT_ONCE_BYTES: Final = 1 << 16
-"""A chunk of up to so many bytes, uncompressed, is written by whoever fills it where no clock is kept pace with
+"""A chunk of up to this many bytes, uncompressed, is written by whoever fills it where no clock is kept pace with
 (decision): it takes 0.1 ms, and handing it to a thread takes longer than that."""
 CHUNK_BYTES: Final = 1 << 20
 """A chunk ends before the next instant when it holds more bytes than this, uncompressed."""

@@ -86,7 +86,7 @@ def records(chance: random.Random, width: int) -> Iterator[ScanRecord]:
         for accesses in (record.reads, record.writes):
             for _ in range(chance.choice((0, 0, 0, 0, 0, 1, 2))):
                 accesses.append((chance.randrange(2), 0, chance.choice(few)))
-        record.errors = chance.choice(([], [], [], [(10, 7001)]))
+        record.errors.extend(chance.choice(([], [], [], [(10, 7001)])))
         yield record
 
 
@@ -128,15 +128,15 @@ def test_scans_with_as_many_accesses_do_not_go_through_the_codec(
     for number in range(4 * patterns.ENOUGH_TIMES):
         record = ScanRecord(number, number)
         record.latched = (number, *[number % 2] * (width - 1))
-        record.reads = [(number % 7, number, 0.5 * number), (3, 0, True)]
-        record.writes = [(2, 5 * number, -number)]
+        record.reads.extend([(number % 7, number, 0.5 * number), (3, 0, True)])
+        record.writes.append((2, 5 * number, -number))
         record.commits = [(1 + number % 3, number)]
         by_codec = number < 2 * patterns.ENOUGH_TIMES + 2
         if not by_codec and number % 5 == 0:
             record.reads[0], by_codec = (6, 0, "text"), True
         monkeypatch.setattr(made, "_encode_scan", encode_scan if by_codec else None)
         assert made.scan_bytes(record, number, full=False) == encode(other.scan(record, number, full=False))
-    record.reads = [(0x10000, 0, 1), (3, 0, 1)]
+    record.reads[:] = [(0x10000, 0, 1), (3, 0, 1)]
     monkeypatch.setattr(made, "_encode_scan", encode_scan)
     with pytest.raises(CdrError):
         made.scan_bytes(record, 1, full=False)
