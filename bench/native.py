@@ -19,6 +19,7 @@ from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.native import NativeCache, NativeTask, NotNative, native_form, translate
 from automax_ros.compile.native.build import build, find_compiler, level_of
 from automax_ros.core.types import DataType, type_of_name
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
 
 COLUMN = 20_000
@@ -50,11 +51,20 @@ def column_ns(native: NativeTask, changes: dict[str, Callable[[int], int]], coun
     return best
 
 
-def called_ns(task: Task, compiled: CompiledTask) -> float:
-    """Return the time of one scan that a task executes in the form that it is given."""
+def called_ns(task: Task, compiled: CompiledTask, *, logged: bool = False) -> float:
+    """Return the time of one scan that a task executes in the form that it is given.
+
+    Args:
+        task: installed in a memory of its own.
+        compiled: the form.
+        logged: whether the write log is kept from now on, as the nodes and a recording ask.
+    """
     task.install(compiled)
     task.run()
     memory = task.memory
+    assert isinstance(memory, CommonMemory)
+    if logged:
+        memory.keep_log()
     views = [memory.view(name) for name in ("LINE_SP%", "FDBK%", "COUNT%", "START@", "READY@")]
     for view, value in ((views[0], 3000), (views[3], True), (views[4], True)):
         memory.write_now(view, value, 1)
@@ -62,6 +72,7 @@ def called_ns(task: Task, compiled: CompiledTask) -> float:
     def vary(number: int) -> None:
         memory.write_now(views[1], number & 2047, 1)
         memory.write_now(views[2], number * 7 & 4095, 1)
+        memory.take_writes()
 
     return scan_ns(task, vary)
 
@@ -148,6 +159,7 @@ def main() -> None:
         ("a task's scan, native", called_ns(task, in_c)),
         ("called, memory free, Python", next_ns(python.scans, python)),
         ("called, memory free, native", next_ns(native.scans, python)),
+        ("a task's scan, native, logged", called_ns(task, in_c, logged=True)),
     )
     print(f"program of {PROGRAM_BLOCKS} blocks{'ns per scan':>24}{'ratio':>9}")
     for name, taken in rows:

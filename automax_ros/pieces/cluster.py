@@ -99,7 +99,7 @@ class _Cluster:
         except TimeoutError:
             what = f"not every worker of the cluster has told within {SAME_S} s what is installed there"
             hint = "one hangs, or its machine does: end it; what is not there is not asked"
-            raise ClusterFault("AMX7941", self._scheduler, what, hint) from None
+            raise ClusterFault("AMX6858", self._scheduler, what, hint) from None
         for worker, found in answers.items():
             if found != self._own:
                 raise self._unlike(worker, found)
@@ -163,7 +163,7 @@ class _Cluster:
         elif (found.version, found.sources) != (self._own.version, self._own.sources):
             what = f"worker {worker} has automax_ros {found}, here is {self._own}"
         else:
-            return ClusterFault("AMX7940", self._scheduler, _other_machine(worker, found, self._own), _SAME_MACHINE)
+            return ClusterFault("AMX6857", self._scheduler, _other_machine(worker, found, self._own), _SAME_MACHINE)
         return ClusterFault("AMX6854", self._scheduler, what, _SAME)
 
 

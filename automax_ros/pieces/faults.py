@@ -9,7 +9,7 @@ from automax_ros.core.text import printable
 class ClusterFault(Fault):
     """Pieces cannot be handed to a cluster: ``place`` is the scheduler's address.
 
-    ``code`` is AMX6851 to AMX6854, AMX7940 or AMX7941.
+    ``code`` is AMX6851 to AMX6854, AMX6857 or AMX6858.
     """
 
     def __init__(self, code: str, place: str, message: str, hint: str) -> None:

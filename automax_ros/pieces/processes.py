@@ -82,9 +82,8 @@ def _copy(end: Connection, ours: Iterable[Connection]) -> Process | None:
     """Begin a copy; None where it would not be safe, or the machine does not make one."""
     if threading.active_count() != 1 or not _THREADS.is_dir():
         return None
-    held = signal.pthread_sigmask(
-        signal.SIG_BLOCK, _ENDING
-    )  # a copy shall not be interrupted as if it were this process
+    # A copy shall not be interrupted as if it were this process.
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
     try:
         pid = os.fork()
         if not pid:

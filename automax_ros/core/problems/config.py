@@ -149,8 +149,8 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6854", "another version on a worker"),
     Problem("AMX6855", "part of a replay whose workers died"),
     Problem("AMX6856", "recording that a worker cannot read"),
-    Problem("AMX7940", "another Python, NumPy or arithmetic on a worker"),
-    Problem("AMX7941", "worker that does not answer"),
+    Problem("AMX6857", "another Python, NumPy or arithmetic on a worker"),
+    Problem("AMX6858", "worker that does not answer"),
     Problem("AMX6860", "recording without a drive to report"),
     # the command line: files and the tables of `automax trace` and `automax compare`
     Problem("AMX6900", "file that no task can be named after", Severity.WARNING),
