@@ -125,8 +125,11 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
     )
     try:
         from automax_ros.cli.run_live import run_live
+        from automax_ros.nodes.clean_place import in_clean_place
+        from automax_ros.nodes.lock import domain_id
 
-        return run_live(plan, stop)
+        with in_clean_place(domain_id()):
+            return run_live(plan, stop)
     except RackError as error:
         return print_refused("node", error)
     except StimuliRefused:
