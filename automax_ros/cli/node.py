@@ -90,7 +90,10 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.watched:
             end_with_watcher(stop)
         if arguments.module is not None:
+            from automax_ros.nodes.transports import avoid_shared_memory
+
             prepare_ros(arguments, "`automax run --simulated` needs no ROS")
+            avoid_shared_memory()
         config = config_of(arguments.config, allow_outside=arguments.allow_outside, quiet=arguments.watched)
         if config is None:
             return 1
@@ -125,11 +128,8 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
     )
     try:
         from automax_ros.cli.run_live import run_live
-        from automax_ros.nodes.clean_place import in_clean_place
-        from automax_ros.nodes.lock import domain_id
 
-        with in_clean_place(domain_id()):
-            return run_live(plan, stop)
+        return run_live(plan, stop)
     except RackError as error:
         return print_refused("node", error)
     except StimuliRefused:

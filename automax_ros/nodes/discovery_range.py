@@ -9,9 +9,13 @@ from __future__ import annotations
 
 import os
 
+from automax_ros.nodes.transports import PEERS as _PEERS
+from automax_ros.nodes.transports import RANGE as _VARIABLE
+from automax_ros.nodes.transports import is_on_loopback
+
 RANGES = ("localhost", "subnet", "off")
 """What can be chosen; ``off`` finds nobody."""
-_VARIABLE, _PEERS, _OLD = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"
+_OLD = "ROS_LOCALHOST_ONLY"
 _WORDS = {"LOCALHOST": "this host", "SUBNET": "the whole subnet", "OFF": "nobody"}
 
 
@@ -29,6 +33,8 @@ def range_text() -> str:
     name = os.environ.get(_VARIABLE, "").upper()
     if os.environ.get(_OLD) == "1":
         return f"this host ({_OLD})"
+    if is_on_loopback():
+        return _WORDS["LOCALHOST"]
     text = _WORDS.get(name, "the whole subnet" if not name else f"range {name[:40]}")
     peers = [peer for peer in os.environ.get(_PEERS, "").split(";") if peer.strip()]
     if peers and name != "OFF":

@@ -13,7 +13,7 @@ from automax_ros.blocks.instance import Instance
 TICK = 5_500_000
 """The default tick in ns: a scan period of TICKS = 1."""
 
-repeatable = settings(deadline=None, derandomize=True, max_examples=100, database=None)
+repeatable = settings(deadline=None, derandomize=True, max_examples=60, database=None)
 int16 = st.integers(-32768, 32767) | st.sampled_from([-32768, -32767, -1, 0, 1, 32766, 32767])
 
 

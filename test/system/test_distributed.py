@@ -84,6 +84,9 @@ def test_processes_that_are_killed_come_back_and_nobody_else_is_disturbed(ros_do
     rack = copied(tmp_path)
     with Distributed(rack) as run, Line() as line:
         line.until_it_scans()
+        for pid in run.seats.values():
+            mapped = Path(f"/proc/{pid}/maps").read_text()
+            assert "/dev/shm/fastrtps_" not in mapped, "who is killed leaves it in a state that others wait for"
         for name, seat in (("processor_2", 2), ("common_memory", 0)):
             before, life = dict(line.values), line.processes[seat].process
             run.kill(name)

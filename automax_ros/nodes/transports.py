@@ -1,0 +1,42 @@
+"""Which ways Fast DDS takes between the processes of a distributed rack: UDP, and no shared memory.
+
+They are made to be killed and started again, and shared memory does not bear that: the process that comes back gets the
+port of the one that was killed, which the others repair at the same time, each for itself, so that some send to a
+segment that nobody reads from then on; or one waits for ever for a lock that the killed one held.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
+_PROFILES, _TRANSPORTS, _MIDDLEWARE = (
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "FASTDDS_BUILTIN_TRANSPORTS",
+    "RMW_IMPLEMENTATION",
+)
+_LOOPBACK = Path(__file__).with_name("loopback.xml")
+
+
+def avoid_shared_memory() -> None:
+    """Let this process speak over UDP alone, after its range is chosen and before rclpy is initialised (decision).
+
+    In the range of one host rmw_fastrtps adds shared memory whatever Fast DDS is told. So it is told nothing of a
+    range, and Fast DDS has the loopback alone: no other host is reached. What the environment says of profiles or
+    transports goes first; other middleware, and peers on other hosts, are left as they are.
+    """
+    chosen = [os.environ.get(name) for name in (_PROFILES, _TRANSPORTS)]
+    if any(chosen) or not (os.environ.get(_MIDDLEWARE) or "rmw_fastrtps_cpp").startswith("rmw_fastrtps"):
+        return
+    if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
+        return
+    if os.environ.get(RANGE, "").upper() != "LOCALHOST":
+        os.environ[_TRANSPORTS] = "UDPv4"
+    elif not os.environ.get(PEERS) and _LOOPBACK.is_file():
+        os.environ.update({RANGE: "SUBNET", PEERS: "127.0.0.1", _PROFILES: str(_LOOPBACK)})
+
+
+def is_on_loopback() -> bool:
+    """Whether this process has the loopback alone, whatever its range says."""
+    return os.environ.get(_PROFILES) == str(_LOOPBACK)

@@ -1,0 +1,67 @@
+"""The processes of a distributed rack speak over UDP, and no farther than their range."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from automax_ros.nodes.discovery_range import choose_range, range_text
+from automax_ros.nodes.transports import avoid_shared_memory
+
+RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
+PROFILES, TRANSPORTS = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS"
+OTHERS = ("ROS_LOCALHOST_ONLY", "RMW_IMPLEMENTATION")
+
+
+def surroundings(monkeypatch, **values: str) -> None:
+    for name in (RANGE, PEERS, PROFILES, TRANSPORTS, *OTHERS):
+        monkeypatch.setenv(name, "")
+        monkeypatch.delenv(name)
+    for name, value in values.items():
+        monkeypatch.setenv(name, value)
+
+
+def found() -> dict[str, str]:
+    return {name: os.environ[name] for name in (RANGE, PEERS, PROFILES, TRANSPORTS) if name in os.environ}
+
+
+def test_on_one_host_only_the_loopback_is_used(monkeypatch):
+    surroundings(monkeypatch)
+    choose_range(None)
+    avoid_shared_memory()
+    assert range_text() == "this host"
+    assert (os.environ[RANGE], os.environ[PEERS]) == ("SUBNET", "127.0.0.1")
+    root = ElementTree.fromstring(Path(os.environ[PROFILES]).read_text(encoding="utf-8").encode())
+    texts = {item.tag.rpartition("}")[2]: (item.text or "").strip() for item in root.iter()}
+    assert (texts["type"], texts["address"], texts["useBuiltinTransports"]) == ("UDPv4", "127.0.0.1", "false")
+    before = found()
+    avoid_shared_memory()
+    assert found() == before
+
+
+def test_on_the_subnet_fast_dds_itself_is_told(monkeypatch):
+    surroundings(monkeypatch)
+    choose_range("subnet")
+    avoid_shared_memory()
+    assert found() == {RANGE: "SUBNET", TRANSPORTS: "UDPv4"}
+    assert range_text() == "the whole subnet"
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {RANGE: "LOCALHOST", PROFILES: "plant.xml"},
+        {RANGE: "SUBNET", TRANSPORTS: "DEFAULT"},
+        {RANGE: "LOCALHOST", PEERS: "10.0.0.5"},
+        {RANGE: "LOCALHOST", "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"},
+        {"ROS_LOCALHOST_ONLY": "1"},
+    ],
+)
+def test_what_the_environment_says_goes_first(monkeypatch, given):
+    surroundings(monkeypatch, **given)
+    before, told = found(), range_text()
+    avoid_shared_memory()
+    assert (found(), range_text()) == (before, told)
