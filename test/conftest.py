@@ -53,7 +53,13 @@ def this_host_alone() -> Iterator[None]:
     """A program that a test runs in its own process may have chosen another range: no other test shall have it."""
     yield
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    os.environ.pop("ROS_LOCALHOST_ONLY", None)
+    for chosen in (
+        "ROS_LOCALHOST_ONLY",
+        "ROS_STATIC_PEERS",
+        "FASTRTPS_DEFAULT_PROFILES_FILE",
+        "FASTDDS_BUILTIN_TRANSPORTS",
+    ):
+        os.environ.pop(chosen, None)
 
 
 @pytest.fixture
