@@ -8,6 +8,8 @@ import timeit
 from collections.abc import Callable
 from pathlib import Path
 
+from _harness import seconds_in_turn
+
 from automax_ros.bags.export import export_csv
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder, RecordingOptions
@@ -124,12 +126,12 @@ def print_share_of_a_rack(folder: Path) -> None:
     config = load(RACK).config
     assert config is not None
     scans = scans_per_second(Rack(config)) * SECONDS
-    plain = min(run_seconds(None) for _ in range(REPEATS))
+    bags = {name: [folder / f"rack_{name}_{number}" for number in range(REPEATS)] for name in COMPRESSIONS}
+    works = [lambda number, name=name: run_seconds(bags[name][number], name) for name in bags]
+    plain, *times = seconds_in_turn([lambda _: run_seconds(None), *works], REPEATS)
     print(f"example rack, {SECONDS} simulated s: {plain / SECONDS * 1e3:.2f} ms per second without recording")
-    for compression in COMPRESSIONS:
-        bags = [folder / f"rack_{compression}_{number}" for number in range(REPEATS)]
-        taken = min(run_seconds(bag, compression) for bag in bags)
-        size = sum(path.stat().st_size for path in bags[0].iterdir())
+    for compression, taken in zip(COMPRESSIONS, times, strict=True):
+        size = sum(path.stat().st_size for path in bags[compression][0].iterdir())
         print(
             f"  {compression:6}{taken / SECONDS * 1e3:6.2f} ms per second {scans / taken:10,.0f} scans/s"
             f"{size / scans:7.0f} bytes per scan{size / taken / 1e6:7.1f} MB/s"

@@ -37,7 +37,7 @@ ROS_PACKAGES = {
     "std_msgs", "std_srvs",
 }  # fmt: skip
 ROSDEP_KEYS = {"lz4": "python3-lz4", "numpy": "python3-numpy", "yaml": "python3-yaml", "zstandard": "python3-zstandard"}
-WITHOUT_KEY = {"automax_ros", "distributed", "matplotlib", "mcap", "mypy_extensions", "scipy"}
+WITHOUT_KEY = {"automax_ros", "distributed", "librt", "matplotlib", "mcap", "mypy_extensions", "scipy"}
 """Imported, but ours, wanted for pictures, clusters or the check of types only, or without a key of rosdep."""
 
 

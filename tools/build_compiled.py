@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from compiled_groups import GROUPS, PACKAGE, ROOT, Group
+from compiler_parts import parts
 
 sys.path.insert(0, str(ROOT))
 from automax_ros.core import compiled
@@ -41,7 +42,7 @@ FLAGS = (
 is hidden is called directly, and may be inlined."""
 PART_BYTES = 600_000
 """C that is compiled at once: headers are read a few times, modules are inlined in each other, all cores have work."""
-TOOLS = ("build_compiled.py", "compiled_translate.py")
+TOOLS = ("build_compiled.py", "compiled_translate.py", "compiler_parts.py")
 NICE = 5
 
 
@@ -132,8 +133,9 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
     with tempfile.TemporaryDirectory(prefix="automax_compiled") as temporary:
         work = Path(temporary)
         facts = translated(group, work)
-        include = [f"-I{work}", f"-I{sysconfig.get_path('include')}"]
-        library_parts = parts(work, [*facts["c"], *facts["runtime"]])
+        folders = [work, *(work / item for item in facts["include"]), sysconfig.get_path("include")]
+        include = [f"-I{item}" for item in folders]
+        library_parts = part_files(work, [*facts["c"], *facts["runtime"]])
         objects = [*library_parts, *facts["shims"].values()]
         list(pool.map(lambda file: run([*compiler.compile, *include, "-c", file, "-o", f"{file}.o"], work), objects))
         suffix = EXTENSION_SUFFIXES[0]
@@ -158,18 +160,12 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
     return lines
 
 
-def parts(work: Path, files: Sequence[str]) -> list[str]:
+def part_files(work: Path, files: Sequence[str]) -> list[str]:
     """Write files that include about PART_BYTES of C each, in the order of ``files``; return their names."""
-    divided: list[list[str]] = []
-    size = PART_BYTES
-    for file in files:
-        if size >= PART_BYTES:
-            divided.append([])
-            size = 0
-        divided[-1].append(file)
-        size += (work / file).stat().st_size
+    divided = parts([work / file for file in files], PART_BYTES)
     for number, part in enumerate(divided):
-        (work / f"part_{number}.c").write_text("".join(f'#include "{file}"\n' for file in part), encoding="utf-8")
+        text = "".join(f'#include "{path.relative_to(work)}"\n' for path in part)
+        (work / f"part_{number}.c").write_text(text, encoding="utf-8")
     return [f"part_{number}.c" for number in range(len(divided))]
 
 

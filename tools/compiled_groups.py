@@ -53,6 +53,7 @@ _RECORDING = (
     "wire/rack_messages.py",
     "wire/stream.py",
     "wire/task_messages.py",
+    "wire/unsigned.py",
     "wire/write_messages.py",
     "bags/chunk_builder.py",
     "bags/mcap_output.py",

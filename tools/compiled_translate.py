@@ -57,7 +57,7 @@ def translate(name: str, folder: Path) -> dict[str, Any]:
     errors = Errors(options)
     try:
         if not result.errors:
-            _, texts, _ = emitmodule.compile_modules_to_c(result, wanted, errors, groups)
+            translated, texts, _ = emitmodule.compile_modules_to_c(result, wanted, errors, groups)
     finally:
         result.manager.metastore.close()
     problems = [*result.errors, *(message for message in errors.new_messages() if ": error:" in message)]
@@ -66,12 +66,14 @@ def translate(name: str, folder: Path) -> dict[str, Any]:
     for file, text in texts[0]:
         (folder / file).write_text(text, encoding="utf-8")
     modules = {source.module: str(source.path) for source in sources}
+    used = sorted(emitmodule.collect_source_dependencies(translated), key=lambda item: item.path)
     return {
         "modules": modules,
         "needs": needs(result, set(modules)),
         "library": shared_lib_name(f"automax_{name}"),
         "c": [file for file, _ in texts[0] if file.endswith(".c")],
-        "runtime": runtime(folder),
+        "runtime": runtime(folder, [item.path for item in used]),
+        "include": sorted({item for source in used for item in source.include_dirs}),
         "shims": shims(shared_lib_name(f"automax_{name}"), modules, folder),
     }
 
@@ -86,11 +88,14 @@ def needs(result: Any, modules: set[str]) -> dict[str, str]:
     return found
 
 
-def runtime(folder: Path) -> list[str]:
-    """Copy mypyc's own C files to where the group's are."""
-    for path in Path(include_dir()).glob("*.[ch]"):
-        shutil.copy(path, folder)
-    return list(RUNTIME_C_FILES)
+def runtime(folder: Path, used: list[str]) -> list[str]:
+    """Copy mypyc's own C files to where the group's are; return those that all need, and what the group ``used``."""
+    here = Path(include_dir())
+    for path in here.rglob("*.[ch]"):
+        target = folder / path.relative_to(here)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, target)
+    return [*RUNTIME_C_FILES, *used]
 
 
 def shims(library: str, modules: dict[str, str], folder: Path) -> dict[str, str]:

@@ -37,7 +37,8 @@ fingerprint() {
     {
         echo "$PWD"
         cat pyproject.toml setup.cfg automax_ros/__init__.py tools/setup_environment.sh \
-            tools/build_messages.py tools/message_code.py tools/message_libraries.py msg_defs/package.xml
+            tools/build_messages.py tools/compiler_parts.py tools/message_code.py tools/message_libraries.py \
+            msg_defs/package.xml
         tail -n +1 msg_defs/msg/*.msg msg_defs/srv/*.srv
     } | sha256sum
 }

@@ -62,7 +62,7 @@ if [ ! -x "$venv/bin/colcon" ]; then
         ros-jazzy-ament-{package,index-python,index-cpp} ros-jazzy-gmock-vendor ros-jazzy-gtest-vendor \
         ros-jazzy-python-cmake-module ros-jazzy-fastrtps-cmake-module ros-jazzy-rcutils ros-jazzy-rcpputils \
         ros-jazzy-domain-coordinator \
-        lz4 mcap PyYAML zstandard
+        librt lz4 mcap PyYAML zstandard
 fi
 
 # The wheels' CMake files name the Python of the machine that built them.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import lz4.frame
@@ -114,7 +114,7 @@ class McapOutput:
 
     def add_chunk(self, chunk: ChunkBuilder) -> None:
         """Write a chunk with its index; one without messages is left out."""
-        if not chunk.index:
+        if not chunk.has_messages:
             return
         data = chunk.data
         first_time, last_time = chunk.first_time, chunk.last_time
@@ -141,14 +141,15 @@ class McapOutput:
         offsets: dict[int, int] = {}
         parts = [record]
         length_of_indexes = 0
-        for channel, entries in chunk.index.items():
+        index = chunk.index
+        for channel, entries in index.items():
             offsets[channel] = offset + length_of_indexes
-            size = len(entries) * 8
+            size = len(entries)
             parts.append(_INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size))
-            parts.append(struct.pack(f"<{len(entries)}Q", *entries))
+            parts.append(entries)
             length_of_indexes += _INDEX_HEAD.size + size
         self._write(b"".join(parts))
-        self._count(chunk, first_time, last_time)
+        self._count(index, first_time, last_time)
         self.statistics.chunk_count += 1
         ChunkIndex(
             message_start_time=packed.message_start_time,
@@ -186,15 +187,15 @@ class McapOutput:
         crc = zlib.crc32(footer[:-4], zlib.crc32(data))
         self._write(data + footer[:-4] + struct.pack("<I", crc) + MAGIC)
 
-    def _count(self, chunk: ChunkBuilder, first_time: int, last_time: int) -> None:
+    def _count(self, index: Mapping[int, bytes], first_time: int, last_time: int) -> None:
         total = self.statistics
         if not total.message_count:
             total.message_start_time, total.message_end_time = first_time, last_time
         total.message_start_time = min(total.message_start_time, first_time)
         total.message_end_time = max(total.message_end_time, last_time)
         counts = total.channel_message_counts
-        for channel, entries in chunk.index.items():
-            count = len(entries) * 8 // _INDEX_BYTES
+        for channel, entries in index.items():
+            count = len(entries) // _INDEX_BYTES
             counts[channel] = counts.get(channel, 0) + count
             total.message_count += count
 

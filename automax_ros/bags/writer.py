@@ -336,7 +336,7 @@ class BagWriter:
     def _end_chunk(self, *, wait: bool) -> None:
         """Let the open chunk be written; ``wait`` until it is: then the file may be asked for its size, or written."""
         chunk = self._chunk
-        if chunk.index:
+        if chunk.has_messages:
             if chunk.size <= AT_ONCE_BYTES and not self._keeps_pace():
                 self._chunks.settle()
                 self._mcap.add_chunk(chunk)

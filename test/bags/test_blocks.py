@@ -67,6 +67,10 @@ def chunk() -> ChunkBuilder:
     return builder
 
 
+def index_of(chunk: ChunkBuilder) -> dict[int, list[int]]:
+    return {channel: list(struct.unpack(f"<{len(data) // 8}Q", data)) for channel, data in chunk.index.items()}
+
+
 def indexed(chunk: ChunkBuilder, entries: dict[int, list[int]]) -> WholeChunk:
     whole = WholeChunk(bytes(chunk.data))
     for channel, numbers in entries.items():
@@ -75,7 +79,7 @@ def indexed(chunk: ChunkBuilder, entries: dict[int, list[int]]) -> WholeChunk:
 
 
 def test_an_index_that_fills_its_chunk_tells_where_messages_stand(chunk: ChunkBuilder):
-    table = indexed(chunk, chunk.index).table()
+    table = indexed(chunk, index_of(chunk)).table()
     assert table is not None
     assert table.lengths.tolist() == [number + 4 for number in range(20)]
     assert table.log_times.tolist() == [1000 + number for number in range(20)]
@@ -89,7 +93,7 @@ def test_an_index_that_fills_its_chunk_tells_where_messages_stand(chunk: ChunkBu
 
 @pytest.mark.parametrize("place", [-1, 0, 5, 10_000, (1 << 64) - 1], ids=str)
 def test_an_index_that_lies_counts_nothing(chunk: ChunkBuilder, place: int):
-    entries = {channel: list(numbers) for channel, numbers in chunk.index.items()}
+    entries = index_of(chunk)
     if place < 0:
         del entries[2][-2:]  # a message that no index tells of
     else:
@@ -98,9 +102,9 @@ def test_an_index_that_lies_counts_nothing(chunk: ChunkBuilder, place: int):
 
 
 def test_more_entries_than_a_chunk_can_hold_count_nothing(chunk: ChunkBuilder):
-    entries = dict(chunk.index)
+    entries = index_of(chunk)
     for channel in range(3, 40):
-        entries[channel] = list(chunk.index[1])
+        entries[channel] = list(entries[1])
     assert indexed(chunk, entries).table() is None
 
 

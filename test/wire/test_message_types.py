@@ -109,22 +109,19 @@ def test_each_generator_gets_a_copy_of_what_is_parsed_once(tmp_path: Path, monke
     assert read == places[:2]
 
 
-@pytest.mark.parametrize("name", ["message_libraries", "build_compiled"])
-def test_parts_that_are_compiled_at_once_have_each_source_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
+def test_parts_that_are_compiled_at_once_have_each_source_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
-    tool = importlib.import_module(name)
-    monkeypatch.setattr(tool, "PART_BYTES", 100)
     sizes = {"a.c": 60, "b.c": 60, "c.c": 10, "d.c": 200, "e.c": 5}
     for file, size in sizes.items():
         (tmp_path / file).write_text("x" * size)
-    if name == "message_libraries":
-        found = [[path.name for path in part] for part in tool._parts([tmp_path / file for file in sizes])]
-    else:
-        texts = [(tmp_path / part).read_text() for part in tool.parts(tmp_path, list(sizes))]
-        found = [re.findall(r'#include "(.*)"', text) for text in texts]
-    assert found == [["a.c", "b.c"], ["c.c", "d.c"], ["e.c"]]
+    expected = [["a.c", "b.c"], ["c.c", "d.c"], ["e.c"]]
+    parts = importlib.import_module("compiler_parts").parts([tmp_path / file for file in sizes], 100)
+    assert [[path.name for path in part] for part in parts] == expected
+
+    tool = importlib.import_module("build_compiled")
+    monkeypatch.setattr(tool, "PART_BYTES", 100)
+    texts = [(tmp_path / part).read_text() for part in tool.part_files(tmp_path, list(sizes))]
+    assert [re.findall(r'#include "(.*)"', text) for text in texts] == expected
 
 
 @pytest.mark.soak

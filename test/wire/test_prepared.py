@@ -142,6 +142,27 @@ def test_scans_with_as_many_accesses_do_not_go_through_the_codec(
         made.scan_bytes(record, 1, full=False)
 
 
+def test_the_numbers_of_a_quiet_scan_reach_as_far_as_their_fields(tmp_path: Any) -> None:
+    task = build(tmp_path).task("SPEED")
+    one, other = TaskMessages(task), TaskMessages(task)
+    latched = (0,) * len(task.compiled.latched)
+
+    def both(stamp: int, scan: int, number: int) -> tuple[bytes, bytes]:
+        record = ScanRecord(0, scan, number)
+        record.latched, record.duration_ns = latched, number
+        return one.scan_bytes(record, stamp, full=False), encode(other.scan(record, stamp, full=False))
+
+    both(0, 1, 0)  # a full one
+    for stamp in (0, NS_PER_S - 1, NS_PER_S, (2**31 - 1) * NS_PER_S + 999_999_999):
+        for scan in (1, 2**62, 2**63 - 1, 2**63, 2**64 - 1):
+            for number in (0, 1, 2**31 - 1, 2**31, 2**32 - 1, 2**40):
+                made, expected = both(stamp, scan, number)
+                assert made == expected
+    for stamp, scan in ((2**31 * NS_PER_S, 1), (0, 2**64), (0, -1)):
+        with pytest.raises(CdrError, match="scan of task SPEED"):
+            both(stamp, scan, 0)
+
+
 def test_states_of_a_task(tmp_path: Any) -> None:
     rack = build(tmp_path)
     rack.start()
