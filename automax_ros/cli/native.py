@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Iterable
 
-from automax_ros.compile.native.build import LIMIT_S
+from automax_ros.compile.native.compiler_process import LIMIT_S
 from automax_ros.compile.native.forms import NativeForms, NativeMode, NativeOutcome
 
 _LIVE_LIMIT_S = 20.0

@@ -22,11 +22,16 @@ _NO_END = "simulated time without an end: Ctrl-C ends the run (or give --duratio
 
 
 def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
-    """Run until the duration has passed, nothing can happen any more, or a stop is requested; return the exit code."""
-    rack = Rack(plan.config, native=plan.native)
-    warn(rack)
-    tell_forms(rack, plan)
-    stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
+    """Run until the duration has passed, nothing can happen any more, or a stop is requested; return the exit code.
+
+    Raises:
+        CutShort: a signal came while tasks were compiled.
+    """
+    with stop.cut_short():
+        rack = Rack(plan.config, native=plan.native)
+        warn(rack)
+        tell_forms(rack, plan)
+        stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, plan.record, plan.recording) if plan.record is not None else None
     display = StatusDisplay(rack, plan.watch, live=False)

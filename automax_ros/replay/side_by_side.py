@@ -24,7 +24,11 @@ LEAST_PART_BYTES = 16 << 20
 
 They are handed out in their order: the first one that differs ends the work, and the last is the shortest as a rule.
 """
-ONE_PART = "the recording is one part, so it is replayed here: a cluster does the files of a split recording"
+ONE_PART = (
+    "the recording is replayed here: a cluster is handed parts of at least "
+    f"{LEAST_PART_BYTES >> 20} MB, each of one file or more, and it has only one such part"
+)
+"""What is told of a cluster that is not used."""
 Progress = Callable[[float], None]
 
 

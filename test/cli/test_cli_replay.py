@@ -54,8 +54,8 @@ def test_a_cluster_that_is_not_used_is_told(automax, bag):
     result, alone = automax("replay", bag, "--scheduler", "tcp://127.0.0.1:1"), automax("replay", bag)
     assert (result.code, result.out) == (0, alone.out)
     assert result.err == (
-        "automax replay: the recording is one part, so it is replayed here: "
-        "a cluster does the files of a split recording\n"
+        "automax replay: the recording is replayed here: a cluster is handed parts of at least 16 MB, "
+        "each of one file or more, and it has only one such part\n"
     )
 
 

@@ -2,44 +2,31 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import platform
 import shutil
-import signal
-import subprocess
 import sys
 import sysconfig
-import tempfile
-import threading
-import weakref
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.source import NotNative
+from automax_ros.compile.native.compiler_process import LIMIT_S, MADE, run_compiler
+from automax_ros.compile.native.source import NOT_KEPT, NotNative
 
 FLAGS = ("-std=c11", "-ffp-contract=off", "-fno-fast-math", "-fwrapv", "-fPIC", "-shared")
 """Nothing among them changes bits: no fused multiply-add, and integers that overflow wrap around."""
 LONG_TEXT = 200_000
 """Characters from which on a text is compiled at -O1, not -O2 (decision).
 
-A task of 2,000 lines, 800,000 characters, takes 5 s and not 15, and scans as quickly within a few percent.
+A task of 2,000 lines, a million characters, takes 5 s and not 15, and scans as quickly within a few percent.
 """
 MOST_TEXT = 4_000_000
-"""Characters of a text that is compiled (decision): a task of 10,000 lines, and 1 GB of memory for the compiler."""
-LIMIT_S = 120.0
-"""Time that the compiler has for one text, s (decision): a task of 2,000 lines takes a few."""
+"""Characters of a text that is compiled (decision): a task of 8,000 lines, and 1 GB of memory for the compiler."""
 _USUAL = ("cc", "gcc", "clang")
-_RUNNING: dict[subprocess.Popen[str], threading.Thread] = {}
-"""The compilers that are under way, and the threads that wait for them."""
-_ABANDONED: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
-"""Threads that nobody waits for any more."""
-_MESSAGE = 400
-"""Characters of what the compiler says that are passed on."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +67,13 @@ def require_tools(limit_s: float = LIMIT_S) -> None:
     python_options()
 
 
-def library(text: str, cache: NativeCache, options: Sequence[str] = (), limit_s: float = LIMIT_S) -> Path:
-    """Return the library of a C text: from the cache, or built and kept there.
+def library(
+    text: str, cache: NativeCache, options: Sequence[str] = (), limit_s: float = LIMIT_S, *, builds: bool = True
+) -> Path:
+    """Return the library of a C text: from the cache or, if it ``builds``, made now and kept there.
 
     Raises:
-        NotNative: no compiler, it fails or takes longer than ``limit_s``, the text is too long, or the cache not safe.
+        NotNative: no compiler, it fails, lacks memory or time, the text is too long, or the cache not safe.
     """
     if len(text) > MOST_TEXT:
         raise NotNative(f"its C text would have {len(text):,} characters, more than {MOST_TEXT:,}")
@@ -92,6 +81,8 @@ def library(text: str, cache: NativeCache, options: Sequence[str] = (), limit_s:
     options = (level_of(text), *options)
     key = key_of(text, compiler, options)
     found = cache.found(key)
+    if found is None and not builds:
+        raise NotNative(NOT_KEPT)
     return found if found is not None else cache.store(key, build(text, compiler, options, limit_s))
 
 
@@ -107,26 +98,16 @@ def key_of(text: str, compiler: Compiler, options: Sequence[str] = ()) -> str:
 
 
 def build(text: str, compiler: Compiler, options: Sequence[str] = (), limit_s: float = LIMIT_S) -> bytes:
-    """Return a library as the compiler makes it of a text, without a shell and without the variables that steer it.
+    """Return a library as the compiler makes it of a text.
 
     Raises:
-        NotNative: the compiler fails, or takes longer than ``limit_s`` s.
+        NotNative: the compiler fails, has not enough memory, or takes longer than ``limit_s`` s.
     """
-    with tempfile.TemporaryDirectory(prefix="automax_native_") as folder:
-        made = Path(folder, "made.so")
-        command = [compiler.path, *FLAGS, *options, "-x", "c", "-", "-o", str(made), "-lm"]
-        _run(command, _environment(compiler.search, folder), text, limit_s)
-        if not made.is_file():
-            raise NotNative(f"{compiler.path} has written no library")
-        return made.read_bytes()
-
-
-def abandon(threads: Iterable[threading.Thread]) -> None:
-    """End the compilers that these threads wait for, and each that they will start: nobody waits for the threads."""
-    _ABANDONED.update(threads)
-    for process, thread in list(_RUNNING.items()):
-        if thread in _ABANDONED:
-            _kill(process)
+    command = [compiler.path, *FLAGS, *options, "-x", "c", "-", "-o", MADE, "-lm"]
+    made = run_compiler(command, compiler.search, text, limit_s).made
+    if made is None:
+        raise NotNative(f"{compiler.path} has written no library")
+    return made
 
 
 def python_options() -> tuple[str, ...]:
@@ -142,54 +123,6 @@ def python_options() -> tuple[str, ...]:
     return f"-I{include}", f"-DAUTOMAX_PYTHON={sys.implementation.cache_tag}_{sys.hexversion:x}"
 
 
-def _environment(search: str, folder: str) -> dict[str, str]:
-    """Return what the compiler is given: CPATH, LIBRARY_PATH, COMPILER_PATH and the like do not reach it."""
-    return {"PATH": search, "TMPDIR": folder, "LC_ALL": "C"}
-
-
-def _run(command: Sequence[str], environment: dict[str, str], text: str, limit_s: float) -> str:
-    """Run a compiler; return what it prints. With it end the processes that it has started."""
-    try:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=environment,
-            cwd=os.sep,
-            text=True,
-            encoding="utf-8",
-            errors="replace",
-            start_new_session=True,
-        )
-    except OSError as error:
-        raise NotNative(f"{command[0]} cannot be run: {error.strerror or error}") from error
-    thread = _RUNNING[process] = threading.current_thread()
-    if thread in _ABANDONED:
-        _kill(process)
-    try:
-        said, complaints = process.communicate(text, limit_s)
-    except BaseException as error:
-        _kill(process)
-        process.communicate()
-        if isinstance(error, subprocess.TimeoutExpired):
-            raise NotNative(f"{command[0]} has not ended within {limit_s:g} s") from error
-        raise
-    finally:
-        del _RUNNING[process]
-    if process.returncode:
-        lines = complaints.strip().splitlines() or [f"exit code {process.returncode}"]
-        told = next((line for line in lines if "error" in line), lines[0])
-        raise NotNative(f"{command[0]} fails: {told[:_MESSAGE]}")
-    return said
-
-
-def _kill(process: subprocess.Popen[str]) -> None:
-    if process.poll() is None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-
-
 def _stamp(path: str) -> tuple[int, int]:
     """Return what changes with a compiler: time and size of its file."""
     known = os.stat(path)
@@ -198,5 +131,5 @@ def _stamp(path: str) -> tuple[int, int]:
 
 @lru_cache(maxsize=8)
 def _version(path: str, search: str, _: tuple[int, int], limit_s: float) -> str:
-    said = _run([path, "--version"], _environment(search, os.sep), "", limit_s)
+    said = run_compiler([path, "--version"], search, limit_s=limit_s).said
     return (said.splitlines() or [""])[0]

@@ -25,7 +25,7 @@ FOLDER = "automax_ros"
 MOST_BYTES = 256 << 20
 """Size that a cache may have; what was not used for longest goes first (decision)."""
 STALE_S = 3600
-"""Age after which an unfinished file is taken for that of a process which was killed, s (decision)."""
+"""Age after which an unfinished file, or a compiler's folder, is taken for that of a killed process, s (decision)."""
 _LIBRARY, _TEXT, _UNFINISHED = ".so", ".text", ".unfinished"
 _DIGEST = 32
 """Bytes of SHA-256."""

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native.build import LIMIT_S, abandon, library
+from automax_ros.compile.native.build import library
 from automax_ros.compile.native.cache import NativeCache
+from automax_ros.compile.native.compiler_process import LIMIT_S, abandon
 from automax_ros.compile.native.source import NotNative
 
 if TYPE_CHECKING:
@@ -22,10 +23,13 @@ if TYPE_CHECKING:
 
 LINE_NS = 75
 """What a line of a task takes in a scan in Python, ns, about: a block does."""
-WORTHWHILE_NS, WORTHWHILE_LINE_NS = 2_000_000_000, 10_000_000
-"""Time that scans must take in Python for native ones to be built or looked for, ns, and what each line of the task
-adds to that (decision: twice what it takes at most to translate and build the task the first time, which is a second,
-and 5 ms per line; what is kept from another run takes some hundredths).
+WORTHWHILE_NS, WORTHWHILE_LINE_NS = 500_000_000, 10_000_000
+"""Time that scans must take in Python for native ones to be built, ns, and what each line of the task adds to that
+(decision: twice what it takes to translate and build the task, which is 0.2 s, and 5 ms per line).
+"""
+WORTHWHILE_KEPT_NS = 100_000_000
+"""Time that scans must take in Python for native ones to be looked for among what other runs have built, ns (decision:
+a task is found in 0.02 s, and saves two thirds of this).
 """
 
 _FAULT = "automax itself failed to make it native, please report this with the task's text"
@@ -100,24 +104,26 @@ class NativeForms:
         """
         if self.mode is NativeMode.OFF:
             return NativeOutcome(compiled, why=self.why_off)
-        if self.mode is NativeMode.AUTO and not self._pays(compiled):
+        builds = self.mode is NativeMode.ON or self._pays(compiled, WORTHWHILE_NS, WORTHWHILE_LINE_NS)
+        if not builds and not self._pays(compiled, WORTHWHILE_KEPT_NS, 0):
             return NativeOutcome(compiled, why="a run this short gains nothing by it (--native on)")
         from automax_ros.compile.native.task import native_form
 
         try:
-            native = native_form(compiled, self.cache, limit_s=self.limit_s)
+            native = native_form(compiled, self.cache, limit_s=self.limit_s, builds=builds)
         except NotNative as reason:
             return NativeOutcome(compiled, why=str(reason))
         except Exception as fault:
             return NativeOutcome(compiled, why=f"{_FAULT}: {type(fault).__name__}: {fault}"[:_MOST_WHY])
         return NativeOutcome(compiled.with_scans(native.scans, native.scans_forced), native)
 
-    def _pays(self, compiled: CompiledTask) -> bool:
+    def _pays(self, compiled: CompiledTask, least_ns: int, least_line_ns: int) -> bool:
+        """Return whether scans in Python take as long as this, and as this for each line."""
         if self.expected_ns is None:
             return True
         period = compiled.program.period_ns
         scans, lines = self.expected_ns // period if period else 0, len(compiled.program.scan)
-        return scans * lines * LINE_NS >= WORTHWHILE_NS + lines * WORTHWHILE_LINE_NS
+        return scans * lines * LINE_NS >= least_ns + lines * least_line_ns
 
 
 def _side_by_side(

@@ -17,7 +17,7 @@ from automax_ros.compile.assembly import Form
 from automax_ros.compile.coefficient_function import CoefficientFunction
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.source import NativeSource
+from automax_ros.compile.native.source import NOT_KEPT, NativeSource, NotNative
 from automax_ros.compile.native.translation import fixed_parts, scans_of, translated
 from automax_ros.pieces.installation import installation
 
@@ -25,17 +25,19 @@ _TRANSLATOR = (installation().sources, sys.implementation.cache_tag, *fixed_part
 """What translates: looked at when this module is loaded, as are the others, so that it is what runs."""
 
 
-def kept_translation(compiled: CompiledTask, cache: NativeCache) -> NativeSource:
-    """Return the C of a task's scans, as ``translate`` does: from the cache, or translated and kept there.
+def kept_translation(compiled: CompiledTask, cache: NativeCache, *, builds: bool = True) -> NativeSource:
+    """Return the C of a task's scans, as ``translate`` does: from the cache, or translated if it ``builds``, and kept.
 
     Raises:
-        NotNative: the task has no translation, or the cache is not safe.
+        NotNative: the task has no translation, or only a new one, or the cache is not safe.
     """
     form = scans_of(compiled)
     key = translation_key(compiled, form)
     content = cache.read(key)
     if content is not None:
         return _unpacked(content)
+    if not builds:
+        raise NotNative(NOT_KEPT)
     source = translated(compiled, form)
     cache.keep(key, _packed(source))
     return source

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+NOT_KEPT = "a run this short gains nothing by building it, and no other has (--native on)"
+"""Why a task is in Python that is only looked for in the cache, and not there."""
+
 
 class NotNative(Exception):
     """A task cannot be native, or not here; it runs in Python, bit for bit the same.

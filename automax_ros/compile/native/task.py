@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, Scans
-from automax_ros.compile.native.build import LIMIT_S, library, python_options, require_tools
+from automax_ros.compile.native.build import library, python_options, require_tools
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.columns import Columns
+from automax_ros.compile.native.compiler_process import LIMIT_S
 from automax_ros.compile.native.executed import BesideLatch, Column, Executed
 from automax_ros.compile.native.kept_translations import kept_translation
 from automax_ros.compile.native.slots import StateSlots, kind_of
@@ -63,16 +64,19 @@ def native_form(
     cache: NativeCache,
     translator: Callable[[CompiledTask], NativeSource] | None = None,
     limit_s: float = LIMIT_S,
+    *,
+    builds: bool = True,
 ) -> NativeTask:
-    """Return the native form of a task, from the cache or built now. Any thread may ask for it.
+    """Return the native form of a task, from the cache or, if it ``builds``, made now. Any thread may ask for it.
 
     Raises:
         NotNative: the task cannot be native, or not here, and why.
     """
     try:
         require_tools(limit_s)  # first, since translating a long task takes some seconds
-        source = kept_translation(compiled, cache) if translator is None else translator(compiled)
-        return NativeTask(compiled, source, library(source.text, cache, limit_s=limit_s), host_module(cache, limit_s))
+        source = kept_translation(compiled, cache, builds=builds) if translator is None else translator(compiled)
+        path = library(source.text, cache, limit_s=limit_s, builds=builds)
+        return NativeTask(compiled, source, path, host_module(cache, limit_s, builds=builds))
     except (OSError, ImportError) as error:
         raise NotNative(f"native code cannot be loaded: {error}; is the cache's folder mounted noexec?") from error
 
@@ -86,16 +90,16 @@ def _forced_in_python(compiled: CompiledTask) -> Scans:
     return scans
 
 
-def host_module(cache: NativeCache, limit_s: float = LIMIT_S) -> Any:
+def host_module(cache: NativeCache, limit_s: float = LIMIT_S, *, builds: bool = True) -> Any:
     """Return the module that calls native tasks, from the cache or built now.
 
     Raises:
-        NotNative: it cannot be built here.
+        NotNative: it cannot be built here, or is not to be.
         OSError, ImportError: it cannot be loaded.
     """
     folder = Path(__file__).parent
     text = "\n".join((folder / name).read_text(encoding="utf-8") for name in _HOST_TEXTS)
-    return _host(str(library(text, cache, python_options(), limit_s)))
+    return _host(str(library(text, cache, python_options(), limit_s, builds=builds)))
 
 
 @lru_cache(maxsize=4)

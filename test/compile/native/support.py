@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 from automax_ros.compile import native
+
+PATIENCE_S = 60.0
 
 ABI = (Path(native.__file__).parent / "abi.h").read_text(encoding="utf-8")
 
@@ -57,3 +62,26 @@ def compiler_of(folder: Path, script: str) -> Path:
     path.write_text(f'#!/bin/sh\n[ "$1" = --version ] && {{ echo fake 1; exit 0; }}\n{script}\n')
     path.chmod(0o755)
     return path
+
+
+def begun_compiler_of(folder: Path, ending: str = "exec sleep 1000") -> Path:
+    """A compiler that tells its process's number through the named pipe ``begun`` of its folder, and goes on and on."""
+    (folder / "begun").unlink(missing_ok=True)
+    os.mkfifo(folder / "begun")
+    return compiler_of(folder, f"echo $$ > {folder / 'begun'}; {ending}")
+
+
+def await_that(what: Callable[[], bool]) -> None:
+    """Wait until something is so; fail if it does not come."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not what():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def has_ended(pid: int) -> bool:
+    """Whether a process has ended; whoever takes over orphans buries it when it finds the time."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return True

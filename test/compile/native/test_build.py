@@ -1,11 +1,9 @@
 import ctypes
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import sysconfig
-import time
 from pathlib import Path
 
 import pytest
@@ -16,7 +14,7 @@ from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.source import NotNative
 
 from ..support import compiled_of, lines
-from .support import compiler_of
+from .support import await_that, begun_compiler_of, compiler_of, has_ended
 
 ANSWER = "int answer(void) { return 42; }\n"
 
@@ -144,19 +142,8 @@ def test_a_compiler_that_hangs_is_ended_with_all_it_has_started(cache, monkeypat
     with pytest.raises(NotNative, match="cc has not ended within 1 s"):
         library(ANSWER, cache, limit_s=1.0)
     child = int(started.read_text())
-    for _ in range(2000):  # whoever takes over orphans buries it when it finds the time
-        if not _is_alive(child):
-            break
-        time.sleep(0.005)
-    assert not _is_alive(child)
+    await_that(lambda: has_ended(child))
     assert files_of(cache) == []
-
-
-def _is_alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    except FileNotFoundError:
-        return False
 
 
 def test_variables_that_steer_a_compiler_do_not_reach_it(cache, monkeypatch, tmp_path):
@@ -192,14 +179,12 @@ def test_two_processes_that_build_at_once_both_load_it(cache):
     assert [name.endswith(".so") for name in files_of(cache)] == [True]
 
 
-def test_a_builder_that_is_killed_leaves_nothing_harmful(cache, monkeypatch, tmp_path):
-    begun = tmp_path / "begun"
-    os.mkfifo(begun)
-    environment = {**os.environ, "CC": str(compiler_of(tmp_path, f"echo $$ > {begun}; exec sleep 1000"))}
+def test_a_builder_that_is_killed_leaves_nothing_harmful(cache, tmp_path):
+    environment = {**os.environ, "CC": str(begun_compiler_of(tmp_path))}
     builder = subprocess.Popen([sys.executable, "-c", BUILDING, str(cache.folder)], env=environment)
-    compiler = int(begun.read_text())  # blocks until the compiler has begun
+    compiler = int((tmp_path / "begun").read_text())  # blocks until the compiler has begun
     builder.kill()
     builder.wait()
-    os.kill(compiler, signal.SIGKILL)
+    await_that(lambda: has_ended(compiler))
     assert not [name for name in files_of(cache) if name.endswith(".so")]
     assert ctypes.CDLL(str(library(ANSWER, cache))).answer() == 42

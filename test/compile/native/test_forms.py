@@ -8,16 +8,30 @@ import pytest
 from automax_ros.compile.native import task as task_module
 from automax_ros.compile.native.build import build, find_compiler
 from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.forms import IN_PYTHON, WORTHWHILE_LINE_NS, WORTHWHILE_NS, NativeForms, NativeMode
+from automax_ros.compile.native.forms import (
+    IN_PYTHON,
+    WORTHWHILE_KEPT_NS,
+    WORTHWHILE_LINE_NS,
+    WORTHWHILE_NS,
+    NativeForms,
+    NativeMode,
+)
+from automax_ros.compile.native.source import NOT_KEPT
+from automax_ros.compile.native.task import native_form
 
 from ..support import compiled_of
-from .support import compiler_of
+from .support import await_that, begun_compiler_of, compiler_of, has_ended
 from .test_host import TASK
 
 
 @pytest.fixture(scope="module")
 def compiled():
     return compiled_of(TASK)
+
+
+def _task_time_ns(compiled, python_ns):
+    """Return the task time in which scans take this time in Python, as it is estimated."""
+    return -(-python_ns // (75 * len(compiled.program.scan))) * compiled.program.period_ns
 
 
 def test_off_gives_back_the_same_task(compiled):
@@ -37,13 +51,34 @@ def test_on_makes_tasks_native_by_their_names(compiled, tmp_path):
 
 def test_auto_builds_what_pays(compiled, tmp_path):
     cache = NativeCache(tmp_path / "cache")
-    lines = len(compiled.program.scan)
-    enough = ((WORTHWHILE_NS + lines * WORTHWHILE_LINE_NS) // (75 * lines) + 1) * compiled.program.period_ns
-    short = NativeForms(NativeMode.AUTO, enough // 2, cache).form(compiled)
+    enough = _task_time_ns(compiled, WORTHWHILE_NS + len(compiled.program.scan) * WORTHWHILE_LINE_NS)
+    short = NativeForms(NativeMode.AUTO, enough - compiled.program.period_ns, cache).form(compiled)
     assert short.compiled is compiled
-    assert short.why == "a run this short gains nothing by it (--native on)"
+    assert short.why == NOT_KEPT
     assert NativeForms(NativeMode.AUTO, enough, cache).form(compiled).native is not None
     assert NativeForms(NativeMode.AUTO, None, cache).form(compiled).native is not None
+
+
+def test_auto_takes_what_another_run_has_built_for_a_shorter_one(compiled, tmp_path):
+    cache = NativeCache(tmp_path / "cache")
+    enough = _task_time_ns(compiled, WORTHWHILE_KEPT_NS)
+    assert NativeForms(NativeMode.AUTO, enough, cache).form(compiled).text == f"TASK: in Python: {NOT_KEPT}"
+    assert not list((tmp_path / "cache").iterdir())
+    native_form(compiled, cache)
+    assert NativeForms(NativeMode.AUTO, enough, cache).form(compiled).native is not None
+    shorter = NativeForms(NativeMode.AUTO, enough - compiled.program.period_ns, cache).form(compiled)
+    assert shorter.why == "a run this short gains nothing by it (--native on)"
+
+
+@pytest.mark.parametrize("suffix", [".so", ".text"])
+def test_a_kept_form_of_which_a_part_is_missing_is_not_built_for_a_short_run(compiled, tmp_path, suffix):
+    cache = NativeCache(tmp_path / "cache")
+    native_form(compiled, cache)
+    for path in (tmp_path / "cache").glob(f"*{suffix}"):
+        path.unlink()
+    short = NativeForms(NativeMode.AUTO, _task_time_ns(compiled, WORTHWHILE_KEPT_NS), cache)
+    assert short.form(compiled).why == NOT_KEPT
+    assert not list((tmp_path / "cache").glob(f"*{suffix}"))
 
 
 def test_what_helps_besides_tasks_is_built_where_it_pays(tmp_path, monkeypatch):
@@ -67,13 +102,11 @@ def test_a_run_without_native_scans_says_why(compiled):
 
 
 def test_ctrl_c_ends_the_compilers_too(compiled, monkeypatch, tmp_path):
-    begun = tmp_path / "begun"
-    os.mkfifo(begun)
-    monkeypatch.setenv("CC", str(compiler_of(tmp_path, f"echo $$ > {begun}; exec sleep 1000")))
+    monkeypatch.setenv("CC", str(begun_compiler_of(tmp_path)))
     started = []
 
     def interrupt():
-        started.append(int(begun.read_text()))
+        started.append(int((tmp_path / "begun").read_text()))
         os.kill(os.getpid(), signal.SIGINT)
 
     other = threading.Thread(target=interrupt)
@@ -85,8 +118,7 @@ def test_ctrl_c_ends_the_compilers_too(compiled, monkeypatch, tmp_path):
         assert thread is threading.main_thread() or thread.daemon  # no thread keeps the program from its end
         if thread.name.endswith("(work)"):
             thread.join()
-    with pytest.raises(ProcessLookupError):
-        os.kill(started[0], 0)
+    await_that(lambda: has_ended(started[0]))
 
 
 def test_ctrl_c_amid_a_translation_waits_for_nothing_and_starts_no_compiler(compiled, monkeypatch, tmp_path):
@@ -108,8 +140,7 @@ def test_ctrl_c_amid_a_translation_waits_for_nothing_and_starts_no_compiler(comp
     goes_on.set()
     assert over.wait(60)
     if ran.exists():  # it was started, and ended at once
-        with pytest.raises(ProcessLookupError):
-            os.kill(int(ran.read_text()), 0)
+        await_that(lambda: has_ended(int(ran.read_text())))
 
 
 def test_an_end_asked_for_on_a_thread_is_raised(compiled, monkeypatch, tmp_path):
@@ -128,10 +159,10 @@ def test_a_fault_of_the_translator_leaves_its_task_in_python_and_asks_for_a_repo
     other = compiled_of(TASK.replace("SUMMER", "DIFFERENCE"))
     kept = task_module.kept_translation
 
-    def fails(task, cache):
+    def fails(task, cache, *, builds):
         if task is compiled:
             raise RecursionError("x" * 1000)
-        return kept(task, cache)
+        return kept(task, cache, builds=builds)
 
     monkeypatch.setattr(task_module, "kept_translation", fails)
     made = NativeForms(mode, cache=NativeCache(tmp_path / "cache")).made({"A": compiled, "B": other})

@@ -1,0 +1,79 @@
+"""Ctrl-C and SIGTERM while tasks are built: the program ends at once, with its compilers, and leaves no folder."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from compile.native.support import await_that, begun_compiler_of, has_ended
+
+from automax_ros.cli.main import main
+
+RACK = """
+rack: ALONE
+slots:
+  0: {module: 57C413}
+  1: {module: 57C435, tick_ms: 5.5, tasks: {LEAD: {priority: 5}, SHAPE: {priority: 6}}}
+common:
+  REF%: {}
+  OUT%: {}
+"""
+TASK = """10 COMMON REF%, OUT%
+20 CALL SCAN_LOOP(TICKS=2)
+30 CALL SUMMER(INPUT1=REF%, INPUT2=12, OUTPUT=OUT%)
+40 END
+"""
+RUN = ("run", "rack.yaml", "--simulated", "--duration", "1000")
+SWEEP = ("sweep", "rack.yaml", "--vary", "REF%=1,2,3", "--measure", "max(OUT%)", "--jobs", "2")
+TRACE = ("trace", "LEAD.BLK", "--input", "IN.csv")
+REPLAY = ("replay", "bag")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A rack, a table and a recording."""
+    made: Path = tmp_path_factory.mktemp("alone")
+    (made / "rack.yaml").write_text(RACK)
+    (made / "LEAD.BLK").write_text(TASK)
+    (made / "SHAPE.BLK").write_text(TASK.replace("12", "13").replace("OUTPUT=OUT%", "OUTPUT=REF%"))
+    (made / "IN.csv").write_text("REF%\n5\n")
+    options = ("--simulated", "--duration", "0.1", "--record", str(made / "bag"), "--native", "off")
+    assert main(["run", str(made / "rack.yaml"), *options]) == 0
+    return made
+
+
+@pytest.mark.parametrize(
+    ("command", "number", "code"),
+    [
+        (RUN, signal.SIGINT, 0),
+        (RUN, signal.SIGTERM, 0),
+        (SWEEP, signal.SIGTERM, 128 + signal.SIGTERM),
+        (TRACE, signal.SIGTERM, 128 + signal.SIGTERM),
+        (REPLAY, signal.SIGINT, 128 + signal.SIGINT),
+        (REPLAY, signal.SIGTERM, 128 + signal.SIGTERM),
+    ],
+)
+def test_a_signal_ends_the_compilers_too(folder, tmp_path, command, number, code):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    compiler = begun_compiler_of(tmp_path)
+    environment = {"CC": str(compiler), "TMPDIR": str(temporary), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "automax_ros.cli.main", *command, "--native", "on"],
+        cwd=folder,
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        begun = int((tmp_path / "begun").read_text().split()[0])  # blocks until a compiler has begun
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)  # a compiler has 120 s
+    finally:
+        process.kill()
+    assert (process.returncode, err) == (code, "")
+    await_that(lambda: has_ended(begun))
+    await_that(lambda: list(temporary.iterdir()) == [])
