@@ -1,10 +1,16 @@
-"""What the benchmarks share: a task made from text, and the time of one of its scans."""
+"""What the benchmarks share: a task made from text, and times of works that are run in turn."""
 
 from __future__ import annotations
 
 import gc
+import os
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from statistics import median
+from subprocess import PIPE, Popen
+from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Platform
@@ -16,8 +22,21 @@ from automax_ros.running.memory import CommonMemory
 from automax_ros.running.task import Task
 from automax_ros.running.views import ViewSpec
 
-REPEATS = 60
-"""Short runs of which the fastest counts, so that other work on the machine disturbs little."""
+SECONDS = 1.0
+"""How long a measurement of short runs takes, s: a host that changes its speed has its best at some time in it."""
+FASTEST = 0.1
+"""The part of the rounds that counts: other work on the machine disturbs those little."""
+ANSWER = "--answer"
+"""The argument with which a program of bench/ answers questions of the one that has started it."""
+
+
+class Loop(NamedTuple):
+    """Passes that are timed, a millisecond or less of them: with what is measured, and without it."""
+
+    whole: Callable[[], object]
+    rest: Callable[[], object]
+    """Its time is taken off."""
+    passes: int
 
 
 def task_of(text: str, target: Platform = Platform.AUTOMAX) -> tuple[Task, CommonMemory]:
@@ -34,19 +53,92 @@ def task_of(text: str, target: Platform = Platform.AUTOMAX) -> tuple[Task, Commo
     return task, memory
 
 
-def scan_ns(task: Task, vary: Callable[[int], None] = lambda _: None, scans: int = 300) -> float:
-    """Return the time of one scan in ns: the best of many short runs; ``vary`` changes inputs and is not counted."""
-    scan = task.scan
-    whole = min(_run_ns(lambda number: (vary(number), scan(0)), scans) for _ in range(REPEATS))
-    return whole - min(_run_ns(lambda number: (vary(number), None), scans) for _ in range(REPEATS))
+def ns_in_turn(loops: Sequence[Loop], seconds: float = SECONDS) -> list[float]:
+    """Return the time of one pass of each loop, ns.
 
-
-def _run_ns(action: Callable[[int], object], count: int) -> float:
+    All are run in turn, round by round. What is subtracted is of one round, and what is compared is of the same rounds,
+    the fastest ones, of which the median counts: a host that changes its speed changes it for all alike.
+    """
+    works = [work for loop in loops for work in (loop.rest, loop.whole)]
+    rounds: list[list[int]] = []
+    clock = time.perf_counter_ns
     gc.collect()
     gc.disable()
-    began = time.perf_counter_ns()
-    for number in range(count):
-        action(number)
-    taken = time.perf_counter_ns() - began
+    end = clock() + seconds * 1e9
+    while not rounds or clock() < end:
+        marks = [clock()]
+        for work in works:
+            work()
+            marks.append(clock())
+        rounds.append([after - before for before, after in pairwise(marks)])
     gc.enable()
-    return taken / count
+    fastest = sorted(rounds, key=sum)[: max(1, round(len(rounds) * FASTEST))]
+    return [
+        median(taken[2 * number + 1] - taken[2 * number] for taken in fastest) / loop.passes
+        for number, loop in enumerate(loops)
+    ]
+
+
+def still(_: int) -> None:
+    """Change no input."""
+
+
+def scans_of(task: Task, vary: Callable[[int], object] = still, scans: int = 300) -> Loop:
+    """Return scans of a task; ``vary`` changes inputs before each and is not counted."""
+    scan = task.scan
+
+    def whole() -> None:
+        for number in range(scans):
+            vary(number)
+            scan(0)
+
+    def rest() -> None:
+        for number in range(scans):
+            vary(number)
+
+    return Loop(whole, rest, scans)
+
+
+def scan_ns(task: Task, vary: Callable[[int], object] = still) -> float:
+    """Return the time of one scan in ns; ``vary`` changes inputs before each and is not counted."""
+    return ns_in_turn([scans_of(task, vary)])[0]
+
+
+def seconds_in_turn(works: Sequence[Callable[[int], float]], repeats: int) -> list[float]:
+    """Return the least of the seconds that each work tells of its runs, all in turn; each is given the round."""
+    rounds = [[work(number) for work in works] for number in range(repeats)]
+    return [min(taken) for taken in zip(*rounds, strict=True)]
+
+
+def wall_s(work: Callable[[], object]) -> float:
+    """Return the wall time of work, s."""
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+class Other:
+    """A program of bench/ in a process of its own, in another form than this one: it answers while this one waits."""
+
+    def __init__(self, file: str, form: Mapping[str, str]) -> None:
+        command = [sys.executable, file, ANSWER]
+        self._process = Popen(command, stdin=PIPE, stdout=PIPE, text=True, env={**os.environ, **form})
+
+    def __enter__(self) -> Other:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.communicate()
+
+    def __call__(self, question: str) -> float:
+        """Return what its ``answer`` says to a question of one line."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(question, file=self._process.stdin, flush=True)
+        return float(self._process.stdout.readline())
+
+
+def answer(measure: Callable[[str], float]) -> None:
+    """Answer the questions of the process that has started this one, until it has no more."""
+    for line in sys.stdin:
+        print(measure(line.strip()), flush=True)

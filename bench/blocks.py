@@ -8,7 +8,7 @@ scan, so that all coefficients of the block are computed again.
 
 from __future__ import annotations
 
-from _harness import scan_ns, task_of
+from _harness import Loop, ns_in_turn, scan_ns, scans_of, task_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.blocks.declaration import Access, Block, Form, Input, Platform, Special, Time
@@ -110,11 +110,11 @@ def block_ns(block: Block, table: int = TABLE, changing: str = "") -> float:
         lines.append(f"20001 {shift_text(block)}")
     target = Platform.UDC if block.times.model_7010 is None else Platform.AUTOMAX
     coefficient = float(COEFFICIENTS[changing]) if changing else None
-    empty = _varied_ns("\n".join([*lines, "30000 END"]), target, coefficient)
-    full = _varied_ns(
+    empty = _varied("\n".join([*lines, "30000 END"]), target, coefficient)
+    full = _varied(
         "\n".join([*lines, *(f"{21001 + n} {call}" for n, call in enumerate(calls)), "30000 END"]), target, coefficient
     )
-    return (full - empty) / copies
+    return ns_in_turn([Loop(full.whole, empty.whole, full.passes * copies)])[0]
 
 
 def shift_text(block: Block) -> str:
@@ -125,21 +125,27 @@ def shift_text(block: Block) -> str:
     return f"CALL {shift}(STRUCTURE_NAME=QUEUE{mark}, MAX_COLUMNS=20, SHIFT=-OFF_B@, {pairs})"
 
 
-def _varied_ns(text: str, target: Platform, coefficient: float | None = None) -> float:
-    """Return the time of one scan of a task whose inputs change from scan to scan, and COEF where there is one."""
+def _varied(text: str, target: Platform, coefficient: float | None = None) -> Loop:
+    """Return scans of a task whose inputs change from scan to scan, and COEF where there is one."""
     task, memory = task_of(text, target)
     word, low, high, flag = (memory.view(name) for name in ("IN_W%", "LOW_W%", "HIGH_W%", "IN_B@"))
     memory.write_now(low, -4000, 1)
     memory.write_now(high, 4000, 1)
-    changing = None if coefficient is None else memory.view("COEF")
+    write = memory.write_now
 
     def vary(number: int) -> None:
-        memory.write_now(word, VALUES[number & 7], 1)
-        memory.write_now(flag, number & 3 == 1, 1)
-        if changing is not None and coefficient is not None:
-            memory.write_now(changing, coefficient * (1.0 + 0.01 * (number & 7)), 1)
+        write(word, VALUES[number & 7], 1)
+        write(flag, number & 3 == 1, 1)
 
-    return scan_ns(task, vary)
+    if coefficient is None:
+        return scans_of(task, vary)
+    changing, changed = memory.view("COEF"), [coefficient * (1.0 + 0.01 * number) for number in range(8)]
+
+    def vary_all(number: int) -> None:
+        vary(number)
+        write(changing, changed[number & 7], 1)
+
+    return scans_of(task, vary_all)
 
 
 def manual_us(block: Block) -> float:
@@ -227,10 +233,11 @@ def program_ns() -> float:
     memory.write_from_outside(views[0], 3000, 1)
     memory.write_from_outside(views[3], True, 1)
     memory.write_from_outside(views[4], True, 1)
+    feedback, count, write = views[1], views[2], memory.write_now
 
     def vary(number: int) -> None:
-        memory.write_now(views[1], number & 2047, 1)
-        memory.write_now(views[2], number * 7 & 4095, 1)
+        write(feedback, number & 2047, 1)
+        write(count, number * 7 & 4095, 1)
 
     return scan_ns(task, vary)
 

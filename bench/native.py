@@ -10,21 +10,19 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from _harness import scan_ns, task_of
+from _harness import SECONDS, Loop, ns_in_turn, scans_of, task_of
 from blocks import PROGRAM, PROGRAM_BLOCKS
 
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.native import NativeCache, NativeTask, NotNative, native_form, translate
 from automax_ros.compile.native.build import build, find_compiler, level_of
 from automax_ros.core.types import DataType, type_of_name
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
 
 COLUMN = 20_000
 """Scans of one call by columns."""
-REPEATS = 25
 PID = (
     "10 COMMON REF%, FDBK%, OUT%\n11 LOCAL GAIN, K%\n20 CALL SCAN_LOOP(TICKS=4)\n"
     "25 K% = K% + 1\n26 IF K% > 1000 THEN K% = 1\n27 GAIN = K% * 0.001 + 0.5\n"
@@ -33,52 +31,51 @@ PID = (
 PID_7010_US = 124.0
 
 
-def column_ns(native: NativeTask, changes: dict[str, Callable[[int], int]], count: int = COLUMN) -> float:
-    """Return the time of one scan in a native loop over columns, ns: the best of some."""
+def columns_of(native: NativeTask, changes: dict[str, Callable[[int], int]], count: int = COLUMN) -> Loop:
+    """Return scans of a native loop over columns."""
     compiled = native.compiled
     columns = []
     for name in compiled.latched:
         kind = np.float64 if type_of_name(name) is DataType.REAL else np.int64
-        vary, still = changes.get(name), int(name.endswith("@"))
-        columns.append(np.array([still if vary is None else vary(number) for number in range(count)], kind))
-    best = float("inf")
-    for _ in range(REPEATS):
-        state = compiled.layout.fresh()
-        began = time.perf_counter_ns()
-        done = native.columns(state, columns, count).done
-        best = min(best, (time.perf_counter_ns() - began) / count)
-        assert done == count
-    return best
+        vary, steady = changes.get(name), int(name.endswith("@"))
+        columns.append(np.array([steady if vary is None else vary(number) for number in range(count)], kind))
+
+    def whole() -> None:
+        assert native.columns(compiled.layout.fresh(), columns, count).done == count
+
+    return Loop(whole, compiled.layout.fresh, count)
 
 
-def called_ns(task: Task, compiled: CompiledTask, *, logged: bool = False) -> float:
-    """Return the time of one scan that a task executes in the form that it is given.
+def called(compiled: CompiledTask, *, logged: bool = False) -> Loop:
+    """Return scans that a task executes in the form that it is given.
 
     Args:
-        task: installed in a memory of its own.
-        compiled: the form.
-        logged: whether the write log is kept from now on, as the nodes and a recording ask.
+        compiled: the form of the program of 40 blocks.
+        logged: whether the write log is kept, as the nodes and a recording ask.
     """
+    task, memory = task_of(PROGRAM)
     task.install(compiled)
     task.run()
-    memory = task.memory
-    assert isinstance(memory, CommonMemory)
     if logged:
         memory.keep_log()
     views = [memory.view(name) for name in ("LINE_SP%", "FDBK%", "COUNT%", "START@", "READY@")]
     for view, value in ((views[0], 3000), (views[3], True), (views[4], True)):
         memory.write_now(view, value, 1)
+    feedback, count, write, take = views[1], views[2], memory.write_now, memory.take_writes
 
     def vary(number: int) -> None:
-        memory.write_now(views[1], number & 2047, 1)
-        memory.write_now(views[2], number * 7 & 4095, 1)
-        memory.take_writes()
+        write(feedback, number & 2047, 1)
+        write(count, number * 7 & 4095, 1)
 
-    return scan_ns(task, vary)
+    def vary_and_take(number: int) -> None:
+        vary(number)
+        take()
+
+    return scans_of(task, vary_and_take if logged else vary)
 
 
-def next_ns(form: Callable[..., object], compiled: CompiledTask) -> float:
-    """Return the time of ``next`` alone, with memory that costs nothing: what latched is always one tuple."""
+def nexts(form: Callable[..., object], compiled: CompiledTask, count: int = 500) -> Loop:
+    """Return ``next`` alone, with memory that costs nothing: what latched is always one tuple."""
 
     class Still:
         latched = tuple(type_of_name(name).zero for name in compiled.latched)
@@ -92,14 +89,17 @@ def next_ns(form: Callable[..., object], compiled: CompiledTask) -> float:
         def log(self, line: int, code: int) -> None:
             """Drop it."""
 
-    scans = form(compiled.layout.fresh(), Still())
-    best = float("inf")
-    for _ in range(REPEATS):
-        began = time.perf_counter_ns()
-        for _ in range(2000):
-            next(scans)  # type: ignore[call-overload]
-        best = min(best, (time.perf_counter_ns() - began) / 2000)
-    return best
+    scans: Any = form(compiled.layout.fresh(), Still())
+
+    def whole() -> None:
+        for _ in range(count):
+            next(scans)
+
+    def rest() -> None:
+        for _ in range(count):
+            pass
+
+    return Loop(whole, rest, count)
 
 
 def built_s(text: str, level: str) -> float:
@@ -154,19 +154,19 @@ def main() -> None:
         print(f"no native scans here: {reason}")
         return
     python, in_c = task.compiled, replace(task.compiled, scans=native.scans)
-    rows = (
-        ("a task's scan, in Python", called_ns(task, python)),
-        ("a task's scan, native", called_ns(task, in_c)),
-        ("called, memory free, Python", next_ns(python.scans, python)),
-        ("called, memory free, native", next_ns(native.scans, python)),
-        ("a task's scan, native, logged", called_ns(task, in_c, logged=True)),
-    )
-    print(f"program of {PROGRAM_BLOCKS} blocks{'ns per scan':>24}{'ratio':>9}")
-    for name, taken in rows:
-        print(f"{name:34}{taken:>10.0f}{rows[0][1] / taken:>9.1f}")
     changes = {"LINE_SP%": lambda _: 3000, "FDBK%": lambda n: n & 2047, "COUNT%": lambda n: n * 7 & 4095}
-    loop = column_ns(native, changes)
-    print(f"{'native loop over columns':34}{loop:>10.1f}{rows[0][1] / loop:>9.1f}   wanted: 60 ns")
+    loops = {
+        "a task's scan, in Python": called(python),
+        "a task's scan, native": called(in_c),
+        "called, memory free, Python": nexts(python.scans, python),
+        "called, memory free, native": nexts(native.scans, python),
+        "a task's scan, native, logged": called(in_c, logged=True),
+        "native loop over columns": columns_of(native, changes),
+    }
+    found = ns_in_turn(list(loops.values()), len(loops) * SECONDS)
+    print(f"program of {PROGRAM_BLOCKS} blocks{'ns per scan':>24}{'ratio':>9}   the last: wanted 60 ns")
+    for name, taken in zip(loops, found, strict=True):
+        print(f"{name:34}{taken:>10.1f}{found[0] / taken:>9.1f}")
     report_changing(cache)
     print(f"\n{'made':16}{'translated':>12}{'gcc -O1':>12}{'gcc -O2':>12}{'found':>12}{'text, as built':>17}")
     report_making(f"{PROGRAM_BLOCKS} blocks", PROGRAM)
@@ -175,23 +175,25 @@ def main() -> None:
 
 def report_changing(cache: NativeCache) -> None:
     """Print the time of a scan in which a PID's KP changes every time."""
+    compiled = task_of(PID)[0].compiled
+    forms = {"Python": compiled, "native": replace(compiled, scans=native_form(compiled, cache).scans)}
+    found = ns_in_turn([referred(form) for form in forms.values()], len(forms) * SECONDS)
+    print(f"\n{'PID, KP new in every scan':34}{'ns':>10}{'of 7010':>9}   the whole scan; wanted: 100")
+    for name, ns in zip(forms, found, strict=True):
+        print(f"{name:34}{ns:>10.0f}{PID_7010_US * 1000 / ns:>9.0f}")
+
+
+def referred(compiled: CompiledTask) -> Loop:
+    """Return scans of PID in a form, with a new REF% for each."""
     task, memory = task_of(PID)
-    reference = memory.view("REF%")
+    task.install(compiled)
+    task.run()
+    reference, write = memory.view("REF%"), memory.write_now
 
     def vary(number: int) -> None:
-        memory.write_now(reference, number & 4095, 1)
+        write(reference, number & 4095, 1)
 
-    taken = {}
-    for name, compiled in (
-        ("Python", task.compiled),
-        ("native", replace(task.compiled, scans=native_form(task.compiled, cache).scans)),
-    ):
-        task.install(compiled)
-        task.run()
-        taken[name] = scan_ns(task, vary)
-    print(f"\n{'PID, KP new in every scan':34}{'ns':>10}{'of 7010':>9}   the whole scan; wanted: 100")
-    for name, ns in taken.items():
-        print(f"{name:34}{ns:>10.0f}{PID_7010_US * 1000 / ns:>9.0f}")
+    return scans_of(task, vary)
 
 
 if __name__ == "__main__":

@@ -5,9 +5,6 @@ Prints, fails on none.
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -16,7 +13,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from _harness import ANSWER, Other, answer, seconds_in_turn, wall_s
+
 from automax_ros.bags.recorder import Recorder
+from automax_ros.compile.native import NativeForms, NativeMode
+from automax_ros.compile.native.forms import IN_PYTHON
 from automax_ros.core.ticks import seconds_ns
 from automax_ros.pieces.piece import Where
 from automax_ros.rack.config import RackConfig, Timing
@@ -24,22 +25,20 @@ from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
 from automax_ros.sweep.blueprint import Blueprint
 from automax_ros.sweep.measures import read_measures
-from automax_ros.sweep.points import grid, read_varied
+from automax_ros.sweep.points import Point, grid, read_varied
 from automax_ros.sweep.run import Plan, run_points
 from automax_ros.sweep.sweeping import run_sweep
 from automax_ros.wire.stream import RackStream
 
 CONFIG = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
-SECONDS, LONG_SECONDS = 60, 300
-PLAIN = "--plain"
-"""The argument with which this runs itself for the figures of plain Python."""
+SECONDS, LONG_SECONDS, HOUR_S = 60, 300, 3600
 REPEATS = 3
 SWEEP_RUNS, SWEEP_SECONDS, MORE = 30, 2, 40
 
 
-def run(config: RackConfig, folder: Path | None, seconds: float = SECONDS) -> float:
+def run(config: RackConfig, folder: Path | None, seconds: float = SECONDS, native: NativeForms = IN_PYTHON) -> float:
     """Run the rack and return the wall time in seconds, from the start of the rack to the closed bag."""
-    rack = Rack(config)
+    rack = Rack(config, native=native)
     began = time.perf_counter()
     if folder is None:
         rack.start()
@@ -64,53 +63,58 @@ def sweeps(config: RackConfig) -> None:
     plan = Plan(Blueprint.of(rack), (varied.quantity,), measures, duration_ns)
     points = grid([varied])
     run_points(plan, points[:1])
-    here = min(taken(partial(run_points, plan, [point])) for point in points * REPEATS)
-    alone = min(taken(lambda: run(config, None, SWEEP_SECONDS)) for _ in range(3 * REPEATS))
+    one_each = [partial(run_points, plan, [point]) for point in points]
+    compiled_each = [partial(run, config, None, SWEEP_SECONDS)] * 3
+    works = [lambda _, runs=runs: min(map(wall_s, runs)) for runs in (one_each, compiled_each)]
+    here, alone = seconds_in_turn(works, REPEATS)
     print(
         f"sweep: {1 / here:.0f} runs of {SWEEP_SECONDS} s a second, {alone / here:.1f} times as many as racks ", end=""
     )
     print(f"that are each compiled ({1 / alone:.0f}); {SWEEP_SECONDS / here:.0f} x real time")
     many = points * MORE
-    pair = min(taken(lambda: run_sweep(plan, many, Where(2))) for _ in range(REPEATS)) / len(many)
-    one = min(taken(lambda: run_sweep(plan, many, Where(1))) for _ in range(REPEATS)) / len(many)
+    pair, one = seconds_in_turn([partial(sweep_s, plan, many, jobs) for jobs in (2, 1)], REPEATS)
     print(f"sweep with two jobs, their start counted: {one / pair:.2f} times one job")
 
 
-def taken(work: Callable[[], object]) -> float:
-    """Return the wall time of work, s."""
-    began = time.perf_counter()
-    work()
-    return time.perf_counter() - began
+def sweep_s(plan: Plan, points: list[Point], jobs: int, _: int) -> float:
+    """Return the wall time of a sweep with its start, s."""
+    return wall_s(lambda: run_sweep(plan, points, Where(jobs)))
 
 
-def recorded_and_not(config: RackConfig, seconds: float) -> tuple[float, float]:
-    """Return the wall times of a run with recording and of one without, s: each the best of several, in turn."""
+def asked(config: RackConfig, question: str) -> float:
+    """Return the wall time of a long run, "recorded" or "bare", s."""
     with tempfile.TemporaryDirectory() as temporary:
-        pairs = [
-            (run(config, Path(temporary) / f"bag{number}", seconds), run(config, None, seconds))
-            for number in range(REPEATS)
-        ]
-    return min(pair[0] for pair in pairs), min(pair[1] for pair in pairs)
+        return run(config, Path(temporary, "bag") if question == "recorded" else None, LONG_SECONDS)
+
+
+def an_hour(config: RackConfig) -> None:
+    """Print what an hour takes as ``automax run --simulated --record`` runs it, native scans in the cache, and bare."""
+    native = NativeForms(NativeMode.AUTO, seconds_ns(HOUR_S))
+    Rack(config, native=replace(native, mode=NativeMode.ON))
+    with tempfile.TemporaryDirectory() as temporary:
+        works = (
+            lambda number: run(config, Path(temporary) / f"bag{number}", HOUR_S, native),
+            lambda _: run(config, None, HOUR_S, native),
+        )
+        recorded, bare = seconds_in_turn(works, REPEATS)
+    print(
+        f"an hour, native scans found in the cache: {HOUR_S / recorded:.0f} x real time with recording, "
+        f"{HOUR_S / bare:.0f} without; wanted: 1000 x"
+    )
 
 
 def forms(config: RackConfig) -> None:
     """Print what a long recording costs in the form that runs here, and in plain Python in a process of its own."""
-    plain = json.loads(
-        subprocess.run(
-            [sys.executable, __file__, PLAIN],
-            env={**os.environ, "AUTOMAX_COMPILED": "off"},
-            check=True,
-            capture_output=True,
-            text=True,
-        ).stdout
-    )
-    here = recorded_and_not(config, LONG_SECONDS)
-    for word, (recorded, bare) in (("as installed", here), ("plain Python", plain)):
+    with Other(__file__, {"AUTOMAX_COMPILED": "off"}) as plain:
+        ways: tuple[Callable[[str], float], ...] = (partial(asked, config), plain)
+        works = [lambda _, ask=ask, what=what: ask(what) for ask in ways for what in ("recorded", "bare")]
+        found = seconds_in_turn(works, REPEATS)
+    for word, recorded, bare in (("as installed", *found[:2]), ("plain Python", *found[2:])):
         print(
             f"{LONG_SECONDS} s, {word:12} {LONG_SECONDS / recorded:7.0f} x real time with recording, "
             f"{LONG_SECONDS / bare:5.0f} without; {recorded / bare:.1f} times as long"
         )
-    print(f"as installed over plain Python, with recording: {plain[0] / here[0]:.2f} times as fast; wanted: 1000 x")
+    print(f"as installed over plain Python, with recording: {found[2] / found[0]:.2f} times as fast")
 
 
 def main() -> None:
@@ -118,24 +122,29 @@ def main() -> None:
     config = load(CONFIG).config
     if config is None:
         raise SystemExit(f"{CONFIG} has errors: automax check {CONFIG}")
-    if PLAIN in sys.argv[1:]:
-        print(json.dumps(recorded_and_not(config, LONG_SECONDS)))
+    if ANSWER in sys.argv[1:]:
+        answer(partial(asked, config))
         return
     began = time.perf_counter()
     rate = scans_per_second(Rack(config))
     print(f"example rack: {rate:.0f} scans per second, compiled in {time.perf_counter() - began:.2f} s")
-    plain = min(run(config, None) for _ in range(REPEATS))
-    modeled = min(run(replace(config, execution=Timing.MODELED), None) for _ in range(REPEATS))
+    in_model = replace(config, execution=Timing.MODELED)
     with tempfile.TemporaryDirectory() as temporary:
-        recorded = min(run(config, Path(temporary) / f"bag{number}") for number in range(REPEATS))
+        works = (
+            lambda _: run(config, None),
+            lambda _: run(in_model, None),
+            lambda number: run(config, Path(temporary) / f"bag{number}"),
+        )
+        plain, modeled, recorded = seconds_in_turn(works, REPEATS)
         size = sum(item.stat().st_size for item in (Path(temporary) / "bag0").iterdir())
-    for word, taken, wanted in (("without recording", plain, 200), ("with recording", recorded, 60)):
-        pace, scan_us = SECONDS / taken, taken / SECONDS / rate * 1e6
+    for word, wall, wanted in (("without recording", plain, 200), ("with recording", recorded, 60)):
+        pace, scan_us = SECONDS / wall, wall / SECONDS / rate * 1e6
         print(f"{word:18} {pace:7.0f} x real time, {scan_us:6.1f} us per scan; wanted: at least {wanted}")
     scan_us = modeled / SECONDS / rate * 1e6
     print(f"modeled execution  {SECONDS / modeled:7.0f} x real time, {scan_us:6.1f} us per scan; ", end="")
     print(f"{modeled / plain:.2f} times as long as ideal; wanted: at most 3")
     print(f"bag: {size / 1e6:.2f} MB, {size / SECONDS / rate:.0f} bytes per scan")
+    an_hour(config)
     forms(config)
     sweeps(config)
 

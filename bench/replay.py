@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from _harness import seconds_in_turn, wall_s
+
 from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.compile.native.forms import NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
@@ -97,20 +99,14 @@ FORMS = (
 
 
 def print_replay(what: str, bag: Path, rate: float, new: Mapping[str, SourceText]) -> None:
-    slow = 0.0
-    for form, options in FORMS:
-        replay = Replay(bag, new, options)
-        replay.run()  # the first pass builds native tasks and the codec
-        best = float("inf")
-        for _ in range(REPEATS):
-            began = time.perf_counter()
-            report = replay.run()
-            best = min(best, time.perf_counter() - began)
-        slow = slow or best
+    replays = [Replay(bag, new, options) for _, options in FORMS]
+    reports = [replay.run() for replay in replays]  # the first pass builds native tasks and the codec
+    times = seconds_in_turn([lambda _, run=replay.run: wall_s(run) for replay in replays], REPEATS)
+    for (form, _), report, best in zip(FORMS, reports, times, strict=True):
         result = "identical" if report.identical else f"{sum(task.different for task in report.tasks)} scans differ"
         print(
             f"{what:42}{form:23}{report.scans / best:10,.0f} of {rate:.0f} scans per second: "
-            f"{SECONDS / best:7.1f} x real time, wanted {WANTED}; {slow / best:5.1f} x the first form; {result}"
+            f"{SECONDS / best:7.1f} x real time, wanted {WANTED}; {times[0] / best:5.1f} x the first form; {result}"
         )
 
 
@@ -124,19 +120,18 @@ def print_side_by_side(bag: Path, form: str, options: ReplayOptions) -> None:
     """One job against two, each with its start: processes begun, tasks compiled."""
     replay = Replay(bag, {}, options)
     replay.run()
-    best = {}
-    for jobs in (1, 2):
-        best[jobs] = float("inf")
-        for _ in range(REPEATS):
-            began = time.perf_counter()
-            report = replay_side_by_side(replay, Where(jobs))
-            best[jobs] = min(best[jobs], time.perf_counter() - began)
-            assert report.identical
-    ratio = best[1] / best[2]
+
+    def side_by_side_s(jobs: int) -> float:
+        began = time.perf_counter()
+        report = replay_side_by_side(replay, Where(jobs))
+        assert report.identical
+        return time.perf_counter() - began
+
+    one, two = seconds_in_turn([lambda _: side_by_side_s(1), lambda _: side_by_side_s(2)], REPEATS)
     what = f"five regulators, {SPLIT_SECONDS} s in {FILES} files"
     print(
-        f"{what:42}{form:23}{SPLIT_SECONDS / best[1]:7.1f} x real time, "
-        f"{SPLIT_SECONDS / best[2]:7.1f} x with two jobs: {ratio:5.2f} times one job, wanted 1.8"
+        f"{what:42}{form:23}{SPLIT_SECONDS / one:7.1f} x real time, "
+        f"{SPLIT_SECONDS / two:7.1f} x with two jobs: {one / two:5.2f} times one job, wanted 1.8"
     )
 
 
