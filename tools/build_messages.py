@@ -54,7 +54,9 @@ def source_fingerprint() -> str:
     """
     digest = hashlib.sha256()
     definitions = [SOURCE / "package.xml", *SOURCE.glob("msg/*.msg"), *SOURCE.glob("srv/*.srv")]
-    tools = [TOOLS / name for name in ("build_messages.py", "message_code.py", "message_libraries.py")]
+    tools = [
+        TOOLS / name for name in ("build_messages.py", "compiler_parts.py", "message_code.py", "message_libraries.py")
+    ]
     for path in sorted([*definitions, *tools]):
         content = path.read_bytes()
         digest.update(f"{path.name} {len(content)} ".encode() + content)

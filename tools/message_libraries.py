@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from compiler_parts import parts
 from message_code import KINDS, PYTHON_TYPE_SUPPORT, Interfaces
 
 
@@ -143,24 +144,11 @@ def _units(package: Interfaces, suffix: str, library: Library) -> list[Unit]:
     sources = _sources(package, library)
     alone = [source for source in sources if library.alone and source.name.endswith(library.alone)]
     units = [Unit(source, folder / f"{source.parent.parent.name}__{source.name}.o") for source in alone]
-    for number, part in enumerate(_parts([source for source in sources if source not in alone])):
+    for number, part in enumerate(parts([source for source in sources if source not in alone], PART_BYTES)):
         text = folder / f"part_{number}{part[0].suffix}"
         text.write_text("".join(f'#include "{source.resolve()}"\n' for source in part))
         units.append(Unit(text, text.with_suffix(".o")))
     return units
-
-
-def _parts(sources: Sequence[Path]) -> list[list[Path]]:
-    """Divide sources in their order into parts of about PART_BYTES."""
-    parts: list[list[Path]] = []
-    size = PART_BYTES
-    for source in sources:
-        if size >= PART_BYTES:
-            parts.append([])
-            size = 0
-        parts[-1].append(source)
-        size += source.stat().st_size
-    return parts
 
 
 def _compile(unit: Unit, flags: list[str]) -> None:

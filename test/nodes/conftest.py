@@ -9,3 +9,14 @@ def client(ros_domain_id):
 
     with Client() as made:
         yield made
+
+
+@pytest.fixture
+def context(ros_domain_id):
+    """Somebody else's context, which nothing of ours shuts down."""
+    from rclpy.context import Context
+
+    made = Context()
+    made.init(args=[])
+    yield made
+    made.try_shutdown()

@@ -32,14 +32,6 @@ class Watched(Node):
         return super().waitables
 
 
-@pytest.fixture
-def context(ros_domain_id):
-    made = Context()
-    made.init(args=[])
-    yield made
-    made.try_shutdown()
-
-
 @pytest.fixture(params=[SingleThreadedExecutor, lambda context: MultiThreadedExecutor(2, context=context)])
 def executor(request, context):
     made = request.param(context=context)

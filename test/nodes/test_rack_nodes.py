@@ -20,16 +20,6 @@ from automax_ros.rack.rack import Rack
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def context(ros_domain_id):
-    from rclpy.context import Context
-
-    made = Context()
-    made.init(args=[])
-    yield made
-    made.try_shutdown()
-
-
 @pytest.fixture(params=["EventsExecutor", "SingleThreadedExecutor", "MultiThreadedExecutor"])
 def executor(request, context):
     from rclpy import executors, experimental

@@ -40,11 +40,12 @@ def copied(folder: Path, *, rule: str = "hold", more: str = "") -> Path:
 
 
 class Distributed(Automax):
-    """`automax run RACK --distributed` with its stimuli; ``report`` is read at the end."""
+    """`automax run RACK --distributed` with its stimuli, if it has any; ``report`` is read at the end."""
 
     def __init__(self, rack: Path, *options: str | Path) -> None:
         self._report = rack.parent / "report.json"
-        given = ("--stimuli", rack / "stimuli.yaml", "--report", self._report)
+        stimuli = rack / "stimuli.yaml"
+        given = ("--report", self._report, *(("--stimuli", stimuli) if stimuli.exists() else ()))
         super().__init__("run", rack, "--distributed", *given, *options)
 
     @property

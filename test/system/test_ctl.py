@@ -2,6 +2,7 @@
 
 import json
 import signal
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from automax_ros.bags.reader import BagReader
 from automax_ros.replay.engine import ReplayOptions, replay
 
-from .support import RACKS, TYPES, Automax, Client, automax
+from .support import RACKS, TYPES, Automax, Client, automax, automax_here
 
 OPERATED = RACKS / "operated" / "rack.yaml"
 READY = "Ctrl-C ends the run"
@@ -26,12 +27,35 @@ def rack(module_domain_id, tmp_path_factory):
         yield process
 
 
+@pytest.fixture(scope="module")
+def caller(rack):
+    from automax_ros.nodes.operating import RackClient
+
+    with RackClient("/operated") as made:
+        yield made
+
+
+@pytest.fixture
+def one_client(caller, monkeypatch):
+    """Calls in this process speak through one client: each of its own takes up to 3 s to find the rack."""
+    from automax_ros.nodes import operating
+
+    def joined(space: str, *_: object):
+        assert space == "/operated"
+        return nullcontext(caller)
+
+    monkeypatch.setattr(operating, "RackClient", joined)
+
+
 def ctl(*arguments: str | Path):
-    return automax("ctl", "OPERATED", *arguments, *PATIENT)
+    return automax_here("ctl", "OPERATED", *arguments, *PATIENT)
 
 
-def test_a_rack_is_operated_from_another_process(rack, tmp_path):
-    watched = ctl("watch", "REF%", "COUNT!", "--every", "0.1", "--duration", "1.5", "--json")
+@pytest.mark.usefixtures("rack", "one_client")
+def test_a_rack_is_operated_from_another_process(tmp_path):
+    watched = automax(
+        "ctl", "OPERATED", "watch", "REF%", "COUNT!", "--every", "0.1", "--duration", "1.5", "--json", *PATIENT
+    )
     told = [json.loads(line) for line in watched.out.splitlines()]
     assert watched.code == 0
     assert [item["name"] for item in told].count("REF%") == 1, "told once: it does not change"
@@ -80,7 +104,8 @@ def test_a_rack_is_operated_from_another_process(rack, tmp_path):
     assert "stopped" not in ctl("status").out
 
 
-def test_a_rack_is_halted_and_stepped_from_another_process(rack):
+@pytest.mark.usefixtures("rack", "one_client")
+def test_a_rack_is_halted_and_stepped_from_another_process():
     assert ctl("pause").out.startswith("pause: done, rack time stands still at ")
     (stepped,) = json.loads(ctl("step", "scan", "SPEED", "--count", "2", "--json").out)
     at_s = stepped["answer"]["time_s"]
@@ -128,12 +153,12 @@ def test_what_was_done_is_told_to_late_joiners_and_recorded_and_the_recording_re
 
 
 def test_without_an_operator_nothing_can_be_operated(ros_domain_id):
-    absent = automax("ctl", "TYPES", "status", "--timeout", "0.5")
+    absent = automax_here("ctl", "TYPES", "status", "--timeout", "0.5")
     assert absent.code == 2
     assert "no rack /types is seen within 0.5 s" in absent.err
     with Automax("run", TYPES) as rack:
         rack.wait_for_line(READY)
-        closed = automax("ctl", TYPES, "stop-all", *PATIENT)
+        closed = automax_here("ctl", TYPES, "stop-all", *PATIENT)
         with Client() as client:
             names = [name for name, _ in client.node.get_service_names_and_types()]
         assert not [name for name in names if name in ("/types/stop_all", "/types/run", "/types/set")]
@@ -155,12 +180,7 @@ def test_without_an_operator_nothing_can_be_operated(ros_domain_id):
         (("PM1", "status", "--timeout", "0"), "too short"),
     ],
 )
-def test_wrong_usage(automax_cli, arguments, reason):
-    result = automax_cli("ctl", *arguments)
+def test_wrong_usage(ros_domain_id, arguments, reason):
+    result = automax_here("ctl", *arguments)
     assert result.code == 2
     assert reason in result.err
-
-
-@pytest.fixture
-def automax_cli(ros_domain_id):
-    return automax

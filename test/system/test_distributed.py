@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import time
 from collections import Counter
@@ -20,7 +21,7 @@ from automax_ros.wire.cdr import decode
 from automax_ros.wire.messages import NAMES, Scan
 
 from .distributed import RINGS, SEATS, Distributed, Line, copied
-from .support import TYPES, Automax, automax, wait_until
+from .support import TYPES, Automax, automax, automax_here, wait_until
 
 TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
 STOP = "- {at: 3.0, stop: [CML, RING_1, RING_2, RING_3, RING_4, SPEED, WIND_A]}\n"
@@ -130,14 +131,18 @@ def test_stop_all_when_a_process_is_lost(ros_domain_id, tmp_path):
 
 
 def test_processes_end_with_whoever_started_them(ros_domain_id, tmp_path):
-    rack = copied(tmp_path)
+    rack = shutil.copytree(TYPES.parent, tmp_path / "rack")
+    file = rack / "rack.yaml"
+    file.write_text(file.read_text().replace("rack: TYPES", "rack: TYPES\non_module_loss: hold"))
+    seats = {"common_memory", "processor_1", "processor_2"}
     with Distributed(rack) as run:
-        wait_until(lambda: len(run.seats) == len(SEATS))
-        second = automax("run", rack, "--distributed")
+        wait_until(lambda: set(run.seats) == seats)
+        second = automax_here("run", rack, "--distributed")
         assert (second.code, "runs already" in second.err) == (2, True)
-        whole = automax("run", rack)
+        whole = automax_here("run", rack)
         assert (whole.code, "distributed over several processes" in whole.err) == (2, True)
         pids = list(run.seats.values())
+        assert len(pids) == len(seats)
         run.send(signal.SIGKILL)
         wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids))
 

@@ -9,7 +9,7 @@ from nodes.managing import ACTIVE, INACTIVE, UNCONFIGURED, Manager
 
 from automax_ros.bags.reader import BagReader
 
-from .support import RACKS, ROOT, TYPES, Automax, Client, automax
+from .support import RACKS, ROOT, TYPES, Automax, Client, automax_here
 
 WAITS = "is unconfigured"
 OPERATED = RACKS / "operated" / "rack.yaml"
@@ -90,7 +90,7 @@ def test_the_page_shows_how_it_is_done_by_hand(ros_domain_id, tmp_path):
         process.wait_for_line(WAITS)
         printed = []
         for command in found[1].splitlines():
-            ended = automax(*command.split()[1:], "--timeout", "30")
+            ended = automax_here(*command.split()[1:], "--timeout", "30")
             assert (ended.code, ended.err) == (0, ""), command
             printed.append(ended.out)
         assert printed == ["done\n", "done\n", "done\n", "inactive\n", "done\n"]

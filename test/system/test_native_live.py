@@ -13,7 +13,7 @@ import pytest
 from automax_ros.bags.reader import BagReader
 from automax_ros.wire.messages import NAMES, Scan
 
-from .support import Automax, Ended, automax, wait_until
+from .support import Automax, Ended, automax_here, wait_until
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
 
@@ -92,7 +92,7 @@ def assert_same_in_python(ended: Ended, bag: Path, told: Sequence[str]) -> None:
         scan = item.message
         values[scan.task].update((*scan.committed.value, *scan.written.value))
     assert all(len(found) > 10 for found in values.values()), {name: len(values[name]) for name in values}
-    replayed = automax("replay", bag, "--native", "off", "--verbose")
+    replayed = automax_here("replay", bag, "--native", "off", "--verbose")
     assert (replayed.code, replayed.err.count("in Python")) == (0, len(TASKS)), replayed
 
 

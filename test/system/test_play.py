@@ -14,7 +14,7 @@ from mcap.writer import Writer
 
 from automax_ros.bags.reader import BagReader
 
-from .support import TYPES, Automax, Client, Ended, automax, consecutive, ns
+from .support import TYPES, Automax, Client, Ended, automax, automax_here, consecutive, ns
 
 PLAYING = "Ctrl-C ends it"
 SPAN_NS = 454 * 5_500_000
@@ -166,7 +166,7 @@ def running(module_domain_id):
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
     bag: Path = tmp_path_factory.mktemp("recorded") / "bag"
-    assert automax("run", TYPES, "--simulated", "--duration", "1", "--record", bag).code == 0
+    assert automax_here("run", TYPES, "--simulated", "--duration", "1", "--record", bag).code == 0
     return bag
 
 
@@ -207,7 +207,7 @@ def test_live_rack_and_playback_side_by_side(running, recorded):
 def test_rack_does_not_start_where_its_recording_plays(ros_domain_id, recorded):
     with Automax("play", recorded, "--start-paused") as player:
         player.wait_for_line(PLAYING)
-        ended = automax("run", TYPES, "--duration", "0.1")
+        ended = automax_here("run", TYPES, "--duration", "0.1")
         assert ended.code == 2
         assert f"runs already (process {player.pid})" in ended.err
         assert player.end(signal.SIGTERM).code == 0
@@ -291,16 +291,16 @@ def test_malformed_message_ends_the_playback(ros_domain_id, tmp_path):
     ],
 )
 def test_wrong_usage(ros_domain_id, bag, options, words):
-    ended = automax("play", bag, *options)
+    ended = automax_here("play", bag, *options)
     assert ended.code == 2
     assert words in ended.err
     assert "Traceback" not in ended.err
 
 
 def test_what_is_no_recording_is_refused(ros_domain_id, tmp_path):
-    assert "AMX6810" in automax("play", tmp_path / "none").err
+    assert "AMX6810" in automax_here("play", tmp_path / "none").err
     (tmp_path / "scans_0.mcap").write_bytes(b"nothing")
-    ended = automax("play", tmp_path / "scans_0.mcap")
+    ended = automax_here("play", tmp_path / "scans_0.mcap")
     assert ended.code == 2
     assert "AMX6810" in ended.err
 

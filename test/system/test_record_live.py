@@ -14,7 +14,7 @@ from replay.reexecution import Reexecution
 from automax_ros.bags.reader import BagReader
 from automax_ros.core.ticks import NS_PER_S, NS_PER_US
 
-from .support import TYPES, Automax, Client, automax, consecutive, wait_until
+from .support import TYPES, Automax, Client, automax, automax_here, consecutive, wait_until
 
 READY = "Ctrl-C ends the run"
 BEGUN = "recording since"
@@ -22,6 +22,13 @@ LOG = {"automax_msgs/msg/Scan", "automax_msgs/msg/CommonWrite", "automax_msgs/ms
 TASKS = {"FAST", "SLOW", "COPY"}
 LONGEST_STOP_S = 20.0
 """The promise is 1 s, which is printed; a test on a busy machine only asks that the end comes."""
+
+
+@pytest.fixture(scope="module")
+def running(module_domain_id) -> Iterator[Automax]:
+    with Automax("run", TYPES) as process:
+        process.wait_for_line(READY)
+        yield process
 
 
 def log_of(bag: Path) -> list[Any]:
@@ -112,14 +119,12 @@ def test_recording_is_the_racks_own_over_the_common_span(ros_domain_id, tmp_path
     assert set(Reexecution(bag, tmp_path / "again").execute().scans) == TASKS
 
 
-def test_replay_of_a_live_recording_finds_no_difference(ros_domain_id, tmp_path):
+def test_replay_of_a_live_recording_finds_no_difference(running, tmp_path):
     bag = tmp_path / "bag"
-    with Automax("run", TYPES) as rack:
-        rack.wait_for_line(READY)
-        ended = automax("record", "/types", "--output", bag, "--duration", "1", "--tasks", "fast,COPY")
+    ended = automax("record", "/types", "--output", bag, "--duration", "1", "--tasks", "fast,COPY")
     assert (ended.code, ended.err) == (0, "")
     assert {item.task for item in log_of(bag) if is_scan(item)} == {"FAST", "COPY"}
-    replayed = automax("replay", bag)
+    replayed = automax_here("replay", bag)
     assert (replayed.code, replayed.err) == (0, "")
 
 
@@ -132,33 +137,35 @@ def test_stop_before_anything_came_is_clean(ros_domain_id, tmp_path, number):
     assert not (tmp_path / "bag").exists()
 
 
-def test_stopped_recorder_tells_the_gap_and_goes_on_from_a_new_image(ros_domain_id, tmp_path):
+def test_stopped_recorder_tells_the_gap_and_goes_on_from_a_new_image(running, tmp_path):
     from automax_msgs.msg import CommonWrite
 
     bag = tmp_path / "bag"
-    with Automax("run", TYPES) as rack, Client() as client:
-        rack.wait_for_line(READY)
-        with Automax("record", "TYPES", "--output", bag) as recorder:
-            recorder.wait_for_line(BEGUN)
-            wait_until(lambda: size_of(bag) > 20_000)
-            writes = client.listen(CommonWrite, "/types/backplane")
-            client.until(lambda: bool(writes))
-            recorder.send(signal.SIGSTOP)
-            # The rack keeps 1000 writes for those who lag behind; far more are lost.
-            client.until(lambda: writes[-1].sequence > writes[0].sequence + 3000)
-            recorder.send(signal.SIGCONT)
-            recorder.wait_for_line("writes of common memory did not come")
-            grown = size_of(bag) + 30_000
-            wait_until(lambda: size_of(bag) > grown)
-            ended = recorder.end(signal.SIGINT)
+    with Automax("record", "TYPES", "--output", bag) as recorder, Client() as client:
+        recorder.wait_for_line(BEGUN)
+        wait_until(lambda: size_of(bag) > 20_000)
+        writes = client.listen(CommonWrite, "/types/backplane")
+        client.until(lambda: bool(writes))
+        recorder.send(signal.SIGSTOP)
+        # The rack keeps 1000 writes for those who lag behind; far more are lost.
+        client.until(lambda: writes[-1].sequence > writes[0].sequence + 3000)
+        recorder.send(signal.SIGCONT)
+        recorder.wait_for_line("writes of common memory did not come")
+        grown = size_of(bag) + 30_000
+        wait_until(lambda: size_of(bag) > grown)
+        ended = recorder.end(signal.SIGINT)
     assert (ended.code, ended.err) == (0, "")
     assert re.search(r"  gap at \d+\.\d{3} s: \d+ writes of common memory\n", ended.out)
-    assert BagReader(bag).custom_data["gaps"].startswith("1: ")
     numbers = sequences(log_of(bag))
-    (jump,) = (n for n, (one, two) in enumerate(pairwise(numbers)) if two != one + 1)
+    # DDS may lose writes a second time while it catches up on a busy machine: each gap is told, whole, and no other.
+    jumps = [(one, two) for one, two in pairwise(numbers) if two != one + 1]
+    told = BagReader(bag).custom_data["gaps"]
+    assert told.startswith(f"{len(jumps)}: ")
+    assert re.findall(r"(\d+) writes of common memory", told) == [str(two - one - 1) for one, two in jumps]
+    assert jumps
     images = [item.message.sequence for item in BagReader(bag).messages(types={"automax_msgs/msg/CommonImage"})]
-    assert numbers[jump + 1] - 1 in images
-    replayed = automax("replay", bag)
+    assert {two - 1 for _, two in jumps} <= set(images)
+    replayed = automax_here("replay", bag)
     assert (replayed.code, replayed.err) == (0, "")
 
 
@@ -185,15 +192,11 @@ def test_restarted_rack_ends_the_recording(ros_domain_id, tmp_path):
 # What it is asked for
 
 
-@pytest.fixture(scope="module")
-def running(module_domain_id) -> Iterator[Automax]:
-    with Automax("run", TYPES) as process:
-        process.wait_for_line(READY)
-        yield process
-
-
 def test_racks_that_are_there_are_named(running, tmp_path):
-    ended = automax("record", "TIPES", "--output", tmp_path / "bag", "--wait", "15")
+    for wait_s in ("3", "15"):  # on a busy machine it may not have been seen
+        ended = automax_here("record", "TIPES", "--output", tmp_path / "bag", "--wait", wait_s)
+        if "no rack is there" not in ended.err:
+            break
     assert ended.code == 2
     assert "no rack /tipes in ROS domain" in ended.err
     assert "did you mean /types?" in ended.err
@@ -201,20 +204,20 @@ def test_racks_that_are_there_are_named(running, tmp_path):
 
 
 def test_no_rack_at_all(ros_domain_id, tmp_path):
-    ended = automax("record", "TYPES", "--output", tmp_path / "bag", "--wait", "0.5")
+    ended = automax_here("record", "TYPES", "--output", tmp_path / "bag", "--wait", "0.5")
     assert ended.code == 2
     assert "within 0.5 s; no rack is there\n  hint: start the rack first" in ended.err
 
 
 def test_unknown_task_is_refused(running, tmp_path):
-    ended = automax("record", "TYPES", "--output", tmp_path / "bag", "--tasks", "FASTER")
+    ended = automax_here("record", "TYPES", "--output", tmp_path / "bag", "--tasks", "FASTER")
     assert ended.code == 2
     assert ended.err == "automax record: error: --tasks: no task 'FASTER'\n  hint: did you mean FAST?\n"
     assert not (tmp_path / "bag").exists()
 
 
 def test_existing_folder_is_not_recorded_into(tmp_path):
-    ended = automax("record", "TYPES", "--output", tmp_path)
+    ended = automax_here("record", "TYPES", "--output", tmp_path)
     assert ended.code == 2
     assert "AMX6800" in ended.err
     assert list(tmp_path.iterdir()) == []
@@ -230,7 +233,7 @@ def test_existing_folder_is_not_recorded_into(tmp_path):
     ],
 )
 def test_wrong_usage(ros_domain_id, arguments, words):
-    ended = automax("record", *arguments)
+    ended = automax_here("record", *arguments)
     assert ended.code == 2
     assert words in ended.err
     assert "Traceback" not in ended.err
@@ -250,15 +253,13 @@ def test_yaml_file_names_the_rack_and_is_compared_with_what_runs(running, tmp_pa
     assert stored["SLOW.BLK"] == (TYPES.parent / "SLOW.BLK").read_bytes()
 
 
-def test_folder_that_vanishes_is_one_error_that_names_the_cure(ros_domain_id, tmp_path):
+def test_folder_that_vanishes_is_one_error_that_names_the_cure(running, tmp_path):
     """As a disk that is pulled out."""
     bag = tmp_path / "bag"
-    with Automax("run", TYPES) as rack:
-        rack.wait_for_line(READY)
-        with Automax("record", "TYPES", "--output", bag) as recorder:
-            recorder.wait_for_line(BEGUN)
-            shutil.rmtree(bag)
-            ended = recorder.end(signal.SIGINT)
+    with Automax("record", "TYPES", "--output", bag) as recorder:
+        recorder.wait_for_line(BEGUN)
+        shutil.rmtree(bag)
+        ended = recorder.end(signal.SIGINT)
     assert ended.code == 1
     assert ended.err.count("error[AMX6801]") == 1
     assert "`automax bag repair`" in ended.err

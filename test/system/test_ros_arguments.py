@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from .support import TYPES, Automax, automax
+from .support import TYPES, Automax, automax, automax_here
 
 READY = "Ctrl-C ends"
 
@@ -35,7 +35,7 @@ def test_wrong_tunable_refuses_the_start_with_the_reason(ros_domain_id, tmp_path
 
 
 def test_use_sim_time_of_a_distributed_rack_is_refused(ros_domain_id):
-    ended = automax("run", TYPES, "--distributed", "--ros-args", "-p", "use_sim_time:=true", "--")
+    ended = automax_here("run", TYPES, "--distributed", "--ros-args", "-p", "use_sim_time:=true", "--")
     assert ended.code == 2
     assert "use_sim_time: processes of a distributed rack agree by the wall clock" in ended.err
 

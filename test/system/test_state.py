@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from .support import Automax, Client, automax
+from .support import Automax, Client, automax, automax_here
 
 RACK = """\
 rack: KEEP
@@ -64,30 +64,30 @@ def test_values_survive_a_restart(ros_domain_id, rack, tmp_path):
 
 def test_simulated_run_keeps_nothing_unless_asked(rack):
     run = ("run", rack, "--simulated", "--duration", "0.1", "--watch", "LEVEL%")
-    assert automax(*run, "--set", "LEVEL%=9").code == 0
+    assert automax_here(*run, "--set", "LEVEL%=9").code == 0
     assert sorted(path.name for path in rack.parent.iterdir()) == ["T.BLK", "rack.yaml"]
-    assert "LEVEL%=0" in automax(*run).out
+    assert "LEVEL%=0" in automax_here(*run).out
 
 
 def test_simulated_runs_with_a_state_go_on_from_each_other(rack):
     run = ("run", rack, "--simulated", "--duration", "0.1", "--state", rack.parent / "kept", "--watch", "LEVEL%")
-    assert automax(*run, "--set", "LEVEL%=9").code == 0
-    second = automax(*run)
+    assert automax_here(*run, "--set", "LEVEL%=9").code == 0
+    second = automax_here(*run)
     assert "LEVEL%=9" in second.out
     assert "kept from the last run: 1 common, 0 tunables" in second.out
-    assert "LEVEL%=4" in automax(*run, "--set", "LEVEL%=4").out, "what is set wins over what was kept"
+    assert "LEVEL%=4" in automax_here(*run, "--set", "LEVEL%=4").out, "what is set wins over what was kept"
 
 
 def test_recording_of_a_run_with_a_state_replays(rack):
     """What came back stands in the recording as a write, and the tunable in the states."""
     state, bag = rack.parent / "kept", rack.parent / "bag"
     run = ("run", rack, "--simulated", "--duration", "0.1", "--state", state)
-    assert automax(*run, "--set", "LEVEL%=9").code == 0
+    assert automax_here(*run, "--set", "LEVEL%=9").code == 0
     text = (state / "state.json").read_text()
     (state / "state.json").write_text(text.replace('"K%": 2', '"K%": 5'))
-    ended = automax(*run, "--record", bag, "--watch", "COPY%")
+    ended = automax_here(*run, "--record", bag, "--watch", "COPY%")
     assert "COPY%=45" in ended.out
-    replayed = automax("replay", bag)
+    replayed = automax_here("replay", bag)
     assert replayed.code == 0, replayed.out + replayed.err
 
 
@@ -107,11 +107,11 @@ COUNTING = """\
 def test_locals_of_the_last_run_stand_in_the_recording_before_the_start(rack):
     (rack.parent / "T.BLK").write_text(COUNTING)
     run = ("run", rack, "--simulated", "--duration", "0.1", "--state", rack.parent / "kept")
-    assert automax(*run).code == 0
-    ended = automax(*run, "--record", rack.parent / "bag", "--watch", "LEVEL%,COPY%")
+    assert automax_here(*run).code == 0
+    ended = automax_here(*run, "--record", rack.parent / "bag", "--watch", "LEVEL%,COPY%")
     assert "LEVEL%=2019" in ended.out
     assert "COPY%=19" in ended.out
-    replayed = automax("replay", rack.parent / "bag")
+    replayed = automax_here("replay", rack.parent / "bag")
     assert replayed.code == 0, replayed.out + replayed.err
 
 
@@ -120,8 +120,8 @@ def test_damaged_state_is_a_clear_error(ros_domain_id, rack, simulated):
     state = rack.parent / "kept"
     state.mkdir()
     (state / "state.json").write_text("{")
-    how = ("--simulated",) if simulated else ()
-    ended = automax("run", rack, *how, "--duration", "0.1", "--state", state)
+    program, how = (automax_here, ("--simulated",)) if simulated else (automax, ())
+    ended = program("run", rack, *how, "--duration", "0.1", "--state", state)
     assert ended.code == 2
     assert "state.json: error[AMX6711]: the kept state is damaged: " in ended.err
     assert "hint: remove it to start the rack as installed" in ended.err
@@ -129,7 +129,7 @@ def test_damaged_state_is_a_clear_error(ros_domain_id, rack, simulated):
 
 def test_folder_that_cannot_be_one_is_refused_before_the_run(rack):
     (rack.parent / "kept").write_text("a file stands there")
-    ended = automax("run", rack, "--simulated", "--duration", "0.1", "--state", rack.parent / "kept")
+    ended = automax_here("run", rack, "--simulated", "--duration", "0.1", "--state", rack.parent / "kept")
     assert ended.code == 2
     assert "kept is not a folder" in ended.err
     assert "ran" not in ended.out

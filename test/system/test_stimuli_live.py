@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rack.stimuli.helpers import DRAW, RACK, SPEED
 
-from .support import Automax, automax
+from .support import Automax, automax, automax_here
 
 
 def written(folder: Path, stimuli: str) -> tuple[Path, Path, Path]:
@@ -44,8 +44,8 @@ def test_ctrl_c_ends_with_a_report_that_has_what_services_did(ros_domain_id, tmp
     config, file, report = written(tmp_path, "- {at: 0.01, set: {REF%: 7}}\n- {at: 0.02, stop: [DRAW]}\n")
     with Automax("run", config, "--stimuli", file, "--report", report) as process:
         process.wait_for_line("Ctrl-C ends the run")
-        refused = automax("ctl", "PM1", "stop", "NOBODY")
-        stopped = automax("ctl", "PM1", "stop-all")
+        refused = automax_here("ctl", "PM1", "stop", "NOBODY")
+        stopped = automax_here("ctl", "PM1", "stop-all")
         ended = process.end(signal.SIGINT)
     assert (refused.code, stopped.code) == (1, 0)
     assert ended.code == 0

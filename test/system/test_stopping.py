@@ -13,7 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from automax_ros.bags.reader import BagReader
 
-from .support import STUCK, TYPES, Automax, Client, automax, consecutive, ns, wait_until
+from .support import STUCK, TYPES, Automax, Client, automax, automax_here, consecutive, ns, wait_until
 
 READY = "Ctrl-C ends the run"
 LONGEST_STOP_S = 20.0
@@ -106,7 +106,7 @@ def running(module_domain_id) -> Iterator[Automax]:
 
 
 def test_second_launch_is_refused(running, module_domain_id):
-    ended = automax("run", TYPES, "--duration", "1")
+    ended = automax_here("run", TYPES, "--duration", "1")
     assert ended.code == 2
     assert ended.err == (
         f"automax run: error: rack /types in ROS domain {module_domain_id} runs already (process {running.pid}): "
