@@ -64,14 +64,16 @@ def ns_in_turn(loops: Sequence[Loop], seconds: float = SECONDS) -> list[float]:
     clock = time.perf_counter_ns
     gc.collect()
     gc.disable()
-    end = clock() + seconds * 1e9
-    while not rounds or clock() < end:
-        marks = [clock()]
-        for work in works:
-            work()
-            marks.append(clock())
-        rounds.append([after - before for before, after in pairwise(marks)])
-    gc.enable()
+    try:
+        end = clock() + seconds * 1e9
+        while not rounds or clock() < end:
+            marks = [clock()]
+            for work in works:
+                work()
+                marks.append(clock())
+            rounds.append([after - before for before, after in pairwise(marks)])
+    finally:
+        gc.enable()
     fastest = sorted(rounds, key=sum)[: max(1, round(len(rounds) * FASTEST))]
     return [
         median(taken[2 * number + 1] - taken[2 * number] for taken in fastest) / loop.passes
@@ -135,7 +137,10 @@ class Other:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         print(question, file=self._process.stdin, flush=True)
-        return float(self._process.stdout.readline())
+        told = self._process.stdout.readline()
+        if not told:
+            raise SystemExit(f"{self._process.args} has ended with {self._process.wait()}")
+        return float(told)
 
 
 def answer(measure: Callable[[str], float]) -> None:

@@ -147,6 +147,7 @@ def build(group: Group, compiler: Compiler, folder: Path, pool: ThreadPoolExecut
         for module in sorted(facts["modules"]):
             shim = facts["shims"][module.rpartition(".")[0]]
             lines.append(f"module\t{module}\t{placed(work, name, f'{shim[:-2]}{suffix}')}")
+        lines += [f"interface\t{item}\t{abi}\t{api}" for item, (abi, api) in sorted(facts["interfaces"].items())]
         sources = sorted([*facts["modules"].values(), *facts["needs"].values()])
         lines += [
             f"source\t{Path(file).relative_to(PACKAGE.name).as_posix()}\t{digests[ROOT / file]}" for file in sources

@@ -6,6 +6,7 @@ tools/compiled_translate.py GROUP FOLDER     writes C into FOLDER, and FOLDER/fa
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -74,6 +75,7 @@ def translate(name: str, folder: Path) -> dict[str, Any]:
         "c": [file for file, _ in texts[0] if file.endswith(".c")],
         "runtime": runtime(folder, [item.path for item in used]),
         "include": sorted({item for source in used for item in source.include_dirs}),
+        "interfaces": interfaces([item.path for item in used]),
         "shims": shims(shared_lib_name(f"automax_{name}"), modules, folder),
     }
 
@@ -96,6 +98,18 @@ def runtime(folder: Path, used: list[str]) -> list[str]:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(path, target)
     return [*RUNTIME_C_FILES, *used]
+
+
+def interfaces(used: list[str]) -> dict[str, list[int]]:
+    """The C interfaces of librt that a group ``used``: the binary version and the other one, by mypyc's headers."""
+    found: dict[str, list[int]] = {}
+    for folder in {Path(file).parent for file in used}:
+        header = Path(include_dir()) / folder / f"librt_{folder.name}.h"
+        if header.is_file():
+            defined = re.findall(r"#define LIBRT_\w+_(ABI|API)_VERSION (\d+)", header.read_text(encoding="utf-8"))
+            versions = {kind: int(number) for kind, number in defined}
+            found[f"librt.{folder.name}"] = [versions["ABI"], versions["API"]]
+    return found
 
 
 def shims(library: str, modules: dict[str, str], folder: Path) -> dict[str, str]:

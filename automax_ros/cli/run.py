@@ -112,7 +112,10 @@ def folder(text: str) -> Path:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault."""
+    """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault.
+
+    A simulated run that a signal ends before it begins has the signal's code: its report would be that of another run.
+    """
     if arguments.simulated and arguments.record is not None and arguments.duration is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
     _check_time(arguments)
@@ -129,7 +132,10 @@ def run(arguments: argparse.Namespace) -> int:
         try:
             return _run(arguments, stop)
         except CutShort:
-            return 0
+            if not arguments.simulated:
+                return 0
+            print("run: ended before its first scan; nothing was recorded or reported", file=sys.stderr)
+            return stop.code
         except RackError as error:
             return print_refused("run", error)
         except StimuliRefused:

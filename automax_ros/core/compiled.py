@@ -4,7 +4,8 @@ The Python files are the reference and always there. Machine code made from them
 folder ``automax_ros_compiled`` of the installation, next to the package or in the site-packages of this interpreter;
 nothing else is looked at. A group of modules is used only if every source that it was made from, and every source that
 its types came from, still has the same content (decision): whoever edits a file runs what was edited. Where libraries
-are missing, or cannot be loaded on this machine, the Python files run too; ``automax --version`` says why.
+are missing, cannot be loaded on this machine, or call another module's C in a version that is not there, the Python
+files run too; ``automax --version`` says why.
 ``AUTOMAX_COMPILED=off`` in the environment switches all of it off.
 """
 
@@ -18,7 +19,7 @@ from types import ModuleType
 
 FOLDER = "automax_ros_compiled"
 INDEX = "index.txt"
-VERSION = "2"
+VERSION = "3"
 VARIABLE = "AUTOMAX_COMPILED"
 OFF = ("off", "0", "no", "false")
 
@@ -27,6 +28,8 @@ class CompiledGroup:
     """Modules that are loaded together: ``libraries`` by name of module, ``sources`` with what their content was.
 
     ``sizes`` has the bytes of each library: one that was copied by half would end the process when it is loaded.
+    ``interfaces`` has the version of the C interface of other modules that the libraries call: the binary one, and the
+    least of what it offers.
     ``stale`` is empty as long as the group may be used, otherwise it says why not; None before the first of its modules
     was asked for.
     """
@@ -37,6 +40,7 @@ class CompiledGroup:
         self.libraries: dict[str, str] = {}
         self.sizes: dict[str, int] = {}
         self.sources: dict[str, str] = {}
+        self.interfaces: dict[str, tuple[int, int]] = {}
         self.stale: str | None = None
 
     def fresh(self, package: str) -> bool:
@@ -44,7 +48,8 @@ class CompiledGroup:
         if self.stale is None:
             harmed = (_harmed(file, size) for file, size in self.sizes.items())
             changed = (_changed(package, file, digest) for file, digest in self.sources.items())
-            self.stale = next(filter(None, harmed), "") or next(filter(None, changed), "")
+            others = (_differing(module, *version) for module, version in self.interfaces.items())
+            self.stale = next((why for reasons in (harmed, changed, others) for why in reasons if why), "")
         return not self.stale
 
     def loads(self) -> bool:
@@ -157,6 +162,8 @@ def _groups(folder: str, lines: Sequence[list[str]]) -> list[CompiledGroup]:
             groups[-1].sizes[file] = int(line[3])
         elif line[0] == "source":
             groups[-1].sources[line[1]] = line[2]
+        elif line[0] == "interface":
+            groups[-1].interfaces[line[1]] = (int(line[2]), int(line[3]))
     return groups
 
 
@@ -200,3 +207,21 @@ def _changed(package: str, file: str, digest: str) -> str:
     except OSError:
         return f"{file} cannot be read"
     return "" if source_digest(content) == digest else f"{file} has changed since"
+
+
+def _differing(module: str, binary: int, offered: int) -> str:
+    """Why machine code cannot call a module's C interface, of which it needs this version; empty if it can."""
+    import ctypes
+
+    try:
+        capsule = __import__(module, fromlist=["_C_API"])._C_API
+        pointer = ctypes.pythonapi.PyCapsule_GetPointer
+        pointer.restype, pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+        table = ctypes.cast(pointer(capsule, f"{module}._C_API".encode()), ctypes.POINTER(ctypes.c_void_p))
+        tell = ctypes.CFUNCTYPE(ctypes.c_int)
+        found, offers = tell(table[0])(), tell(table[1])()
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        return f"the C interface of {module} cannot be read: {error}"
+    if found == binary and offers >= offered:
+        return ""
+    return f"{module} has C interface {found}.{offers}, not {binary}.{offered}: install the librt it was compiled with"

@@ -26,7 +26,7 @@ They are handed out in their order: the first one that differs ends the work, an
 """
 ONE_PART = (
     "the recording is replayed here: a cluster is handed parts of at least "
-    f"{LEAST_PART_BYTES >> 20} MB, each of one file or more, and it has only one such part"
+    f"{LEAST_PART_BYTES >> 20} MB, each of one file or more, and this recording makes only one such part"
 )
 """What is told of a cluster that is not used."""
 Progress = Callable[[float], None]

@@ -100,6 +100,33 @@ def test_with_a_library_that_cannot_be_loaded_the_python_file_runs_and_it_is_tol
     assert "library.so" in told or "shims.so" in told
 
 
+@pytest.mark.parametrize(
+    ("interface", "why"),
+    [
+        ("librt.strings\t{0}\t{1}", ""),
+        ("librt.strings\t{0}\t0", ""),
+        ("librt.strings\t9{0}\t{1}", "librt.strings has C interface {0}.{1}, not 9{0}.{1}: install the librt"),
+        ("librt.strings\t{0}\t9{1}", "librt.strings has C interface {0}.{1}, not {0}.9{1}: install the librt"),
+        ("librt\t1\t1", "the C interface of librt cannot be read: "),
+        ("librt.gone\t1\t1", "the C interface of librt.gone cannot be read: No module named"),
+    ],
+)
+def test_what_calls_another_version_of_a_c_interface_is_not_loaded(package, interface, why):
+    folders = compiled._folders(str(PACKAGE))
+    here = [group for folder in folders for group in compiled.read_index(str(folder)) if group.interfaces]
+    if not here:
+        pytest.skip("nothing was compiled here that calls another module's C")
+    group = here[0]
+    ((module, (binary, offered)),) = group.interfaces.items()
+    assert module == "librt.strings"
+    index(package.parent / compiled.FOLDER)
+    with (package.parent / compiled.FOLDER / compiled.INDEX).open("a") as file:
+        file.write(f"interface\t{interface.format(binary, offered)}\n")
+    found = compiled.CompiledFinder(compiled.read_index(str(package.parent / compiled.FOLDER)), str(package))
+    assert (found.find_spec("automax_ros.drive.motor") is None) == bool(why)
+    assert found.groups[0].stale.startswith(why.format(binary, offered))
+
+
 def test_what_is_told_was_tried(package, monkeypatch):
     monkeypatch.delitem(sys.modules, "automax_drive__mypyc", raising=False)
     monkeypatch.setattr(sys, "meta_path", [finder(package)])

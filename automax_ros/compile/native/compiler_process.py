@@ -22,11 +22,13 @@ from automax_ros.compile.native.source import NotNative
 
 LIMIT_S = 120.0
 """Time that the compiler has for one text, s (decision): a task of 2,000 lines takes a few."""
+LOOK_S = 0.25
+"""Time after which whoever waits for a compiler looks up, s: Python misses a signal that comes just before a wait."""
 LEAST_MEMORY, MEMORY_A_CHARACTER = 1 << 30, 512
 """Address space that each process of the compiler may have, bytes, and what each character of a text adds to that
 (decision: gcc 12 takes 50 MB for a task of 40 blocks, and 300 bytes a character for long ones: 310 MB for 2,000 lines,
-which may have 1.6 GB, and 930 MB for 3,800,000 characters, which may have 3 GB). It is never more than half of the
-machine's memory, and where the machine knows no such limit there is none.
+which may have 1.6 GB, and 930 MB for 3,800,000 characters, which may have 3 GB). As many compilers run at a time as
+there are cores, and together they may have half of the memory. Where the machine knows no such limit there is none.
 """
 FOLDER = "automax_native_"
 """What the name of a compiler's folder begins with."""
@@ -35,12 +37,14 @@ _SCRIPT = """
 exec 3<&0
 { trap '' TERM; read -r _ <&3; kill -TERM 0; rm -rf -- "$1" || rm -rf -- "$1"; kill -KILL 0; } >/dev/null 2>&1 &
 exec 3<&-
-ulimit -c 0 2>/dev/null; ulimit -t "$2" 2>/dev/null; ulimit -v "$3" 2>/dev/null
+ulimit -c 0 2>/dev/null; ulimit -f 524288 2>/dev/null
+ulimit -t "$2" 2>/dev/null; ulimit -v "$3" 2>/dev/null
 shift 3
 "$@" <text
 code=$?
 exec 2>/dev/null
-kill -KILL $!; wait
+trap '' TERM
+kill -TERM 0; kill -KILL $!; wait
 exit $code
 """
 """Limits a compiler, and runs it on what stands in the file ``text`` (decision: it is quick and safe among threads).
@@ -48,8 +52,9 @@ exit $code
 It is a shell with a fixed text, which takes no argument apart. It costs 1 ms, an interpreter of Python 9 ms; what
 Python itself can do between fork and exec may hang where there are threads; and limits that are set on a compiler which
 runs already do not reach what it has started by then. The second line waits until nobody holds the other end of
-standard input any more: however we end, be it by SIGKILL, the compiler ends then and its folder goes. A limit that the
-machine does not know, as macOS that of memory, is left out.
+standard input any more: however we end, be it by SIGKILL, the compiler ends then and its folder goes. What a compiler
+leaves running when it has ended is ended too. No file may have more than 256 MB. A limit that the machine does not
+know, as macOS that of memory, is left out.
 """
 MADE = "made.so"
 """Name under which a compiler leaves the library."""
@@ -58,8 +63,14 @@ _MESSAGE = 400
 """Characters of what the compiler says that are passed on."""
 _NOT_RUN = (126, 127)
 """Exit codes of a shell that could not run a program."""
-_NO_MEMORY = ("out of memory", "memory exhausted", "annot allocate memory", "bad_alloc", "Killed signal terminated")
-"""What gcc, clang, as and ld say when they get no more memory; the last, when the machine itself has ended them."""
+_NO_MEMORY = (
+    *("out of memory", "memory exhausted", "annot allocate memory", "bad_alloc"),
+    *("Killed signal terminated", "failed to map segment"),
+)
+"""What gcc, clang, as and ld say when they get no more memory; the last two when the machine has ended them, or has not
+even loaded them."""
+_CONTAINER_LIMIT = Path("/sys/fs/cgroup/memory.max")
+"""Where Linux tells a container how much memory it may have."""
 _RUNNING: dict[io.FileIO, threading.Thread] = {}
 """What lets the compilers live that are under way, and the threads that wait for them."""
 _ABANDONED: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
@@ -100,9 +111,11 @@ def run_compiler(command: Sequence[str], search: str, text: str = "", limit_s: f
 def memory_of(text: str) -> int:
     """Return how much address space each process of a compiler may have for a text, bytes."""
     wanted = LEAST_MEMORY + MEMORY_A_CHARACTER * len(text)
-    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    with contextlib.suppress(OSError, ValueError):  # no container, or one that may have all
+        machine = min(machine, int(_CONTAINER_LIMIT.read_text()))
     own = [limit for limit in resource.getrlimit(resource.RLIMIT_AS) if limit != resource.RLIM_INFINITY]
-    return min(wanted, machine, *own)
+    return min(wanted, machine // 2 // (os.cpu_count() or 1), *own)
 
 
 def abandon(threads: Iterable[threading.Thread]) -> None:
@@ -148,10 +161,11 @@ def _clear_away(new: Path) -> None:
     oldest = new.stat().st_mtime - STALE_S
     with contextlib.suppress(OSError), os.scandir(new.parent) as found:
         for entry in found:
-            if entry.name.startswith(FOLDER) and entry.is_dir(follow_symlinks=False):
-                known = entry.stat(follow_symlinks=False)
-                if known.st_uid == os.geteuid() and known.st_mtime < oldest:
-                    shutil.rmtree(entry.path, ignore_errors=True)
+            with contextlib.suppress(OSError):  # another program may remove it just now
+                if entry.name.startswith(FOLDER) and entry.is_dir(follow_symlinks=False):
+                    known = entry.stat(follow_symlinks=False)
+                    if known.st_uid == os.geteuid() and known.st_mtime < oldest:
+                        shutil.rmtree(entry.path, ignore_errors=True)
 
 
 def _awaited(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s: float) -> tuple[str, str]:
@@ -160,12 +174,15 @@ def _awaited(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s
     try:
         if thread in _ABANDONED:
             life.close()
-        return process.communicate(timeout=limit_s)
+        return _printed(process, limit_s)
     except BaseException as error:
         if process.returncode is None:  # else its number may be another's by now
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+        for pipe in (process.stdout, process.stderr):
+            if pipe is not None:
+                pipe.close()  # what has left the compiler's session may hold its other end for as long as it likes
+        process.wait()
         if isinstance(error, subprocess.TimeoutExpired):
             raise NotNative(f"{name} has not ended within {limit_s:g} s") from error
         raise
@@ -173,12 +190,24 @@ def _awaited(process: subprocess.Popen[str], life: io.FileIO, name: str, limit_s
         del _RUNNING[life]
 
 
+def _printed(process: subprocess.Popen[str], limit_s: float) -> tuple[str, str]:
+    """Return what a process prints, and its complaints.
+
+    Raises:
+        TimeoutExpired: it has not ended in time.
+    """
+    for _ in range(math.ceil(limit_s / LOOK_S) - 1):
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return process.communicate(timeout=LOOK_S)
+    return process.communicate(timeout=LOOK_S)
+
+
 def _failure(name: str, code: int, complaints: str, memory: int) -> str:
     """Return why there is no library."""
     lines = complaints.strip().splitlines() or [f"exit code {code}"]
-    if code in _NOT_RUN:
-        return f"{name} cannot be run: {lines[-1][:_MESSAGE]}"
     if any(words in complaints for words in _NO_MEMORY):
         return f"{name} has not enough memory for it, of which it may have {memory >> 20:,} MB: divide the task"
+    if code in _NOT_RUN:
+        return f"{name} cannot be run: {lines[-1][:_MESSAGE]}"
     told = next((line for line in lines if "error" in line), lines[0])
     return f"{name} fails: {told[:_MESSAGE]}"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.compile.native.build import library
 from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.compiler_process import LIMIT_S, abandon
+from automax_ros.compile.native.compiler_process import LIMIT_S, LOOK_S, abandon
 from automax_ros.compile.native.source import NotNative
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ WORTHWHILE_NS, WORTHWHILE_LINE_NS = 500_000_000, 10_000_000
 """Time that scans must take in Python for native ones to be built, ns, and what each line of the task adds to that
 (decision: twice what it takes to translate and build the task, which is 0.2 s, and 5 ms per line).
 """
-WORTHWHILE_KEPT_NS = 100_000_000
-"""Time that scans must take in Python for native ones to be looked for among what other runs have built, ns (decision:
-a task is found in 0.02 s, and saves two thirds of this).
+WORTHWHILE_KEPT_NS, WORTHWHILE_KEPT_LINE_NS = 150_000_000, 3_000_000
+"""The same for native scans to be looked for among what other runs have built (decision: it saves two thirds of this;
+looking takes 0.05 to 0.1 s for the first task of a program, and 1 to 2 ms per line, for the scans are lowered first).
 """
 
 _FAULT = "automax itself failed to make it native, please report this with the task's text"
@@ -105,7 +105,7 @@ class NativeForms:
         if self.mode is NativeMode.OFF:
             return NativeOutcome(compiled, why=self.why_off)
         builds = self.mode is NativeMode.ON or self._pays(compiled, WORTHWHILE_NS, WORTHWHILE_LINE_NS)
-        if not builds and not self._pays(compiled, WORTHWHILE_KEPT_NS, 0):
+        if not builds and not self._pays(compiled, WORTHWHILE_KEPT_NS, WORTHWHILE_KEPT_LINE_NS):
             return NativeOutcome(compiled, why="a run this short gains nothing by it (--native on)")
         from automax_ros.compile.native.task import native_form
 
@@ -148,7 +148,10 @@ def _side_by_side(
         for thread in threads:
             thread.start()
         while len(made) < len(tasks):
-            name, outcome = found.get()
+            try:
+                name, outcome = found.get(timeout=LOOK_S)
+            except queue.Empty:
+                continue
             if isinstance(outcome, BaseException):
                 raise outcome
             made[name] = outcome

@@ -16,9 +16,12 @@ from automax_ros.compile.native.cache import STALE_S
 from automax_ros.compile.native.compiler_process import FOLDER, abandon, memory_of, run_compiler
 from automax_ros.compile.native.source import NotNative
 
-from .support import await_that, begun_compiler_of, compiler_of, has_ended
+from .support import PATIENCE_S, await_that, begun_compiler_of, compiler_of, has_ended
 
 NEEDS_GCC = pytest.mark.skipif(shutil.which("gcc") is None, reason="native code needs a C compiler")
+
+
+FILE_BLOCKS = (256 << 20) // 512
 
 
 def doubled(times: int) -> str:
@@ -49,18 +52,23 @@ def shell(request, monkeypatch):
 @pytest.mark.usefixtures("shell")
 def test_a_compiler_and_what_it_starts_may_have_so_much_and_no_more(tmp_path, temporary):
     told = tmp_path / "told"
-    limits = "ulimit -v; ulimit -t; ulimit -c"
+    limits = "ulimit -v; ulimit -t; ulimit -c; ulimit -f"
     path = compiler_of(tmp_path, f"{{ {limits}; sh -c '{limits}'; pwd; cat; }} > {told}")
     text = "int x;\n" * 1000
     assert run_compiler([str(path)], os.environ["PATH"], text, 20.0).made is None
-    *numbers, folder, read = told.read_text().split("\n", 7)
+    *numbers, folder, read = told.read_text().split("\n", 9)
+    blocks = [int(numbers.pop(place)) for place in (7, 3)]
+    assert blocks in ([FILE_BLOCKS] * 2, [2 * FILE_BLOCKS] * 2)  # bash by this name counts blocks of 1024 bytes
     assert numbers == [str(memory_of(text) >> 10), "21", "0"] * 2
     assert folder.startswith(str(temporary / FOLDER))
     assert read == text
     assert list(temporary.iterdir()) == []
 
 
-def test_memory_goes_with_the_length_of_the_text_up_to_half_of_the_machine(monkeypatch):
+def test_memory_goes_with_the_length_of_the_text_up_to_half_of_the_machine(monkeypatch, tmp_path):
+    container = tmp_path / "memory.max"
+    monkeypatch.setattr(compiler_process, "_CONTAINER_LIMIT", container)
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY,) * 2)
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": (64 << 30) // 4096}
     monkeypatch.setattr(os, "sysconf", pages.__getitem__)
@@ -68,8 +76,13 @@ def test_memory_goes_with_the_length_of_the_text_up_to_half_of_the_machine(monke
     # What gcc 12 was seen to take, bytes, by characters: three times that there must be.
     for characters, taken in ((36_614, 53 << 20), (1_032_140, 308 << 20), (3_777_089, 930 << 20)):
         assert memory_of("x" * characters) == (1 << 30) + 512 * characters > 3 * taken
+    for told, limit in (("max\n", 1 << 30), (f"{1 << 30}\n", 1 << 29), (f"{1 << 40}\n", 1 << 30)):
+        container.write_text(told)
+        assert memory_of("") == limit
     pages["SC_PHYS_PAGES"] = (1 << 30) // 4096
     assert memory_of("x" * 1_032_140) == 1 << 29
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    assert memory_of("x" * 1_032_140) == 1 << 27
 
 
 @pytest.mark.parametrize("limits", [(300 << 20, 900 << 20), (resource.RLIM_INFINITY, 300 << 20)])
@@ -90,9 +103,16 @@ def test_a_text_that_takes_too_much_memory_is_told(temporary, monkeypatch):
     assert list(temporary.iterdir()) == []
 
 
-@pytest.mark.parametrize("said", ["gcc: fatal error: Killed signal terminated program cc1", "as: out of memory"])
-def test_a_compiler_that_the_machine_ends_for_its_memory_is_told_alike(tmp_path, said):
-    path = compiler_of(tmp_path, f"echo first; echo '{said}' >&2; exit 1")
+@pytest.mark.parametrize(
+    ("said", "code"),
+    [
+        ("gcc: fatal error: Killed signal terminated program cc1", 1),
+        ("as: out of memory", 1),
+        ("clang: error while loading shared libraries: libLLVM.so: failed to map segment from shared object", 127),
+    ],
+)
+def test_a_compiler_that_the_machine_ends_for_its_memory_is_told_alike(tmp_path, said, code):
+    path = compiler_of(tmp_path, f"echo first; echo '{said}' >&2; exit {code}")
     with pytest.raises(NotNative, match="has not enough memory for it"):
         run_compiler([str(path)], os.environ["PATH"])
 
@@ -147,8 +167,32 @@ def test_what_a_killed_process_has_left_is_cleared_away(temporary, monkeypatch):
     assert (temporary / "another" / "text").exists()
 
 
+def test_what_leaves_the_compiler_s_session_and_holds_its_pipes_does_not_hold_us(tmp_path, temporary):
+    child = tmp_path / "child"
+    path = compiler_of(
+        tmp_path, f"setsid sh -c 'echo $$ > {child}; exec sleep 100' & while [ ! -s {child} ]; do :; done"
+    )
+    begun = time.monotonic()
+    with pytest.raises(NotNative, match="has not ended within 1 s"):
+        run_compiler([str(path)], os.environ["PATH"], limit_s=1.0)
+    assert time.monotonic() - begun < PATIENCE_S
+    os.kill(int(child.read_text()), signal.SIGKILL)
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.usefixtures("shell")
+def test_what_a_compiler_leaves_running_ends_with_it(tmp_path):
+    child = tmp_path / "child"
+    going_on = f"sh -c 'echo $$ > {child}; exec sleep 100' >/dev/null 2>&1 </dev/null &"
+    path = compiler_of(tmp_path, f"{going_on} while [ ! -s {child} ]; do :; done; echo done; exit 3")
+    with pytest.raises(NotNative, match="exit code 3"):
+        run_compiler([str(path)], os.environ["PATH"])
+    await_that(lambda: has_ended(int(child.read_text())))
+
+
 RUNNING = """
-import os, sys
+import os, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background of a shell
 from automax_ros.compile.native.cache import STALE_S
 from automax_ros.compile.native.compiler_process import run_compiler
 run_compiler([os.environ["CC"]], os.environ["PATH"])
@@ -166,7 +210,7 @@ def test_however_we_end_the_compiler_ends_with_what_it_has_started(tmp_path, tem
     await_that(lambda: child.exists() and child.read_text().endswith("\n"))
     assert len(list(temporary.iterdir())) == 1
     ours.send_signal(number)
-    ours.wait()
+    ours.wait(PATIENCE_S)
     await_that(lambda: has_ended(begun) and has_ended(int(child.read_text())))
     await_that(lambda: list(temporary.iterdir()) == [])
 

@@ -10,6 +10,7 @@ from automax_ros.compile.native.build import build, find_compiler
 from automax_ros.compile.native.cache import NativeCache
 from automax_ros.compile.native.forms import (
     IN_PYTHON,
+    WORTHWHILE_KEPT_LINE_NS,
     WORTHWHILE_KEPT_NS,
     WORTHWHILE_LINE_NS,
     WORTHWHILE_NS,
@@ -32,6 +33,10 @@ def compiled():
 def _task_time_ns(compiled, python_ns):
     """Return the task time in which scans take this time in Python, as it is estimated."""
     return -(-python_ns // (75 * len(compiled.program.scan))) * compiled.program.period_ns
+
+
+def _enough_for_a_kept_form(compiled):
+    return _task_time_ns(compiled, WORTHWHILE_KEPT_NS + len(compiled.program.scan) * WORTHWHILE_KEPT_LINE_NS)
 
 
 def test_off_gives_back_the_same_task(compiled):
@@ -61,7 +66,7 @@ def test_auto_builds_what_pays(compiled, tmp_path):
 
 def test_auto_takes_what_another_run_has_built_for_a_shorter_one(compiled, tmp_path):
     cache = NativeCache(tmp_path / "cache")
-    enough = _task_time_ns(compiled, WORTHWHILE_KEPT_NS)
+    enough = _enough_for_a_kept_form(compiled)
     assert NativeForms(NativeMode.AUTO, enough, cache).form(compiled).text == f"TASK: in Python: {NOT_KEPT}"
     assert not list((tmp_path / "cache").iterdir())
     native_form(compiled, cache)
@@ -76,7 +81,7 @@ def test_a_kept_form_of_which_a_part_is_missing_is_not_built_for_a_short_run(com
     native_form(compiled, cache)
     for path in (tmp_path / "cache").glob(f"*{suffix}"):
         path.unlink()
-    short = NativeForms(NativeMode.AUTO, _task_time_ns(compiled, WORTHWHILE_KEPT_NS), cache)
+    short = NativeForms(NativeMode.AUTO, _enough_for_a_kept_form(compiled), cache)
     assert short.form(compiled).why == NOT_KEPT
     assert not list((tmp_path / "cache").glob(f"*{suffix}"))
 
