@@ -8,8 +8,8 @@
 SHELL := /bin/bash
 BIN := .venv/bin
 CONFIG ?= config/dc_drive/rack.yaml
-# A file of tests is one worker's; more than four would only hold up the tests of live racks.
-PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile
+# A file of tests is one worker's, in the order of test/conftest.py; more than four would only hold up live racks.
+PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # What runs a second time in plain Python; the whole suite runs with the modules that were compiled ahead of time.
 PLAIN := test/drive/cml test/drive/test_state.py test/drive/test_plant.py test/drive/test_motor.py test/running \

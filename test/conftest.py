@@ -29,6 +29,23 @@ LOCKS = Path(tempfile.gettempdir()) / f"automax_ros_domains_{os.getuid()}"
 turns = itertools.count()
 
 
+@pytest.hookimpl(trylast=True)  # after those that leave tests out
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let files with tests of running racks, which wait much, alternate with others, the longest ones first.
+
+    So the cores have work while racks run, racks are not measured next to too many others, and all workers end
+    together.
+    """
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    longest_first = sorted(files, key=lambda path: (-len(files[path]), path))
+    racks = [path for path in longest_first if path.parent.name == "system"]
+    others = [path for path in longest_first if path.parent.name != "system"]
+    order = itertools.chain.from_iterable(itertools.zip_longest(racks, others))
+    items[:] = [item for path in order if path is not None for item in files[path]]
+
+
 @contextmanager
 def free_domain() -> Iterator[int]:
     """A ROS domain (1 to 101) that no other test on this machine uses while the block lasts.

@@ -8,7 +8,8 @@ import automax_ros
 from automax_ros.bags.live.topics import MAX_VALUE_TOPICS
 from automax_ros.wire.rack_files import RACK_FILE, RackFile, fingerprint
 
-_GAPS_NAMED = 20
+GAPS_NAMED = 20
+"""Gaps that the bag tells one by one; it tells the number of all."""
 
 
 def provenance(
@@ -28,7 +29,7 @@ def provenance(
     if replayable_s is not None:
         data["replayable_from_s"] = f"{replayable_s:.6f}"
     if gaps:
-        data["gaps"] = f"{len(gaps)}: " + "; ".join(gaps[:_GAPS_NAMED])
+        data["gaps"] = f"{len(gaps)}: " + "; ".join(gaps[:GAPS_NAMED])
     if ended is not None:
         data["ended"] = ended
     return data
