@@ -58,7 +58,7 @@ A dash in the name is an underscore in the module's; a word of Python has one at
 ROS_ARGUMENTS = "--ros-args"
 """What the ROS arguments of a command line begin with."""
 UNTIL_STOPPED = ("run", "node", "record", "play")
-"""The subcommands that go on until somebody stops them."""
+"""The subcommands that go on until somebody stops them; a run in simulated time has work to do first."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
 BROKEN_PIPE = 141
@@ -67,7 +67,8 @@ BROKEN_PIPE = 141
 
 def entry() -> NoReturn:
     """Run `automax` as the program of this process: once the exit code stands, no signal changes it any more."""
-    early.until_work_begins(ends_well=_name(sys.argv[1:]) in UNTIL_STOPPED)
+    ends_well = _name(sys.argv[1:]) in UNTIL_STOPPED and "--simulated" not in sys.argv
+    early.until_work_begins(ends_well=ends_well)
     code = main()
     try:
         early.work_has_ended()
