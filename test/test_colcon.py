@@ -87,4 +87,5 @@ def test_colcon_builds_a_workspace_whose_rack_runs(tmp_path_factory, option):
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "2 packages finished" in result.stdout
-    assert re.search(r"^  LINE +1 +11 +18\d ", result.stdout, re.MULTILINE), result.stdout
+    (scans,) = re.findall(r"^  LINE +1 +11 +(\d+) +(\d+) ", result.stdout, re.MULTILINE)
+    assert 180 <= sum(map(int, scans)) < 190, result.stdout  # on a busy machine some are late

@@ -6,16 +6,17 @@ import math
 
 import numpy as np
 
-LARGEST = float(np.float32(9.2233717e18))
+LIMIT = 9.2233717e18
+LARGEST = float(np.float32(LIMIT))
 LOW32, HIGH32 = -(2**31), 2**31 - 1
 
 
 def single(value: float) -> tuple[float, bool]:
-    """What a REAL variable takes, and whether it was clamped."""
+    """What a REAL variable takes, and whether it was clamped: what only single precision makes smaller was not."""
     if math.isnan(value):
         return 0.0, True
     if abs(value) > LARGEST:
-        return math.copysign(LARGEST, value), True
+        return math.copysign(LARGEST, value), abs(value) > LIMIT
     if 0 <= value < 5.4210107e-20 or -2.7105054e-20 < value <= 0:
         return 0.0, False
     return float(np.float32(value)), False
