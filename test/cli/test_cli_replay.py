@@ -55,7 +55,7 @@ def test_a_cluster_that_is_not_used_is_told(automax, bag):
     assert (result.code, result.out) == (0, alone.out)
     assert result.err == (
         "automax replay: the recording is replayed here: a cluster is handed parts of at least 16 MB, "
-        "each of one file or more, and it has only one such part\n"
+        "each of one file or more, and this recording makes only one such part\n"
     )
 
 
