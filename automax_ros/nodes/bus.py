@@ -227,7 +227,8 @@ class RackBus:
     def _asks(self) -> int:
         """Return the process whose image is wanted, 0 for none."""
         running = next(self.peers.running(), None)
-        if self.stage is Stage.JOINING and running is not None and not self._has_image:
+        # One that is ready, but heard of the start when it was over, joins as one that comes later does.
+        if self.stage in (Stage.JOINING, Stage.READY) and running is not None and not self._has_image:
             return running.process
         owing = self.peers.owing() if self._begun else None
         return owing.process if owing is not None else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from functools import partial
 
 import pytest
@@ -15,31 +16,40 @@ PATIENCE_NS = 30 * NS_PER_S
 RUN_ID = 77
 
 
-@pytest.fixture
-def racks(tmp_path, ros_domain_id):
-    """Three processes' parts of a rack, each on a thread of its own here."""
+@contextmanager
+def running(folder, **seating):
+    """Three processes' parts of a rack, each on a thread of its own here, begun as it hears of the start."""
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
 
     from automax_ros.nodes.bus import Seating
     from automax_ros.nodes.rack_nodes import RackNodes
 
-    config = config_in(tmp_path)
+    config = config_in(folder)
     context = Context()
     context.init(args=["--ros-args", "--disable-stdout-logs"])
     executor = SingleThreadedExecutor(context=context)
-    parts = [RackNodes(Rack(config, local=s), context=context, seating=Seating(SEATS, RUN_ID)) for s in SEATS]
+    taken = Seating(SEATS, RUN_ID, **seating)
+    parts = [RackNodes(Rack(config, local=s), context=context, seating=taken) for s in SEATS]
     for part in parts:
         part.add_to(executor)
-    while not all(part.bus.epoch_ns for part in parts):
+    waiting = list(parts)
+    while waiting:
         executor.spin_once(timeout_sec=0.05)
-    for part in parts:
-        part.start()
+        for part in [part for part in waiting if part.bus.epoch_ns]:
+            part.start()
+            waiting.remove(part)
     yield {"executor": executor, "parts": parts}
     for part in parts:
         part.close()
     executor.shutdown()
     context.try_shutdown()
+
+
+@pytest.fixture
+def racks(tmp_path, ros_domain_id):
+    with running(tmp_path) as found:
+        yield found
 
 
 @pytest.fixture
@@ -70,6 +80,14 @@ def ask(racks):
         yield partial(call, client)
     ended.set()
     spinning.join()
+
+
+@pytest.mark.usefixtures("ros_domain_id")
+def test_processes_that_hear_of_the_start_when_it_is_over_join(tmp_path):
+    with running(tmp_path, lead_ns=0) as racks:
+        home, one, two = racks["parts"]
+        assert (home.bus.joining, one.bus.joining, two.bus.joining) == (False, True, True)
+        wait(lambda: one.rack.task("ONE").scan_number > 0 and two.rack.task("TWO").scan_number > 0)
 
 
 def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
