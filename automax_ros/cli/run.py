@@ -134,7 +134,7 @@ def run(arguments: argparse.Namespace) -> int:
         except CutShort:
             if not arguments.simulated:
                 return 0
-            print("run: ended before its first scan; nothing was recorded or reported", file=sys.stderr)
+            print("automax run: ended before its first scan; nothing was recorded or reported", file=sys.stderr)
             return stop.code
         except RackError as error:
             return print_refused("run", error)

@@ -74,7 +74,7 @@ def test_a_signal_ends_the_compilers_too(folder, tmp_path, command, number, code
         _, err = process.communicate(timeout=60)  # a compiler has 120 s
     finally:
         process.kill()
-    told = "run: ended before its first scan; nothing was recorded or reported\n" if command is RUN else ""
+    told = "automax run: ended before its first scan; nothing was recorded or reported\n" if command is RUN else ""
     assert (process.returncode, err) == (code, told)
     await_that(lambda: has_ended(begun))
     await_that(lambda: list(temporary.iterdir()) == [])
