@@ -58,7 +58,7 @@ A dash in the name is an underscore in the module's; a word of Python has one at
 ROS_ARGUMENTS = "--ros-args"
 """What the ROS arguments of a command line begin with."""
 UNTIL_STOPPED = ("run", "node", "record", "play")
-"""The subcommands that go on until somebody stops them; a run in simulated time has work to do first."""
+"""The subcommands that go on until somebody stops them."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT, as the shell has it."""
 BROKEN_PIPE = 141
@@ -67,8 +67,7 @@ BROKEN_PIPE = 141
 
 def entry() -> NoReturn:
     """Run `automax` as the program of this process: once the exit code stands, no signal changes it any more."""
-    ends_well = _name(sys.argv[1:]) in UNTIL_STOPPED and "--simulated" not in sys.argv
-    early.until_work_begins(ends_well=ends_well)
+    early.until_work_begins(ends_well=_until_stopped(sys.argv[1:]))
     code = main()
     try:
         early.work_has_ended()
@@ -129,6 +128,11 @@ def _run(argv: list[str]) -> int:
 def _name(words: Sequence[str]) -> str | None:
     """Return the subcommand: the options before it take no values, so it is the first word."""
     return next((word for word in words if not word.startswith("-")), None)
+
+
+def _until_stopped(words: Sequence[str]) -> bool:
+    """Whether the command goes on until somebody stops it; a simulated run without ROS has work to do first."""
+    return _name(words) in UNTIL_STOPPED and ("--simulated" not in words or "--ros" in words)
 
 
 def _split(argv: list[str]) -> tuple[list[str], RosArguments | None]:

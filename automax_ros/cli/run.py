@@ -114,7 +114,8 @@ def folder(text: str) -> Path:
 def run(arguments: argparse.Namespace) -> int:
     """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault.
 
-    A simulated run that a signal ends before it begins has the signal's code: its report would be that of another run.
+    A simulated run without ROS that a signal ends before it begins has the signal's code: whoever goes by it would take
+    the report of an earlier run for this one's.
     """
     if arguments.simulated and arguments.record is not None and arguments.duration is None:
         raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
@@ -132,7 +133,7 @@ def run(arguments: argparse.Namespace) -> int:
         try:
             return _run(arguments, stop)
         except CutShort:
-            if not arguments.simulated:
+            if arguments.with_ros or not arguments.simulated:
                 return 0
             print("automax run: ended before its first scan; nothing was recorded or reported", file=sys.stderr)
             return stop.code
