@@ -3,7 +3,8 @@
 The link observes the rack. What tasks, inputs and operators here write is noted with its version and put out as
 batches, one for each scan and writer; what comes from another process is written between two scans as far as it is
 newer. A scan that the host has made late writes with the instant of its deadline: where another process wrote the same
-after that, the other's value is put back (decision).
+after that, the other's value is put back (decision). A late scan does not see what was written elsewhere after its
+deadline, or by a scan with the same deadline: that is taken after it (decision).
 
 Presets are not sent, since every process writes them by itself. Neither is what stimuli do at the same rack time in
 every process (``is_common``), but for the home: a process that joins in the middle of a wave has it from there.
@@ -24,10 +25,15 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.standing import StopCause
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.registers import Part
+from automax_ros.running.scheduler import EventClass, EventKey
 from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import MemoryValueError, WriteGroup
 
 _FORCES = (WriteKind.FORCE, WriteKind.RELEASE)
+_BEFORE_SCANS = EventKey(EventClass.OUTSIDE, 2, "bus")
+_AFTER_SCANS = EventKey(EventClass.OBSERVE, 0, "bus")
+MOST_AHEAD_NS = 5 * NS_PER_S
+"""What comes from further ahead is taken at once: a process that is later than this was given up (decision)."""
 
 
 @dataclass(frozen=True)
@@ -135,31 +141,16 @@ class BusLink:
     # from other processes
 
     def receive(self, batch: Batch) -> None:
-        """Take over another process's writes, as far as they are newer than what is held. Between two scans."""
-        self._collect()
-        self._memory.now_ns = self._rack.now_ns
-        for view, element, value in batch.entries:
-            self._take(view, element, value, batch)
-        self._tell_shaped(batch)
-        self._tell()
+        """Take over another process's writes, as far as they are newer than what is held. Between two scans.
 
-    def _tell_shaped(self, batch: Batch) -> None:
-        """Send back what an input has made something else of, as a counter of 24 bits does: all shall hold that."""
-        sent = {(view, element): value for view, element, value in batch.entries}
-        for cause in self._memory.take_causes():
-            entry = cause.view, cause.element, cause.value
-            if sent.get(entry[:2], cause.value) != cause.value:
-                self._note(max(cause.time_ns, batch.time_ns + 1), cause.writer, WriteKind(cause.kind), (entry,))
+        Where the host has made this process late, that is after what it has to do up to the instant of the writes.
+        """
+        self._in_time(batch.time_ns, batch.kind, lambda: self._receive(batch))
 
     def merge(self, picture: Picture) -> None:
-        """Take over what another process holds, as far as it is newer. Between two scans."""
-        self._collect()
-        self._memory.now_ns = self._rack.now_ns
-        for held in picture.values:
-            self._take_held(held)
-        for force in picture.forces:
-            self._hold(force)
-        self._tell()
+        """Take over what another process holds, as far as it is newer. Between two scans, in time as ``receive``."""
+        newest = max((item.version[0] for item in (*picture.values, *picture.forces)), default=0)
+        self._in_time(newest, WriteKind.OUTSIDE, lambda: self._merge(picture))
 
     def picture(self) -> Picture:
         """Return all that was written, for a process that joins or has missed a batch."""
@@ -199,6 +190,42 @@ class BusLink:
                 operations.stopped = standing.cause
         finally:
             self._adopting = False
+
+    def _in_time(self, time_ns: int, kind: WriteKind, take: Callable[[], None]) -> None:
+        """Take what was written at a time: now, or where this process is late, after what it has to do before that."""
+        scheduler = self._rack.scheduler
+        key = _AFTER_SCANS if kind is WriteKind.COMMIT else _BEFORE_SCANS
+        due = scheduler.next_ns
+        is_late = due is not None and (due < time_ns or (due == time_ns and key is _AFTER_SCANS))
+        if self.starting or not is_late or time_ns - scheduler.now_ns > MOST_AHEAD_NS:
+            take()
+        else:
+            scheduler.at(time_ns, key, lambda _: take())
+
+    def _receive(self, batch: Batch) -> None:
+        self._collect()
+        self._memory.now_ns = self._rack.now_ns
+        for view, element, value in batch.entries:
+            self._take(view, element, value, batch)
+        self._tell_shaped(batch)
+        self._tell()
+
+    def _tell_shaped(self, batch: Batch) -> None:
+        """Send back what an input has made something else of, as a counter of 24 bits does: all shall hold that."""
+        sent = {(view, element): value for view, element, value in batch.entries}
+        for cause in self._memory.take_causes():
+            entry = cause.view, cause.element, cause.value
+            if sent.get(entry[:2], cause.value) != cause.value:
+                self._note(max(cause.time_ns, batch.time_ns + 1), cause.writer, WriteKind(cause.kind), (entry,))
+
+    def _merge(self, picture: Picture) -> None:
+        self._collect()
+        self._memory.now_ns = self._rack.now_ns
+        for held in picture.values:
+            self._take_held(held)
+        for force in picture.forces:
+            self._hold(force)
+        self._tell()
 
     def _take(self, view: int, element: int, sent: Value, batch: Batch) -> None:
         value = self._fitting(view, element, sent)

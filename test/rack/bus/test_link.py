@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.rack.bus.link import Standing
+from automax_ros.rack.bus.link import MOST_AHEAD_NS, Batch, Picture, Standing
+from automax_ros.rack.bus.versions import Held
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.standing import StopCause
 from rack.bus.parts import ONE, SEATS, Process, config_in, cut, image, settle
@@ -134,6 +136,51 @@ def test_a_scan_that_was_late_gives_way_to_what_was_written_after_its_deadline(c
     assert one.rack.value("OUT%") == home.rack.value("OUT%") == 8
 
 
+@pytest.mark.parametrize(
+    ("at_ns", "kind", "first", "second"),
+    [
+        (5_600_000, WriteKind.OUTSIDE, 7, 40),
+        (5_500_000, WriteKind.OUTSIDE, 40, 40),
+        (5_499_999, WriteKind.COMMIT, 40, 40),
+        (5_500_000, WriteKind.COMMIT, 7, 40),
+        (5_600_000, WriteKind.FORCE, 7, 40),
+        (11_000_000, WriteKind.COMMIT, 7, 7),
+        (11_000_000, WriteKind.BASIC, 7, 40),
+        (5_500_001 + MOST_AHEAD_NS, WriteKind.OUTSIDE, 40, 40),
+    ],
+)
+def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(config, at_ns, kind, first, second):
+    """The scan of 5.5 ms has not been made yet when the batch comes: it sees what it would have seen in time."""
+    for way in ("write", "picture"):
+        two = Process(config, SEATS[2])
+        two.start()
+        two.rack.run(0.0055)
+        view = two.rack.memory.view("A%")
+        if way == "write":
+            two.link.receive(Batch(1, 1, at_ns, 3, kind, ((view, 0, 40),)))
+        elif kind is WriteKind.OUTSIDE:
+            two.link.merge(Picture(1, (Held(view, 0, 40, 0xFFFF, (at_ns, 1, 1)),), ()))
+        else:
+            continue
+        seen = []
+        for until_ms in (6, 12):
+            two.rack.scheduler.run_due(until_ms * NS_PER_MS)
+            seen.append(two.rack.value("B%"))
+        assert seen == [first, second], way
+
+
+def test_what_was_written_while_a_process_stood_still_comes_between_its_scans_in_order(config):
+    """It has slept for 40 ms: of its scans the last is made, of what has come what was written before it."""
+    _, one, two = cut(config)
+    one.rack.run(0.04)
+    two.rack.scheduler.pass_until(40 * NS_PER_MS)
+    two.hear(one)
+    two.rack.scheduler.run_due(40 * NS_PER_MS)
+    assert two.rack.value("A%") == one.rack.value("A%") == 7 + 8
+    assert two.rack.value("B%") == 7 + 7, "the eighth scan of ONE was at the instant of this one"
+    assert two.rack.task("TWO").scan_number == 1
+
+
 def test_a_force_holds_everywhere_until_it_is_released(config):
     home, one, two = processes = cut(config)
     home.rack.force("A%", 500)
@@ -145,7 +192,8 @@ def test_a_force_holds_everywhere_until_it_is_released(config):
     assert [force.name for force in two.rack.forces()] == ["A%"]
     home.rack.unforce("A%")
     settle(processes)
-    one.rack.run(0.011)
+    for process in processes:
+        process.rack.run(0.011)
     settle(processes)
     assert two.rack.value("A%") == 502
     assert two.rack.forces() == []
@@ -237,8 +285,11 @@ def test_a_process_that_joins_takes_over_what_the_others_hold(config):
     assert again.rack.task("ONE").scan_number == 1
     assert again.rack.value("A%") == home.rack.value("A%") + 1
     for process in (home, two):
+        process.rack.scheduler.run_until(again.rack.now_ns)
         for batch in again.sent:
             process.link.receive(batch)
+    again.hear(two)
+    home.hear(two)
     assert image(home) == image(two) == image(again)
     assert one.rack.task("ONE").scan_number > 1
 
