@@ -149,8 +149,8 @@ class BusLink:
 
     def merge(self, picture: Picture) -> None:
         """Take over what another process holds, as far as it is newer. Between two scans, in time as ``receive``."""
-        newest = max((item.version[0] for item in (*picture.values, *picture.forces)), default=0)
-        self._in_time(newest, WriteKind.OUTSIDE, lambda: self._merge(picture))
+        written_ns = [held.version[0] for held in picture.values] + [force.version[0] for force in picture.forces]
+        self._in_time(max(written_ns, default=0), WriteKind.OUTSIDE, lambda: self._merge(picture))
 
     def picture(self) -> Picture:
         """Return all that was written, for a process that joins or has missed a batch."""
