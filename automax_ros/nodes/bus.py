@@ -26,7 +26,7 @@ from rclpy.qos import LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType
-from automax_ros.nodes.bus_way import BusWay
+from automax_ros.nodes.bus_way import BusWay, Terms
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.process_watch import ProcessWatch, this_host
 from automax_ros.nodes.topics import ros_qos
@@ -50,6 +50,10 @@ ANSWER_NS = 100 * NS_PER_MS
 """The same process gets an image at most this often."""
 MOST_BYTES = 64 << 20
 """Longest image that is read; writes and presences may be a hundredth of it."""
+MOST_A_ROUND = 32
+"""Most batches that the door takes at a time: seven processes send 1000 in a second, and on a busy host it is late."""
+MOST_FIRST = 64
+"""Most batches that are taken because a process's word tells of some that have not come."""
 MODULE_LOST = "31"
 """The hardware's code when a module does not answer on the backplane: bus error (decision: so is one that is lost)."""
 PRESENCE = "bus/presence"
@@ -111,9 +115,10 @@ class RackBus:
         self._writes = node.create_publisher(BusWriteClass, "bus", qos)
         self._images = node.create_publisher(BusImageClass, "bus/image", qos)
         self._presences = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
-        self._hear("bus", qos, BusWrite, self._take_write, MOST_BYTES // 100)
-        self._hear("bus/image", qos, BusImage, self._take_image, MOST_BYTES)
-        self._hear(PRESENCE, presence_qos(), Presence, self._take_presence, MOST_BYTES // 100)
+        words = Terms(MOST_BYTES // 100, then=self._look_for_missing)
+        self._way = self._hear("bus", qos, BusWrite, self._take_write, Terms(MOST_BYTES // 100, MOST_A_ROUND))
+        self._hear("bus/image", qos, BusImage, self._take_image, Terms(MOST_BYTES))
+        self._hear(PRESENCE, presence_qos(), Presence, self._take_presence, words)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(BEAT_NS / NS_PER_S, node.inside("the bus", self._beat), clock=steady)
 
@@ -249,9 +254,10 @@ class RackBus:
 
     # what comes in
 
-    def _hear(self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], most: int) -> None:
-        type_name = f"automax_msgs/msg/{kind.__name__}"
-        BusWay(self._node, topic, type_name, qos, receive, self._refuse, most)
+    def _hear(
+        self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], terms: Terms
+    ) -> BusWay:
+        return BusWay(self._node, topic, f"automax_msgs/msg/{kind.__name__}", qos, receive, self._refuse, terms)
 
     def _refuse(self, topic: str, what: str) -> None:
         self._site.health.note(
@@ -301,6 +307,17 @@ class RackBus:
             self._answer(presence.process)
         if self._begun and presence.run_id == self.run_id:
             self.link.adopt(standing_of(presence))
+
+    def _look_for_missing(self, presence: Presence) -> None:
+        """Take what waits on the bus before batches of which a process has told count as missing.
+
+        Where the host is busy they wait here: an image asked for each time would make it busier.
+        """
+        with self._site.lock:
+            is_short = self.peers.is_short(presence)
+        if is_short and not all(self._way.take() for _ in range(MOST_FIRST)):
+            with self._site.lock:
+                self.peers.missed(presence)
 
     def _strange(self, found: Heard, presence: Presence) -> None:
         name = part_name(self._rack.config, presence.slots)

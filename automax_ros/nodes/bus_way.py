@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.qos import QoSProfile
@@ -19,8 +20,21 @@ Receive = Callable[[Any, bytes], None]
 """Gets a decoded message and its sender's participant, b"" where that is not known; in the rack's present."""
 
 
+@dataclass(frozen=True)
+class Terms:
+    """How a topic of the bus is taken.
+
+    ``most_bytes``: longer messages are refused. ``share``: most in a round of the door, 0 for what any topic has.
+    ``then`` gets each message after it was received, outside the rack: scans may come before.
+    """
+
+    most_bytes: int
+    share: int = 0
+    then: Callable[[Any], None] | None = None
+
+
 class BusWay:
-    """One topic of the bus. ``refuse`` is told what is not a message of it, or longer than ``most_bytes``."""
+    """One topic of the bus. ``refuse`` is told what is not a message of it, or too long."""
 
     def __init__(
         self,
@@ -30,15 +44,15 @@ class BusWay:
         qos: QoSProfile,
         receive: Receive,
         refuse: Callable[[str, str], None],
-        most_bytes: int,
+        terms: Terms,
     ) -> None:
         """Subscribe, and be served at the rack's door."""
         subscription = node.own_subscription(message_class(type_name), topic, qos)
         self.name, self.handle = subscription.topic_name, subscription.handle
-        self._topic, self._type_name = topic, type_name
+        self._topic, self._type_name, self._then = topic, type_name, terms.then
         self._receive, self._refuse = node.inside(topic, receive), refuse
-        self._taker = taker_of(subscription, most_bytes)
-        node.site.door.add(self)
+        self._taker = taker_of(subscription, terms.most_bytes)
+        node.site.door.add(self, share=terms.share)
 
     def take(self) -> bool:
         """Take the next message; False where there is none."""
@@ -54,6 +68,8 @@ class BusWay:
             self._refuse(self._topic, str(error))
         else:
             self._receive(message, taken.sender[:PARTICIPANT_BYTES])
+            if self._then is not None:
+                self._then(message)
         return True
 
     def wake(self, pointer: int, callback: Any, data: int | None) -> int:

@@ -69,11 +69,17 @@ class Door:
         self._thread: threading.Thread | None = None
         self._closing = False
         self._last: Entrance | None = None
+        self._shares: dict[Entrance, int] = {}
         self._poll = select.epoll() if library() is not None else None
 
-    def add(self, entrance: Entrance, *, last: bool = False) -> None:
-        """Let an entrance be served; the ``last`` one, of which there is one, after what has come at all others."""
+    def add(self, entrance: Entrance, *, last: bool = False, share: int = 0) -> None:
+        """Let an entrance be served; the ``last`` one, of which there is one, after what has come at all others.
+
+        ``share``: most messages of it in a round, where that is its own and not a part of what others have.
+        """
         with self._lock:
+            if share:
+                self._shares[entrance] = share
             self._last = entrance if last else self._last
             place = len(self._entrances)
             self._entrances.append(entrance)
@@ -106,6 +112,7 @@ class Door:
                 group.close()
             self._groups.clear()
             self._entrances.clear()
+            self._shares.clear()
             if self._poll is not None:
                 self._poll.close()
                 self._poll = None
@@ -146,8 +153,9 @@ class Door:
             if not room or self._closing:
                 return
             entrance = ready.popleft()
-            taken, more = self._some(entrance, min(room, MOST_OF_ONE))
-            room -= taken
+            share = self._shares.get(entrance, 0)
+            taken, more = self._some(entrance, share or min(room, MOST_OF_ONE))
+            room -= 0 if share else taken
             if more:
                 ready.append(entrance)
 
@@ -171,6 +179,7 @@ class Door:
                     group.entrances.remove(entrance)
             if entrance in self._entrances:
                 self._entrances.remove(entrance)
+            self._shares.pop(entrance, None)
 
 
 class _Group:

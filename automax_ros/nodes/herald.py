@@ -15,7 +15,7 @@ from rclpy.qos import QoSProfile
 
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.nodes.bus import PRESENCE, presence_qos
-from automax_ros.nodes.bus_way import BusWay
+from automax_ros.nodes.bus_way import BusWay, Terms
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.running.health import FROM_STRANGERS
 from automax_ros.wire.bus_messages import Presence, Stage
@@ -33,9 +33,8 @@ class Herald:
         """Join the graph; the first word comes after a second."""
         self._site, self._process = site, int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._publisher = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
-        BusWay(
-            node, PRESENCE, "automax_msgs/msg/Presence", QoSProfile(depth=10), self._heard, self._refuse, _MOST_BYTES
-        )
+        kind, terms = "automax_msgs/msg/Presence", Terms(_MOST_BYTES)
+        BusWay(node, PRESENCE, kind, QoSProfile(depth=10), self._heard, self._refuse, terms)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(PERIOD_NS / NS_PER_S, node.inside(PRESENCE, self._tell), clock=steady)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.nodes.bus_way import BusWay
+from automax_ros.nodes.bus_way import BusWay, Terms
 from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.topics import ros_qos
 from automax_ros.running.health import FROM_STRANGERS
@@ -40,7 +40,7 @@ class JoinedTasks:
             if module.slot not in rack.part.slots
         }
         self._heard: dict[str, tuple[int, list[TaskInfo]]] = {}
-        BusWay(node, PARTS, NAMES[TaskTable], ros_qos(PART), self._take, self._refuse, MOST_BYTES)
+        BusWay(node, PARTS, NAMES[TaskTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
 
     def tasks(self, now_ns: int) -> Sequence[TaskInfo]:
         """Return the tasks of all modules that were heard of lately."""

@@ -3,6 +3,10 @@
 They are made to be killed and started again, and shared memory does not bear that: the process that comes back gets the
 port of the one that was killed, which the others repair at the same time, each for itself, so that some send to a
 segment that nobody reads from then on; or one waits for ever for a lock that the killed one held.
+
+UDP drops what comes while a process is held up and its socket is full: the sockets are as large as the kernel allows,
+and writers tell each 100 ms what they have sent, so that what is missing is sent again (measured with seven processes
+on two cores: 1 % of the datagrams dropped, and scans of up to 2 s ago seen as the latest, without either).
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ _PROFILES, _TRANSPORTS, _MIDDLEWARE = (
     "FASTDDS_BUILTIN_TRANSPORTS",
     "RMW_IMPLEMENTATION",
 )
-_LOOPBACK = Path(__file__).with_name("loopback.xml")
+_LOOPBACK, _NETWORK = (Path(__file__).with_name(name) for name in ("loopback.xml", "network.xml"))
 
 
 def avoid_shared_memory() -> None:
@@ -32,7 +36,7 @@ def avoid_shared_memory() -> None:
     if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
         return
     if os.environ.get(RANGE, "").upper() != "LOCALHOST":
-        os.environ[_TRANSPORTS] = "UDPv4"
+        os.environ.update({_PROFILES: str(_NETWORK)} if _NETWORK.is_file() else {_TRANSPORTS: "UDPv4"})
     elif not os.environ.get(PEERS) and _LOOPBACK.is_file():
         os.environ.update({RANGE: "SUBNET", PEERS: "127.0.0.1", _PROFILES: str(_LOOPBACK)})
 

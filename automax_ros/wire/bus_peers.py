@@ -18,6 +18,8 @@ SILENCE_NS = 75 * NS_PER_MS
 """A process of another host that has said nothing for so long is lost (decision: it is noticed within 100 ms)."""
 HUNG_NS = 10_000 * NS_PER_MS
 """One of this host that lives by the kernel's word may be held up for so long (decision): a busy host is not lost."""
+MISSED_WORDS = 10
+"""In 200 ms DDS has sent again what was dropped on the way (decision); what is missing then is asked for."""
 HELD_UP_NS = 45 * NS_PER_MS
 """Who was held up for so long itself judges nobody until it has heard what came meanwhile."""
 
@@ -38,7 +40,10 @@ class Heard(enum.Enum):
 
 @dataclass
 class Peer:
-    """Another process: what it said last, when, and which of its batches have come."""
+    """Another process: what it said last, when, and which of its batches have come.
+
+    ``owed`` counts words in a row that told of batches that had not come: with the ``MISSED_WORDS``th they are lost.
+    """
 
     presence: Presence
     heard_ns: int
@@ -106,9 +111,21 @@ class Peers:
             found = Heard.NEW
         else:
             peer.presence, peer.heard_ns, found = presence, now_ns, Heard.KNOWN
-        peer.owed = peer.owed + 1 if presence.sequence > peer.received else 0
-        peer.gap = peer.gap or peer.owed > 2
+        if presence.sequence <= peer.received:
+            peer.owed = 0
         return found
+
+    def is_short(self, presence: Presence) -> bool:
+        """Whether a process's word, that was heard, tells of batches of its own that have not been taken here."""
+        peer = self.of(presence.process)
+        return peer is not None and presence.sequence > peer.received
+
+    def missed(self, presence: Presence) -> None:
+        """Note that batches of which a word tells are missing, though all that has come here was taken since."""
+        peer = self.of(presence.process)
+        if peer is not None and presence.sequence > peer.received:
+            peer.owed += 1
+            peer.gap = peer.gap or peer.owed >= MISSED_WORDS
 
     def _refused(self, presence: Presence) -> Heard | None:
         if presence.process == self.process:

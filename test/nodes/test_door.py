@@ -63,6 +63,18 @@ def test_round_takes_a_stated_number_and_each_gets_its_turn(door):
     assert len(taken) == 2 * MOST_A_ROUND
 
 
+def test_an_entrance_with_a_share_of_its_own_takes_nothing_from_the_others(door):
+    taken = []
+    own, *others = ways = [Way(name, 100, taken) for name in "ABCDEF"]
+    door.add(own, share=32)
+    door._round(deque(ways))
+    assert [sum(name == letter for name, _ in taken) for letter in "ABCDEF"] == [32] + [MOST_OF_ONE] * 4 + [0]
+    door._remove(own)
+    taken.clear()
+    door._round(deque([own, *others]))
+    assert sum(name == "A" for name, _ in taken) == MOST_OF_ONE
+
+
 def test_pace_is_bounded(door):
     """However much waits: a round of at most 16, then a rest of a millisecond."""
     taken = []

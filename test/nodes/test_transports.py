@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.nodes.discovery_range import choose_range, range_text
 from automax_ros.nodes.transports import avoid_shared_memory
 
@@ -28,26 +29,44 @@ def found() -> dict[str, str]:
     return {name: os.environ[name] for name in (RANGE, PEERS, PROFILES, TRANSPORTS) if name in os.environ}
 
 
+def profile() -> dict[str, str]:
+    """Return the texts of the profile that was chosen, by their elements."""
+    root = ElementTree.fromstring(Path(os.environ[PROFILES]).read_text(encoding="utf-8").encode())
+    return {item.tag.rpartition("}")[2]: (item.text or "").strip() for item in root.iter()}
+
+
 def test_on_one_host_only_the_loopback_is_used(monkeypatch):
     surroundings(monkeypatch)
     choose_range(None)
     avoid_shared_memory()
     assert range_text() == "this host"
     assert (os.environ[RANGE], os.environ[PEERS]) == ("SUBNET", "127.0.0.1")
-    root = ElementTree.fromstring(Path(os.environ[PROFILES]).read_text(encoding="utf-8").encode())
-    texts = {item.tag.rpartition("}")[2]: (item.text or "").strip() for item in root.iter()}
+    texts = profile()
     assert (texts["type"], texts["address"], texts["useBuiltinTransports"]) == ("UDPv4", "127.0.0.1", "false")
     before = found()
     avoid_shared_memory()
     assert found() == before
 
 
-def test_on_the_subnet_fast_dds_itself_is_told(monkeypatch):
+def test_on_the_subnet_all_networks_are_used(monkeypatch):
     surroundings(monkeypatch)
     choose_range("subnet")
     avoid_shared_memory()
-    assert found() == {RANGE: "SUBNET", TRANSPORTS: "UDPv4"}
+    assert found() == {RANGE: "SUBNET", PROFILES: os.environ[PROFILES]}
     assert range_text() == "the whole subnet"
+    texts = profile()
+    assert (texts["type"], texts["useBuiltinTransports"]) == ("UDPv4", "false")
+    assert "address" not in texts
+
+
+@pytest.mark.parametrize("chosen", [None, "subnet"])
+def test_what_udp_has_dropped_is_sent_again_soon(monkeypatch, chosen):
+    surroundings(monkeypatch)
+    choose_range(chosen)
+    avoid_shared_memory()
+    texts = profile()
+    assert (int(texts["sec"]), int(texts["nanosec"])) == (0, 100 * NS_PER_MS)
+    assert int(texts["receiveBufferSize"]) == 4 << 20
 
 
 @pytest.mark.parametrize(

@@ -156,7 +156,23 @@ class Line(Client):
         """Let the ring stand still, and wait until each has seen the last of the one before it."""
         from std_msgs.msg import Bool
 
-        self.send(Bool, "/line4/common/HALT/set", Bool(data=True))
+        topic = "/line4/common/HALT/set"
+        publisher = self.node.create_publisher(Bool, topic, 10)
+        shown: list[bool] = []
+        kind = "std_msgs/msg/Bool"
+        self._look_at(kind, "/line4/common/HALT", lambda payload: shown.append(decode(kind, payload)[0]), VALUE)
+        sent_s = 0.0
+
+        def is_halted() -> bool:
+            nonlocal sent_s
+            # For a while a reader of a process that was killed is found as well as that of the one that came back.
+            if time.monotonic() - sent_s > 1.0:
+                publisher.publish(Bool(data=True))
+                sent_s = time.monotonic()
+            return bool(shown and shown[-1])
+
+        self.until(is_halted, "HALT is set")
+        self.node.destroy_publisher(publisher)
         self.until(
             lambda: all(self.values.get(f"SEEN_{n}") == self.values.get(f"N_{FEED[n]}", -1) for n in RINGS),
             "the ring stands still",

@@ -10,7 +10,7 @@ from automax_ros.rack.bus.versions import Held
 from automax_ros.rack.standing import StopCause
 from automax_ros.wire.bus import batch_of, image_message, picture_of, standing_of, with_standing, write_message
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
-from automax_ros.wire.bus_peers import HUNG_NS, SILENCE_NS, Heard, Peers
+from automax_ros.wire.bus_peers import HUNG_NS, MISSED_WORDS, SILENCE_NS, Heard, Peers
 from automax_ros.wire.cdr import CdrError, decode, encode
 from automax_ros.wire.messages import NAMES
 from automax_ros.wire.values import Values
@@ -143,8 +143,24 @@ def test_batches_that_did_not_come_are_noticed():
     assert peers.owing() is peer
     peer.caught_up(4)
     assert peers.owing() is None
-    # It tells of batches that never came: said three times in a row, so none of them is on its way.
-    for _ in range(3):
+    # It tells of batches that have not come: as long as they may wait here nothing is missing.
+    for _ in range(2 * MISSED_WORDS):
+        peers.heard(said(sequence=6), 0)
+        assert peers.is_short(said(sequence=6))
+    assert peers.owing() is None
+    # Said ten times in a row after all was taken that had come, so none of them is on its way.
+    for _ in range(MISSED_WORDS - 1):
+        peers.missed(said(sequence=6))
+    peer.got(5)
+    assert peers.is_short(said(sequence=6))
+    for _ in range(MISSED_WORDS):
         assert peers.owing() is None
         peers.heard(said(sequence=6), 0)
+        peers.missed(said(sequence=6))
     assert peers.owing() is peer
+    peer.caught_up(6)
+    peers.missed(said(sequence=6))
+    peers.missed(said(9, sequence=6))
+    assert (peer.owed, peers.owing()) == (0, None)
+    assert not peers.is_short(said(sequence=6))
+    assert not peers.is_short(said(9, sequence=6))
