@@ -102,7 +102,7 @@ class RackBus:
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._watch, self._lead_ns = ProcessWatch(), seating.lead_ns
         self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
-        self.link = BusLink(rack, min(own), self._send, seating.is_common)
+        self.link = BusLink(rack, min(own), self._send, seating.is_common, self._guarded)
         self.stage, self.joining = Stage.JOINING, False
         self.fault: SeatTaken | None = None
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
@@ -258,6 +258,12 @@ class RackBus:
         self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], terms: Terms
     ) -> BusWay:
         return BusWay(self._node, topic, f"automax_msgs/msg/{kind.__name__}", qos, receive, self._refuse, terms)
+
+    def _guarded(self, take: Callable[[], None]) -> None:
+        try:
+            take()
+        except Exception as error:
+            self._node.guard.report("the bus", error)
 
     def _refuse(self, topic: str, what: str) -> None:
         self._site.health.note(

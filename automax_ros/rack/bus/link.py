@@ -91,7 +91,8 @@ class BusLink:
     """The link of one process. ``seat`` is the slot that names it; ``standing`` is how the rack stands as it knows it.
 
     ``send`` gets each batch as soon as it is there; it may not write to the rack. ``is_common`` says whether what
-    happens now happens in every process by itself.
+    happens now happens in every process by itself. ``guard`` carries out what waited for its time, and deals with what
+    that raises: a damaged message of another process ends nothing.
     """
 
     def __init__(
@@ -100,10 +101,11 @@ class BusLink:
         seat: int,
         send: Callable[[Batch], None],
         is_common: Callable[[], bool] = lambda: False,
+        guard: Callable[[Callable[[], None]], None] = lambda take: take(),
     ) -> None:
         """Take the rack; nothing is observed yet."""
         self._rack, self._memory, self.seat = rack, rack.memory, seat
-        self._send, self._is_common = send, is_common
+        self._send, self._is_common, self._guard = send, is_common, guard
         self._versions = Versions(rack.memory.registers)
         self._forces: dict[Key, tuple[Version, bool, Value]] = {}
         self.sequence = 0
@@ -200,7 +202,7 @@ class BusLink:
         if self.starting or not is_late or time_ns - scheduler.now_ns > MOST_AHEAD_NS:
             take()
         else:
-            scheduler.at(time_ns, key, lambda _: take())
+            scheduler.at(time_ns, key, lambda _: self._guard(take))
 
     def _receive(self, batch: Batch) -> None:
         self._collect()

@@ -62,10 +62,10 @@ def config_in(folder: Path, text: str = RACK) -> RackConfig:
 class Process:
     """One process: its part of the rack, its link, and what it has sent."""
 
-    def __init__(self, config: RackConfig, slots: tuple[int, ...], *, common=lambda: False) -> None:
+    def __init__(self, config: RackConfig, slots: tuple[int, ...], *, common=lambda: False, **more) -> None:
         self.rack = Rack(config, local=slots)
         self.sent: list[Batch] = []
-        self.link = BusLink(self.rack, min(slots), self.sent.append, common)
+        self.link = BusLink(self.rack, min(slots), self.sent.append, common, **more)
         self.taken: dict[int, int] = {}
         self.link.begin()
 

@@ -169,6 +169,25 @@ def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(co
         assert seen == [first, second], way
 
 
+def test_a_damaged_image_that_waits_for_its_time_ends_nothing(config):
+    reported = []
+
+    def guard(take):
+        with pytest.raises(OverflowError) as raised:
+            take()
+        reported.append(raised)
+
+    two = Process(config, SEATS[2], guard=guard)
+    two.start()
+    two.rack.run(0.0055)
+    word = next(iter(two.rack.memory.registers.views))
+    two.link.merge(Picture(1, (Held(word, 0, float("inf"), 0xFFFF, (6 * NS_PER_MS, 1, 1)),), ()))
+    assert not reported
+    two.rack.scheduler.run_due(12 * NS_PER_MS)
+    assert len(reported) == 1
+    assert two.rack.task("TWO").scan_number == 2
+
+
 def test_what_was_written_while_a_process_stood_still_comes_between_its_scans_in_order(config):
     """It has slept for 40 ms: of its scans the last is made, of what has come what was written before it."""
     _, one, two = cut(config)
