@@ -161,6 +161,7 @@ class RackBus:
 
     def leave(self) -> None:
         """Tell the others that this process ends in order."""
+        self.link.take_waiting()
         self.stage = Stage.LEAVING
         self._tell()
         self._watch.close()
@@ -323,7 +324,7 @@ class RackBus:
             is_short = self.peers.is_short(presence)
         if is_short and not all(self._way.take() for _ in range(MOST_FIRST)):
             with self._site.lock:
-                self.peers.missed(presence)
+                self.peers.missed(presence, time.monotonic_ns())
 
     def _strange(self, found: Heard, presence: Presence) -> None:
         name = part_name(self._rack.config, presence.slots)

@@ -29,7 +29,7 @@ MOST_OF_ONE = 4
 MOST_ROUNDS_FIRST = 16
 """Most rounds that the last entrance waits for the others (decision: a flood does not hold it up for long)."""
 REST_S = 0.001
-"""Rest after a round: so at most 16,000 are taken in a second (decision)."""
+"""Rest after a round: so at most 16,000 are taken in a second (decision), and what has a share of its own."""
 _GROUPS = 64
 """Counters; with more topics and services several share one (a process has 1024 descriptors or so)."""
 _PATIENCE_S = 0.2

@@ -118,13 +118,16 @@ class Pacer:
                     self._scheduler.run_due(until_ns - 1)
                     self._scheduler.pass_until(until_ns)
                 return
-            with self._turn:
+            with self._turn:  # the queue, too, is looked at within it: a look takes out what was cancelled
                 self._carry_out(now)
-            if on_idle is not None and self._is_chore_time(next_chore):
+                is_chore_time = self._is_chore_time(next_chore)
+                idle_s = self._idle_s(until_ns)
+            if on_idle is not None and is_chore_time:
                 next_chore = self._clock() + CHORE_PERIOD_NS
                 with self._turn:
                     on_idle(now)
-            self._wait(self._idle_s(until_ns))
+                    idle_s = self._idle_s(until_ns)
+            self._wait(idle_s)
 
     def _carry_out(self, now_ns: int) -> None:
         if self.halted:

@@ -18,8 +18,8 @@ SILENCE_NS = 75 * NS_PER_MS
 """A process of another host that has said nothing for so long is lost (decision: it is noticed within 100 ms)."""
 HUNG_NS = 10_000 * NS_PER_MS
 """One of this host that lives by the kernel's word may be held up for so long (decision): a busy host is not lost."""
-MISSED_WORDS = 10
-"""In 200 ms DDS has sent again what was dropped on the way (decision); what is missing then is asked for."""
+MISSING_NS = 200 * NS_PER_MS
+"""After this DDS has sent again what was dropped on the way (decision); what is missing then is asked for."""
 HELD_UP_NS = 45 * NS_PER_MS
 """Who was held up for so long itself judges nobody until it has heard what came meanwhile."""
 
@@ -42,13 +42,13 @@ class Heard(enum.Enum):
 class Peer:
     """Another process: what it said last, when, and which of its batches have come.
 
-    ``owed`` counts words in a row that told of batches that had not come: with the ``MISSED_WORDS``th they are lost.
+    ``short_since_ns`` is when batches of which it told were first missed, None where none has been since the last one.
     """
 
     presence: Presence
     heard_ns: int
     received: int = 0
-    owed: int = 0
+    short_since_ns: int | None = None
     gap: bool = False
 
     @property
@@ -65,12 +65,12 @@ class Peer:
         """Note a batch that has come; one that was left out makes a gap."""
         self.gap = self.gap or sequence > self.received + 1
         self.received = max(self.received, sequence)
-        self.owed = 0
+        self.short_since_ns = None
 
     def caught_up(self, sequence: int) -> None:
         """Note an image that contains its batches up to a number."""
         self.received = max(self.received, sequence)
-        self.gap, self.owed = False, 0
+        self.gap, self.short_since_ns = False, None
 
 
 @dataclass
@@ -111,21 +111,25 @@ class Peers:
             found = Heard.NEW
         else:
             peer.presence, peer.heard_ns, found = presence, now_ns, Heard.KNOWN
-        if presence.sequence <= peer.received:
-            peer.owed = 0
         return found
 
     def is_short(self, presence: Presence) -> bool:
-        """Whether a process's word, that was heard, tells of batches of its own that have not been taken here."""
-        peer = self.of(presence.process)
-        return peer is not None and presence.sequence > peer.received
+        """Whether the latest word of a process, if it was accepted, tells of batches that have not been taken here."""
+        return self._told(presence) is not None
 
-    def missed(self, presence: Presence) -> None:
+    def missed(self, presence: Presence, now_ns: int) -> None:
         """Note that batches of which a word tells are missing, though all that has come here was taken since."""
-        peer = self.of(presence.process)
-        if peer is not None and presence.sequence > peer.received:
-            peer.owed += 1
-            peer.gap = peer.gap or peer.owed >= MISSED_WORDS
+        peer = self._told(presence)
+        if peer is None:
+            return
+        if peer.short_since_ns is None:
+            peer.short_since_ns = now_ns
+        peer.gap = peer.gap or now_ns - peer.short_since_ns >= MISSING_NS
+
+    def _told(self, presence: Presence) -> Peer | None:
+        """Return the process whose latest word this is, if it tells of batches that have not been taken."""
+        peer = self.by_seat.get(presence.seat)
+        return peer if peer is not None and peer.presence is presence and presence.sequence > peer.received else None
 
     def _refused(self, presence: Presence) -> Heard | None:
         if presence.process == self.process:

@@ -10,7 +10,7 @@ from automax_ros.rack.bus.versions import Held
 from automax_ros.rack.standing import StopCause
 from automax_ros.wire.bus import batch_of, image_message, picture_of, standing_of, with_standing, write_message
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
-from automax_ros.wire.bus_peers import HUNG_NS, MISSED_WORDS, SILENCE_NS, Heard, Peers
+from automax_ros.wire.bus_peers import HUNG_NS, MISSING_NS, SILENCE_NS, Heard, Peers
 from automax_ros.wire.cdr import CdrError, decode, encode
 from automax_ros.wire.messages import NAMES
 from automax_ros.wire.values import Values
@@ -144,23 +144,36 @@ def test_batches_that_did_not_come_are_noticed():
     peer.caught_up(4)
     assert peers.owing() is None
     # It tells of batches that have not come: as long as they may wait here nothing is missing.
-    for _ in range(2 * MISSED_WORDS):
-        peers.heard(said(sequence=6), 0)
-        assert peers.is_short(said(sequence=6))
+    for _ in range(100):
+        word = said(sequence=6)
+        peers.heard(word, 0)
+        assert peers.is_short(word)
     assert peers.owing() is None
-    # Said ten times in a row after all was taken that had come, so none of them is on its way.
-    for _ in range(MISSED_WORDS - 1):
-        peers.missed(said(sequence=6))
+    # All was taken that had come: DDS has time to send them again.
+    peers.missed(word, 0)
+    peers.missed(word, MISSING_NS - 1)
+    assert peers.owing() is None
     peer.got(5)
-    assert peers.is_short(said(sequence=6))
-    for _ in range(MISSED_WORDS):
-        assert peers.owing() is None
-        peers.heard(said(sequence=6), 0)
-        peers.missed(said(sequence=6))
+    assert peers.is_short(word)
+    peers.missed(word, MISSING_NS)
+    peers.missed(word, 2 * MISSING_NS - 1)
+    assert peers.owing() is None
+    peers.missed(word, 2 * MISSING_NS)
     assert peers.owing() is peer
     peer.caught_up(6)
-    peers.missed(said(sequence=6))
-    peers.missed(said(9, sequence=6))
-    assert (peer.owed, peers.owing()) == (0, None)
-    assert not peers.is_short(said(sequence=6))
-    assert not peers.is_short(said(9, sequence=6))
+    peers.missed(word, 4 * MISSING_NS)
+    assert (peer.short_since_ns, peers.owing()) == (None, None)
+    assert not peers.is_short(word)
+
+
+@pytest.mark.parametrize(
+    "word", [said(run_id=43, sequence=9), said(fingerprint=2, sequence=9), said(9, 5, sequence=9), said(1, sequence=9)]
+)
+def test_what_a_word_says_that_was_not_accepted_is_not_missed(word):
+    peers = known()
+    peers.heard(said(sequence=0), 0)
+    peers.heard(word, 0)
+    assert not peers.is_short(word)
+    for now_ns in range(0, 2 * MISSING_NS, BEAT):
+        peers.missed(word, now_ns)
+    assert peers.owing() is None

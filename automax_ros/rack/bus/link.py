@@ -25,15 +25,15 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.standing import StopCause
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.registers import Part
-from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
 from automax_ros.running.task import ScanRecord, Task
 from automax_ros.running.views import MemoryValueError, WriteGroup
 
 _FORCES = (WriteKind.FORCE, WriteKind.RELEASE)
 _BEFORE_SCANS = EventKey(EventClass.OUTSIDE, 2, "bus")
 _AFTER_SCANS = EventKey(EventClass.OBSERVE, 0, "bus")
-MOST_AHEAD_NS = 5 * NS_PER_S
-"""What comes from further ahead is taken at once: a process that is later than this was given up (decision)."""
+MOST_AHEAD_NS = 10 * NS_PER_S
+"""What comes from further ahead is taken at once (decision): a process that is later than this is lost."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,7 @@ class BusLink:
         self.standing = Standing()
         self.starting = True
         self._adopting = False
+        self._waiting: dict[ScheduledEvent, Callable[[], None]] = {}
 
     def begin(self) -> None:
         """Observe the rack, as the last of its observers, before it is started."""
@@ -145,14 +146,17 @@ class BusLink:
     def receive(self, batch: Batch) -> None:
         """Take over another process's writes, as far as they are newer than what is held. Between two scans.
 
-        Where the host has made this process late, that is after what it has to do up to the instant of the writes.
+        Where the host has made this process late, they are taken only after what it still has to do before them.
         """
-        self._in_time(batch.time_ns, batch.kind, lambda: self._receive(batch))
+        # What start-up parts write at the start of the rack is there before the first scans.
+        by_scan = batch.kind is WriteKind.COMMIT or (batch.kind is WriteKind.BASIC and batch.time_ns > 0)
+        key = _AFTER_SCANS if by_scan else _BEFORE_SCANS
+        self._in_time(batch.time_ns, key, lambda: self._receive(batch))
 
     def merge(self, picture: Picture) -> None:
         """Take over what another process holds, as far as it is newer. Between two scans, in time as ``receive``."""
         written_ns = [held.version[0] for held in picture.values] + [force.version[0] for force in picture.forces]
-        self._in_time(max(written_ns, default=0), WriteKind.OUTSIDE, lambda: self._merge(picture))
+        self._in_time(max(written_ns, default=0), _BEFORE_SCANS, lambda: self._merge(picture))
 
     def picture(self) -> Picture:
         """Return all that was written, for a process that joins or has missed a batch."""
@@ -163,11 +167,19 @@ class BusLink:
         )
         return Picture(self.sequence, tuple(self._versions.all()), tuple(forces))
 
+    def take_waiting(self) -> None:
+        """Take at once what waits for its time: nothing that was written is lost where the rack or its run ends."""
+        waiting, self._waiting = self._waiting, {}
+        for event, take in waiting.items():
+            event.cancel()
+            self._guard(take)
+
     def last_of(self, seat: int) -> Picture:
         """Return what a process has written within the last second, as this image holds it, for all others.
 
         Where it has ended in the middle of sending some have its last batch and others do not.
         """
+        self.take_waiting()
         whole, since_ns = self.picture(), self._rack.now_ns - NS_PER_S
         values = tuple(held for held in whole.values if held.version[1] == seat and held.version[0] >= since_ns)
         forces = tuple(force for force in whole.forces if force.version[1] == seat and force.version[0] >= since_ns)
@@ -180,6 +192,7 @@ class BusLink:
         """
         if standing.order <= self.standing.order:
             return
+        self.take_waiting()
         operations = self._rack.operations
         self.standing = standing
         self._adopting = True
@@ -193,16 +206,20 @@ class BusLink:
         finally:
             self._adopting = False
 
-    def _in_time(self, time_ns: int, kind: WriteKind, take: Callable[[], None]) -> None:
+    def _in_time(self, time_ns: int, key: EventKey, take: Callable[[], None]) -> None:
         """Take what was written at a time: now, or where this process is late, after what it has to do before that."""
         scheduler = self._rack.scheduler
-        key = _AFTER_SCANS if kind is WriteKind.COMMIT else _BEFORE_SCANS
         due = scheduler.next_ns
         is_late = due is not None and (due < time_ns or (due == time_ns and key is _AFTER_SCANS))
         if self.starting or not is_late or time_ns - scheduler.now_ns > MOST_AHEAD_NS:
             take()
-        else:
-            scheduler.at(time_ns, key, lambda _: self._guard(take))
+            return
+
+        def take_waiting(_: int) -> None:
+            self._guard(self._waiting.pop(event))
+
+        event = scheduler.at(time_ns, key, take_waiting)
+        self._waiting[event] = take
 
     def _receive(self, batch: Batch) -> None:
         self._collect()

@@ -14,6 +14,7 @@ from automax_ros.rack.bus.link import MOST_AHEAD_NS, Batch, Picture, Standing
 from automax_ros.rack.bus.versions import Held
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.standing import StopCause
+from automax_ros.running.scheduler import EventClass, EventKey
 from rack.bus.parts import ONE, SEATS, Process, config_in, cut, image, settle
 
 WRITTEN = {
@@ -145,7 +146,9 @@ def test_a_scan_that_was_late_gives_way_to_what_was_written_after_its_deadline(c
         (5_500_000, WriteKind.COMMIT, 7, 40),
         (5_600_000, WriteKind.FORCE, 7, 40),
         (11_000_000, WriteKind.COMMIT, 7, 7),
-        (11_000_000, WriteKind.BASIC, 7, 40),
+        (5_500_000, WriteKind.BASIC, 7, 40),
+        (11_000_000, WriteKind.BASIC, 7, 7),
+        (11_000_000, WriteKind.OUTSIDE, 7, 40),
         (5_500_001 + MOST_AHEAD_NS, WriteKind.OUTSIDE, 40, 40),
     ],
 )
@@ -167,6 +170,39 @@ def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(co
             two.rack.scheduler.run_due(until_ms * NS_PER_MS)
             seen.append(two.rack.value("B%"))
         assert seen == [first, second], way
+
+
+def test_what_start_up_parts_wrote_is_there_before_the_first_scans(config):
+    two = Process(config, SEATS[2])
+    two.start()
+    two.link.receive(Batch(1, 1, 0, 3, WriteKind.BASIC, ((two.rack.memory.view("A%"), 0, 40),)))
+    two.rack.run(0.001)
+    assert two.rack.value("B%") == 40
+
+
+@pytest.mark.parametrize("end", ["stop", "last", "lost"])
+def test_what_waits_for_its_time_is_taken_before_the_rack_stops_or_an_image_is_shown(config, end):
+    """Else an output that was set before a STOP ALL came on again after it."""
+    home = Process(config, SEATS[0])
+    home.start()
+    home.rack.run(0.0055)
+    view = home.rack.memory.view("OUT7@")
+    tick = home.rack.scheduler.every(
+        5 * NS_PER_MS, 6 * NS_PER_MS, EventKey(EventClass.SCAN, 5, "late"), lambda *_: None
+    )
+    home.link.receive(Batch(1, 1, 7 * NS_PER_MS, 3, WriteKind.COMMIT, ((view, 0, True),)))
+    assert home.rack.value("OUT7@") is False
+    if end == "stop":
+        cause = StopCause(8 * NS_PER_MS, "a fault", "31", "")
+        home.link.adopt(Standing(8 * NS_PER_MS, 1, cause))
+    elif end == "last":
+        home.link.take_waiting()
+    else:
+        held = {item.view for item in home.link.last_of(1).values}
+        assert home.rack.memory.registers.parts(view, 0, True)[0].bank in held
+    home.rack.scheduler.run_due(20 * NS_PER_MS)
+    tick.cancel()
+    assert home.rack.value("OUT7@") is (end != "stop")
 
 
 def test_a_damaged_image_that_waits_for_its_time_ends_nothing(config):
