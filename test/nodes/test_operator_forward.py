@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import contextmanager
 from functools import partial
 
@@ -90,6 +91,22 @@ def test_processes_that_hear_of_the_start_when_it_is_over_join(tmp_path):
         wait(lambda: one.rack.task("ONE").scan_number > 0 and two.rack.task("TWO").scan_number > 0)
 
 
+def test_what_waits_on_the_bus_is_taken_before_it_counts_as_missing(racks):
+    """A process whose door was held up hears how much the other has written before it has taken any of it."""
+    _, one, two = racks["parts"]
+    two.bus._node.site.door.stop()
+    peer, link = two.bus.peers.by_seat[1], one.bus.link
+    words = next(item for item in two.bus._node.site.door._entrances if item.name.endswith("bus/presence"))
+    before, told = peer.received, link.sequence + 30
+    deadline = time.monotonic() + PATIENCE_NS / NS_PER_S
+    while peer.presence.sequence < told and time.monotonic() < deadline:
+        racks["executor"].spin_once(timeout_sec=0.01)
+        words.take()
+    assert peer.received >= before + 20
+    assert not peer.gap
+    assert two.bus.peers.owing() is None
+
+
 def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
     home, one, two = (part.rack for part in racks["parts"])
     told = ask("ReadTasks", "tasks")
@@ -171,8 +188,6 @@ def test_the_table_of_tasks_is_that_of_all_processes(ask, racks):
 
 
 def wait(condition) -> None:
-    import time
-
     deadline = time.monotonic_ns() + PATIENCE_NS
     while not condition():
         assert time.monotonic_ns() < deadline
