@@ -82,7 +82,7 @@ def test_transitions_are_operations_on_the_tasks(live, client, manager):
 def test_cleanup_deletes_and_configure_reads_the_files_again(live, client, manager, folder):
     assert not manager.ask(NODE, "cleanup"), "an active node has no such transition"
     assert "a request was refused: cleanup: a node that is active has no transition cleanup" in live.health.news()
-    assert manager.ask(NODE, "deactivate")
+    assert manager.ask(NODE, "deactivate"), (live.health.news(), live.rack.operations.stopped, statuses(live))
     live.told.operations.clear()
     assert manager.ask(NODE, "cleanup")
     assert manager.state(NODE) == UNCONFIGURED
