@@ -50,9 +50,9 @@ ANSWER_NS = 100 * NS_PER_MS
 """The same process gets an image at most this often."""
 MOST_BYTES = 64 << 20
 """Longest image that is read; writes and presences may be a hundredth of it."""
-MOST_A_ROUND = 32
+BATCHES_A_ROUND = 32
 """Most batches that the door takes at a time: seven processes send 1000 in a second, and on a busy host it is late."""
-MOST_FIRST = 64
+BATCHES_FIRST = 64
 """Most batches that are taken because a process's word tells of some that have not come."""
 MODULE_LOST = "31"
 """The hardware's code when a module does not answer on the backplane: bus error (decision: so is one that is lost)."""
@@ -116,7 +116,7 @@ class RackBus:
         self._images = node.create_publisher(BusImageClass, "bus/image", qos)
         self._presences = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
         words = Terms(MOST_BYTES // 100, then=self._look_for_missing)
-        self._way = self._hear("bus", qos, BusWrite, self._take_write, Terms(MOST_BYTES // 100, MOST_A_ROUND))
+        self._way = self._hear("bus", qos, BusWrite, self._take_write, Terms(MOST_BYTES // 100, BATCHES_A_ROUND))
         self._hear("bus/image", qos, BusImage, self._take_image, Terms(MOST_BYTES))
         self._hear(PRESENCE, presence_qos(), Presence, self._take_presence, words)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -322,7 +322,7 @@ class RackBus:
         """
         with self._site.lock:
             is_short = self.peers.is_short(presence)
-        if is_short and not all(self._way.take() for _ in range(MOST_FIRST)):
+        if is_short and not all(self._way.take() for _ in range(BATCHES_FIRST)):
             with self._site.lock:
                 self.peers.missed(presence, time.monotonic_ns())
 

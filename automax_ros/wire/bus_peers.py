@@ -42,7 +42,7 @@ class Heard(enum.Enum):
 class Peer:
     """Another process: what it said last, when, and which of its batches have come.
 
-    ``short_since_ns`` is when batches of which it told were first missed, None where none has been since the last one.
+    ``short_since_ns`` is when batches of which it told were first missed, None as long as none is.
     """
 
     presence: Presence

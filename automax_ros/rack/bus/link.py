@@ -215,10 +215,10 @@ class BusLink:
             take()
             return
 
-        def take_waiting(_: int) -> None:
+        def happen(_: int) -> None:
             self._guard(self._waiting.pop(event))
 
-        event = scheduler.at(time_ns, key, take_waiting)
+        event = scheduler.at(time_ns, key, happen)
         self._waiting[event] = take
 
     def _receive(self, batch: Batch) -> None:
