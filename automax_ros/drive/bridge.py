@@ -84,6 +84,10 @@ class Bridge(Stateful):
         self.gated = 0
         self.gate_end_ns = [min(end, now_ns) for end in self.gate_end_ns]
 
+    def take_back(self) -> None:
+        """Take back the gate windows that have not begun."""
+        self.pending.clear()
+
     def begin_gates(self, now_ns: int) -> int:
         """Begin every window that is due; returns the mask of fired SCRs whose gate lead is open."""
         lost = 0

@@ -5,12 +5,14 @@ No registers, no rack: ``rack/modules`` has the module around it, a bench or a P
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import fmod, pi
 from typing import Final
 
 from automax_ros.drive.ac_line import Rotation
 from automax_ros.drive.cml.signals import (
+    LATE_BIT,
     LINE,
     OVERCURRENT,
     RATED,
@@ -51,13 +53,17 @@ class DriveController:
         """Begin with gates off."""
         self.plant = plant
         self.level = 400
+        self.late_us = 0
+        self._ahead = (0, 0)
+        self._fired = (0, 0)
 
     def measure(self, now_ns: int, status: int = 0, registers: tuple[int, int, int, int] = (109, 4, 2, 0)) -> Measured:
         """Let the plant's time pass to an interrupt and return what was measured since the one before.
 
         Args:
             now_ns: the instant, ns.
-            status: bits of inputs and switches; VOLTAGE where a 57C405 is wired to the armature.
+            status: bits of inputs and switches; VOLTAGE where a 57C405 is wired to the armature. How late the last
+                command came is added.
             registers: 4136, 4137, 4138, 4146.
         """
         plant = self.plant
@@ -66,6 +72,7 @@ class DriveController:
         plant.advance(now_ns)
         circuit, line = plant.circuit, plant.line
         sample = plant.sample()
+        status |= self.late_us << LATE_BIT
         if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.rated_v:
             status |= LINE
         if line.rotation is Rotation.CBA:
@@ -98,28 +105,55 @@ class DriveController:
     def command(self, command: Command, interrupt_ns: int, now_ns: int = 0) -> None:
         """Carry out what the loop commands until the next interrupt: relays and gates.
 
+        A command that comes after its interrupt takes the place of the plan by which the gates went on meanwhile: what
+        should have begun since the interrupt begins at once, what that plan has fired already is not fired twice
+        (decision: nothing is lost for computing time).
+
         Args:
             command: what it commands.
             interrupt_ns: the instant of the interrupt, from which pulses count, ns.
-            now_ns: the present where it is later, ns: pulses that should have begun begin at once.
+            now_ns: the present where it is later, ns.
         """
+        now_ns = max(now_ns, interrupt_ns)
+        self.late_us = (now_ns - interrupt_ns) // 1000
         plant = self.plant
         if plant is None:
             return
-        now_ns = max(now_ns, interrupt_ns)
         plant.advance(now_ns)
         self.level = command.level
         plant.relay(on=command.relays != 0)
         if command.block:
             plant.bridge.cancel(plant.now_ns)
+            self._ahead = self._fired = (0, 0)
+        elif self._ahead[1]:
+            plant.bridge.take_back()
+            if self._ahead[0] < now_ns:
+                self._fired = self._ahead
+            self._ahead = (0, 0)
+        fired_ns, fired = self._fired
         for after_ns, length_ns, gates in command.pulses:
             on_ns = interrupt_ns + after_ns
             off_ns = on_ns + length_ns
+            if gates == fired and on_ns < fired_ns + 3 * length_ns:
+                continue
             if off_ns > now_ns:
                 plant.circuit.fire_mask(on_ns if on_ns > now_ns else now_ns, off_ns, _gate_mask(gates))
+            if after_ns >= command.next_ns:
+                self._ahead = (on_ns, gates)
+
+    def state(self) -> list[int]:
+        """Return what the future depends on, besides the plant."""
+        return [self.level, self.late_us, *self._ahead, *self._fired]
+
+    def load(self, state: Sequence[int]) -> None:
+        """Take over what ``state`` gave."""
+        self.level, self.late_us, ahead_ns, ahead, fired_ns, fired = state
+        self._ahead, self._fired = (ahead_ns, ahead), (fired_ns, fired)
 
     def off(self, now_ns: int) -> None:
         """Suppress all gates at an instant, ns, and turn the contactor's relay off: nobody commands any more."""
+        self.late_us = 0
+        self._ahead = self._fired = (0, 0)
         plant = self.plant
         if plant is not None:
             plant.advance(now_ns)

@@ -175,7 +175,7 @@ class Pmi(Stateful):
 
     def state(self) -> SavedState:
         """Return all that its future depends on but the plant, which has a state of its own."""
-        return super().state() | {"loop": self.loop.numbers(), "level": self._controller.level}
+        return super().state() | {"loop": self.loop.numbers(), "firing": self._controller.state()}
 
     def restore(self, state: SavedState) -> None:
         """Take a state over.
@@ -183,13 +183,13 @@ class Pmi(Stateful):
         Raises:
             ParameterError: it is not the state of a PMI.
         """
-        check_names("PMI", state, (*self._kept, "loop", "level"))
+        check_names("PMI", state, (*self._kept, "loop", "firing"))
         super().restore({name: state[name] for name in self._kept})
         try:
             self.loop.take(state["loop"])
         except (TypeError, ValueError) as error:
             raise ParameterError(f"this is not the state of a PMI: {error}") from error
-        self._controller.level = state["level"]
+        self._controller.load(state["firing"])
 
     def _judge_link(self, commands: Commands) -> None:
         """A drive that is not in standby trips where its UDC does not command it any more."""

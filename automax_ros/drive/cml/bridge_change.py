@@ -64,7 +64,7 @@ class BridgeChange(Stateful):
         self.bridge = bridge
         self.stage = Stage.NONE
 
-    def scan(self, measured: Measured, wanted: float, scan_us: float, *, fast: bool) -> bool:
+    def scan(self, measured: Measured, wanted: float, scan_us: float, *, fast: bool, late: bool = False) -> bool:
         """Move on by a scan; return whether the other bridge is in use from now on.
 
         Args:
@@ -72,12 +72,16 @@ class BridgeChange(Stateful):
             wanted: the reference after the lag, counts.
             scan_us: the time of a scan.
             fast: whether the fast change is on.
+            late: whether commands come after their interrupt: the gates have gone on meanwhile, so what was measured
+                before the change began does not tell that no current flows.
         """
         against = wanted if self.bridge == 2 else -wanted
         if self.stage == Stage.NONE:
             if against < DEAD_BAND:
                 return False
             self.stage = Stage.BACK
+            if late:
+                return False
         elif against < -DEAD_BAND:
             self.stage = Stage.NONE
             return False

@@ -11,7 +11,7 @@ from automax_ros.drive.cml.bridge_change import FLOOR, QUIET, RECOVERY_US, Bridg
 from automax_ros.drive.cml.firing import Firing
 from automax_ros.drive.cml.reference import FULL, ReferenceChain
 from automax_ros.drive.cml.regulator import STEPS, Regulator
-from automax_ros.drive.cml.signals import RATED, Measured, Pulse
+from automax_ros.drive.cml.signals import RATED, Measured, Pulse, late_us
 from automax_ros.drive.state import Stateful
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ class CurrentControl(Stateful):
         self.part = 0.0
         self.block = False
         self._fresh = 0
+        self._late_us = 0
         self.chain = ReferenceChain()
         self.regulator = Regulator()
         self.change = BridgeChange()
@@ -76,6 +77,7 @@ class CurrentControl(Stateful):
         """Scale the mean current of the last scan, 4095 counts at LIM_BAR: once each scan, whatever the drive does."""
         counts = measured.current * COUNTS / lim_bar
         zero_us = measured.zero_us
+        self._late_us = late_us(measured.status)
         # DC_TIME is in whole us, and the scan a little longer.
         self.part = max(0.0, 1.0 - zero_us * 6000 / (period_ns - 12_000)) if zero_us else 1.0
         self.i_fdbk = self.regulator.feedback(counts, self.part)
@@ -99,7 +101,7 @@ class CurrentControl(Stateful):
         fast = settings.fast_change
         self.block = False
         guard_ns = 0
-        if self.change.scan(measured, wanted, scan_us, fast=fast):
+        if self.change.scan(measured, wanted, scan_us, fast=fast, late=self._late_us > 0):
             bridge = self.change.bridge
             self._take(bridge, preset_us(measured, bridge, abs(wanted), settings.cc_thresh, period_us) if fast else 0.0)
             self.block = True
@@ -111,7 +113,7 @@ class CurrentControl(Stateful):
 
     def _phase_back(self, pll: Pll, reverse: bool) -> tuple[Pulse, ...]:
         """Bring the current of the bridge in use to zero, then take its gates away."""
-        if self.change.stage == Stage.OFF:
+        if self.change.stage == Stage.OFF or (self._late_us and self.part < 1.0):
             self.block = True
             self.regulator.begin(0.0)
             return self.off()
@@ -122,6 +124,7 @@ class CurrentControl(Stateful):
     def _regulate(self, wanted: float, settings: Latched, period_us: float) -> None:
         """Find DELTA for the bridge in use."""
         regulator, part = self.regulator, self.part
+        regulator.see_late(self._late_us, period_us)
         if self.change.bridge == 2:
             error = self.i_fdbk - wanted if wanted < 0.0 else self.i_fdbk
             wanted = -wanted
@@ -170,8 +173,11 @@ class CurrentControl(Stateful):
         self.regulator.begin(delta_us)
         self.firing.begin()
         self.block = False
-        self._fresh = FRESH_SCANS if delta_us else 0
+        self._fresh = FRESH_SCANS + (self._late_us > 0) if delta_us else 0
 
     def _fire(self, pll: Pll, delta_us: float, bridge: int, reverse: bool, guard_ns: int = 0) -> tuple[Pulse, ...]:
         delta_ns = int(delta_us * 1000.0 + 0.5)
-        return self.firing.pulses(pll.position, pll.period_ns, pll.next_ns, delta_ns, bridge, reverse, guard_ns)
+        ahead = self._late_us > 0
+        return self.firing.pulses(
+            pll.position, pll.period_ns, pll.next_ns, delta_ns, bridge, reverse, guard_ns, ahead=ahead
+        )

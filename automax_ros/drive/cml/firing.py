@@ -58,6 +58,8 @@ class Firing(Stateful):
         bridge: int,
         reverse: bool,
         earliest_ns: int = 0,
+        *,
+        ahead: bool = False,
     ) -> tuple[Pulse, ...]:
         """Plan the time from an interrupt, at a position of the cycle, to the next.
 
@@ -69,7 +71,22 @@ class Firing(Stateful):
             bridge: 1 or 2.
             reverse: whether the line has the other rotation.
             earliest_ns: no pulse begins sooner after the interrupt, ns.
+            ahead: whether the next command comes after its interrupt: the pulse after the last one is planned too, to
+                be fired by this DELTA unless the next command comes first.
         """
+        planned = self._plan(position, period_ns, next_ns, delta_ns, bridge, reverse, earliest_ns)
+        if ahead:
+            number = max(self.last + 1, self.count - 3)
+            sixth = period_ns // 6
+            after = max(next_ns, max(0, 3 * sixth - delta_ns) + next_ns - (self.count + 1 - number) * sixth)
+            word = _GATES[bridge, reverse][(position - self.count + number) % 6]
+            planned = (*planned, _new(Pulse, (after, sixth, word)))
+        return planned
+
+    def _plan(
+        self, position: int, period_ns: int, next_ns: int, delta_ns: int, bridge: int, reverse: bool, earliest_ns: int
+    ) -> tuple[Pulse, ...]:
+        """Plan what begins before the next interrupt."""
         self.count = count = self.count + 1
         sixth = period_ns // 6
         delay = max(0, 3 * sixth - delta_ns)

@@ -29,6 +29,7 @@ from automax_ros.drive.cml.signals import (
     Command,
     Measured,
     Pulse,
+    late_us,
 )
 from automax_ros.drive.state import Stateful
 
@@ -195,7 +196,9 @@ class CurrentMinorLoop(Stateful):
         if phase < _RUN:
             none = control.off()
             if phase is _SCR_TEST:
-                return self.scr_test.fire(pll.position, pll.period_ns, reverse=reverse)
+                return self.scr_test.fire(
+                    pll.position, pll.period_ns, reverse=reverse, late=late_us(measured.status) > 0
+                )
             return none
         stopping = phase is not _RUN
         if stopping:

@@ -6,6 +6,9 @@ is fired up to a scan after the interrupt (decision). In discontinuous conductio
 alone, with the cube of the part of the scan that conducts: the integral gain is what takes off ``INTEGRAL_STEP`` of an
 error in a scan, at most AG_FACTOR times the continuous one (decision). While nothing conducts, DELTA moves by steps
 (decision).
+
+Where a scan computes for a time, as in modeled execution, the 57C406 fires by the DELTA before meanwhile. The loop
+knows how long that was, and reckons with what it has commanded and does not see yet: it keeps its damping (decision).
 """
 
 from __future__ import annotations
@@ -36,9 +39,15 @@ factor each scan: the drop over the resistance comes with the current (decision)
 RISE: Final = 0.30
 """DELTA rises in a scan by at most this part of a scan in discontinuous conduction, or what conducts would not tell
 (decision)."""
+LATE_RAISED: Final = 0.05
+LATE_RISE: Final = 0.15
+"""RAISED and RISE where commands come after their interrupt: what conducts tells a scan later (decision)."""
 AHEAD: Final = 0.4
 """Part of the last proportional push that the mean of a scan does not show if the SCR is fired at the scan's end
 (decision)."""
+PENDING: Final = 0.65
+"""Part of the last push that is still to come where it was too late for its pulse: the loop gain that the proposed KP
+has (decision)."""
 SEARCH_LEAST: Final = 0.018
 SEARCH_MOST: Final = 0.040
 """Step of DELTA while nothing conducts, over the period: for the smallest reference and for LIM_BAR (decision)."""
@@ -61,6 +70,7 @@ class Regulator(Stateful):
 
     def __init__(self) -> None:
         """Begin at DELTA 0."""
+        self.late = self.missed = False
         self.begin(0.0)
         self.fdbk_gain = self.integral_gain = 0
 
@@ -79,6 +89,17 @@ class Regulator(Stateful):
         self.fdbk_gain = gain = int(GAIN_LOWEST + (GAIN_CONTINUOUS - GAIN_LOWEST) * part + 0.5)
         limit = RAW_LIMIT * gain / STEPS
         return round(limit if counts > limit else -limit if counts < -limit else counts)
+
+    def see_late(self, late_us: int, period_us: float) -> None:
+        """See whether the DELTA of the last scan came too late for that scan's pulse: the one before has fired it.
+
+        Args:
+            late_us: how long after the interrupt it came.
+            period_us: the line's period.
+        """
+        fired_us = (0.5 * period_us - self.before_us) % (period_us / 6.0)
+        self.late = late_us > 0
+        self.missed = self.late and fired_us <= late_us
 
     def search(self, error: float, kp: float, wanted: float, period_us: float) -> None:
         """Move DELTA on by a step while nothing conducts: the greater the reference (over LIM_BAR), the faster."""
@@ -102,7 +123,11 @@ class Regulator(Stateful):
             gain += self.raised
             self.raised = self.raised * FALL if self.raised > 0.01 * gain else 0.0
         fired = (0.5 * period_us - self.delta_us) * 6.0 / period_us % 1.0
-        self.push_us = kp * error - AHEAD * fired * self.push_us
+        unseen_us = AHEAD * fired * self.push_us
+        if self.late and kp > 0.0:
+            error -= PENDING * (fired + self.missed) * self.push_us / kp
+            unseen_us = 0.0
+        self.push_us = kp * error - unseen_us
         self._move(gain, gain * error, lowest_us, 0.5 * period_us)
 
     def discontinuous(
@@ -124,13 +149,16 @@ class Regulator(Stateful):
             # I = thresh x part^3, and part grows by 1 on the way to the boundary.
             steepest = 3.0 / (BOUNDARY_WAY * period_us) * thresh
             x = part if part > LEAST_PART else LEAST_PART
-            self.raised = min(RAISED / steepest, gain * (factor - 1.0))
+            self.raised = min((LATE_RAISED if self.late else RAISED) / steepest, gain * (factor - 1.0))
             gain = min(max(gain, INTEGRAL_STEP / (steepest * x * x)), gain * factor)
-            boundary = 0.5 * (self.delta_us + self.before_us) + (1.0 - part) * BOUNDARY_WAY * period_us
+            fed_us = self.before_us if self.missed else 0.5 * (self.delta_us + self.before_us)
+            boundary = fed_us + (1.0 - part) * BOUNDARY_WAY * period_us
             move = min(gain * error, max(move, boundary - self.integral_us))
         self.push_us = kp * error
-        self._move(gain, move, 0.0, min(0.5, self.delta_us / period_us + RISE / 6.0) * period_us)
-        self.push_us = 0.0  # AHEAD is of a push in continuous conduction
+        rise = RISE if not self.late else LATE_RISE
+        self._move(gain, move, 0.0, min(0.5, self.delta_us / period_us + rise / 6.0) * period_us)
+        # AHEAD is of a push in continuous conduction, PENDING of all that drives the current up.
+        self.push_us = max(0.0, self.delta_us - self.integral_us) if self.late else 0.0
 
     def _move(self, gain: float, move_us: float, lowest_us: float, highest_us: float) -> None:
         """Move the integrator, and find DELTA between two bounds."""

@@ -61,10 +61,12 @@ class ScrTest(Stateful):
                 return _pair(self._fired, place, reverse)
         return PASSED if self._scan >= self.bridges * CYCLES * 6 else GO_ON
 
-    def fire(self, position: int, period_ns: int, *, reverse: bool) -> tuple[Pulse, ...]:
-        """Fire the next gate; arguments as those of ``Firing.pulses``."""
+    def fire(self, position: int, period_ns: int, *, reverse: bool, late: bool = False) -> tuple[Pulse, ...]:
+        """Fire the next gate; arguments as those of ``Firing.pulses``; ``late``: commands come after interrupts."""
         cycle = self._scan // 6
         delta_ns = STEP_NS * (cycle % CYCLES)
+        if late and not delta_ns:  # a pulse at the interrupt would be over when the command comes
+            delta_ns = PULSE_NS
         # Alpha 180 of what is fired is this interrupt without a DELTA, else the next one.
         place = position + 4 if delta_ns else position + 3
         self._fired = (REVERSED if reverse else STANDARD)[place % 6] + 10 * (cycle // CYCLES)

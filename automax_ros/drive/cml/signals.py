@@ -28,6 +28,10 @@ RESET_SWITCH: Final = 1 << 7
 VOLTAGE: Final = 1 << 8
 """A 57C405 gives the armature voltage."""
 
+LATE_BIT: Final = 16
+"""From this bit of ``Measured.status`` on stands how long after its interrupt the last command came, us: the time that
+a scan computes, 0 in ideal execution."""
+
 RATED: Final = 100_000
 """The rated armature current in the units of ``Measured.current`` (thousandths of a percent)."""
 
@@ -88,7 +92,8 @@ class Command(NamedTuple):
     Attributes:
         next_ns: time from this interrupt to the next, ns.
         relays: which contactor relays are on, FMCR and RMCR.
-        pulses: the gate windows that begin before the next interrupt; those of earlier commands stay.
+        pulses: the gate windows that begin before the next interrupt; those of earlier commands that have begun stay.
+            Where scans compute for a time one more follows, for the time until the next command.
         level: current at which OVERCURRENT comes, % of rated.
     """
 
@@ -100,6 +105,11 @@ class Command(NamedTuple):
     """All earlier gate windows end at once (a coast stop, a bridge change)."""
     ok: bool = False
     """The drive OK output of the drive digital I/O module: good inputs and no drive fault (decision)."""
+
+
+def late_us(status: int) -> int:
+    """Return how long after its interrupt the last command came, us."""
+    return status >> LATE_BIT
 
 
 def gate_bits(*numbers: int) -> int:

@@ -84,7 +84,7 @@ class DriveControllerModule:
             "interrupts": self._interrupts.state(),
             "switches": self._switches.state(),
             "measured": list(self._measured),
-            "level": self._controller.level,
+            "firing": self._controller.state(),
             "digital": self._digital.slot,
             "rest_ns": rest_ns,
         }
@@ -94,7 +94,7 @@ class DriveControllerModule:
         self._interrupts.load(state["interrupts"])
         self._switches.load(state["switches"])
         self._measured = Measured(*state["measured"])
-        self._controller.level = state["level"]
+        self._controller.load(state["firing"])
         self._digital.serve(state["digital"])
         self._end_rest()
         if state["rest_ns"] is not None:
