@@ -13,7 +13,7 @@ from typing import Any
 
 from automax_ros.compile.compiler import CompiledTask, ScanSteps
 from automax_ros.core.types import Latched, Value
-from automax_ros.drive.cml.diagnostics import PAGE_NUMBER, Record, next_entry_index, page_of, writes
+from automax_ros.drive.cml.diagnostics import PAGE_NUMBER, SIZE, Record, next_entry_index, page_of, writes
 from automax_ros.drive.cml.inputs import INPUTS, Inputs
 from automax_ros.drive.cml.minor_loop import NUMBERS, CurrentMinorLoop
 from automax_ros.drive.cml.signals import Command, Measured
@@ -81,6 +81,8 @@ class _LoopScans:
             reads += noted_time(now_ns)
             reads += noted_command(outcome.command)
         self._hear(self._give)
+        if outcome.initialised:
+            self._clear(records)
         for code in outcome.problems:
             self._io.log(task.cml.line, code)
         if outcome.record is not None:
@@ -96,6 +98,15 @@ class _LoopScans:
 
     def _give(self) -> None:
         self._task.port.command(self._command)
+
+    def _clear(self, records: list[Value] | None) -> None:
+        """Zero the diagnostic data at task initialisation (52.2.2)."""
+        view = self._task.records
+        if records is not None:
+            records[:] = [0] * len(records)
+        elif view is not None:
+            for index in range(SIZE):
+                self._io.write_now(view, 0, index)
 
     def _keep(self, record: Record, records: list[Value] | None) -> None:
         """Write a record of the diagnostic data: an array of the task's own, or a common in actual memory (52.3.2)."""

@@ -15,9 +15,6 @@ from automax_ros.drive.cml.regulator import BOUNDARY_WAY
 from automax_ros.drive.cml.signals import VOLTAGE, VOLTS, Measured
 from automax_ros.drive.state import Stateful
 
-DEAD_BAND: Final = 4.0
-"""Counts of reference of the other sign that do not ask for a change: it would never rest at reference 0
-(decision)."""
 FLOOR: Final = 27 / 360
 """DELTA over the period that inversion needs while current is continuous: overlap at 2.5 times the rated current, and
 the turn-off time of SCRs (decision)."""
@@ -75,14 +72,15 @@ class BridgeChange(Stateful):
             late: whether commands come after their interrupt: the gates have gone on meanwhile, so what was measured
                 before the change began does not tell that no current flows.
         """
-        against = wanted if self.bridge == 2 else -wanted
+        # Its sign decides, from one count on (52.1.2): what keeps it from chattering is the change itself.
+        against = round(wanted if self.bridge == 2 else -wanted)
         if self.stage == Stage.NONE:
-            if against < DEAD_BAND:
+            if against < 1:
                 return False
             self.stage = Stage.BACK
             if late:
                 return False
-        elif against < -DEAD_BAND:
+        elif against < 0:
             self.stage = Stage.NONE
             return False
         if measured.tail_us <= 0:

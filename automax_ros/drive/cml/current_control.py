@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from automax_ros.drive.cml.bridge_change import FLOOR, QUIET, RECOVERY_US, BridgeChange, Stage, preset_us
 from automax_ros.drive.cml.firing import Firing
+from automax_ros.drive.cml.gaps import Gaps
 from automax_ros.drive.cml.reference import FULL, ReferenceChain
 from automax_ros.drive.cml.regulator import STEPS, Regulator
 from automax_ros.drive.cml.signals import RATED, Measured, Pulse, late_us
@@ -51,7 +52,8 @@ class CurrentControl(Stateful):
         self.regulator = Regulator()
         self.change = BridgeChange()
         self.firing = Firing()
-        self.parts: tuple[Stateful, ...] = (self, self.chain, self.regulator, self.change, self.firing)
+        self.gaps = Gaps()
+        self.parts: tuple[Stateful, ...] = (self, self.chain, self.regulator, self.change, self.firing, self.gaps)
 
     @property
     def bridge(self) -> int:
@@ -131,6 +133,9 @@ class CurrentControl(Stateful):
         else:
             error = wanted - self.i_fdbk if wanted > 0.0 else -self.i_fdbk
         kp = int(settings.kp * STEPS + 0.5) / STEPS
+        if self.gaps.see(wanted - error, wanted):
+            regulator.slow(wanted - self.gaps.mean, kp, FLOOR * period_us, 0.5 * period_us)
+            return
         if part <= 0.0:
             if self._fresh > 0:
                 self._fresh -= 1
@@ -172,6 +177,7 @@ class CurrentControl(Stateful):
         self.change.begin(bridge)
         self.regulator.begin(delta_us)
         self.firing.begin()
+        self.gaps.begin()
         self.block = False
         self._fresh = FRESH_SCANS + (self._late_us > 0) if delta_us else 0
 

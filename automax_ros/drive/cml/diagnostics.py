@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Final
 
 from automax_ros.drive.cml.signals import Pulse
-from automax_ros.drive.state import Stateful
 
 RECORDS: Final = 12
 """Records of a page (52.3.2)."""
@@ -23,7 +22,7 @@ PAGE_NUMBER: Final = 0
 """Index of the element that says which page is written: 0 is page 0, anything else page 1."""
 
 Record = tuple[int, int, int]
-"""I_FDBK, REF_LAG_OUT and the gates that make the feedback of the next scan."""
+"""I_FDBK, REF_LAG_OUT and the gates that are to be pulsed for the feedback of the next scan."""
 
 
 def page_of(page_number: int) -> int:
@@ -51,40 +50,15 @@ def writes(page: int, next_entry: int, record: Record) -> tuple[tuple[int, int],
     return (*words, (next_entry_index(page), number % RECORDS + 1))
 
 
-class Feeding(Stateful):
-    """Which gates make the feedback of the next scan: those whose SCRs carry current for most of it (decision).
+def gates_of(pulses: tuple[Pulse, ...], next_ns: int) -> int:
+    """Return the gates that are to be pulsed from an interrupt to the next, as bits: 0 where none is (52.3.2).
 
-    A pair is fired up to a scan after the interrupt; where that is late in the scan, the pair before it still makes
-    most of the current that the next interrupt measures.
+    Args:
+        pulses: the gate windows of a command.
+        next_ns: time to the next interrupt, ns; what begins later counts for a later record.
     """
-
-    _kept = ("word", "began_ns")
-
-    def __init__(self) -> None:
-        """Begin with nothing fired."""
-        self.word = 0
-        self.began_ns = 0
-
-    def begin(self) -> None:
-        """Begin a run: nothing is fired."""
-        self.word = self.began_ns = 0
-
-    def follow(self, pulses: tuple[Pulse, ...], next_ns: int, flow_ns: int) -> int:
-        """Return the gates that make the feedback of the scan from an interrupt to the next.
-
-        Args:
-            pulses: the gate windows of that time.
-            next_ns: how long it is, ns.
-            flow_ns: for how long a pair conducts, ns; not longer than to the next.
-        """
-        fed, began_ns = self.word, self.began_ns
-        word, most = (pulses[0].gates, 0) if pulses else (fed, 0)
-        for after_ns, _, gates in (*pulses, (next_ns, 0, 0)):
-            end_ns = began_ns + flow_ns
-            carries_ns = (after_ns if after_ns < end_ns else end_ns) - (began_ns if began_ns > 0 else 0)
-            if carries_ns > most:
-                word, most = fed, carries_ns
-            if gates:
-                fed, began_ns = gates, after_ns
-        self.word, self.began_ns = fed, began_ns - next_ns
-        return word
+    gates = 0
+    for after_ns, _, word in pulses:
+        if after_ns < next_ns:
+            gates |= word
+    return gates

@@ -10,7 +10,7 @@ from collections.abc import Sequence as Numbers
 from typing import Final, NamedTuple
 
 from automax_ros.drive.cml.current_control import CurrentControl
-from automax_ros.drive.cml.diagnostics import Feeding
+from automax_ros.drive.cml.diagnostics import gates_of
 from automax_ros.drive.cml.faults import Faults
 from automax_ros.drive.cml.inputs import Inputs
 from automax_ros.drive.cml.latching import TICK_NS, Latched
@@ -83,9 +83,8 @@ class CurrentMinorLoop(Stateful):
         self.sequence = Sequence()
         self.faults = Faults()
         self.scr_test = ScrTest()
-        self.feeding = Feeding()
         self._parts = (
-            self.outputs, self.latched, self.pll, self.sequence, self.faults, self.scr_test, self.feeding,
+            self.outputs, self.latched, self.pll, self.sequence, self.faults, self.scr_test,
             *self.control.parts,
         )  # fmt: skip
 
@@ -183,7 +182,6 @@ class CurrentMinorLoop(Stateful):
         self.sequence.run(now_ns)
         self.control.begin()
         self.faults.begin_run()
-        self.feeding.begin()
         problems = self.latched.run(inputs, self.pll.period_ns)
         if self.latched.cml_coast_stop:
             self.sequence.coast()
@@ -228,9 +226,7 @@ class CurrentMinorLoop(Stateful):
         """Return the record of a scan for DIAG_DATA: only while the loop regulates (52.3.2)."""
         if self.sequence.phase < _RUN or self.latched.cml_test:
             return None
-        next_ns, outputs = self.pll.next_ns, self.outputs
-        gates = self.feeding.follow(pulses, next_ns, int(self.control.part * next_ns))
-        return outputs.i_fdbk, outputs.ref_lag_out, gates
+        return self.outputs.i_fdbk, self.outputs.ref_lag_out, gates_of(pulses, self.pll.next_ns)
 
     # What is kept
 

@@ -45,6 +45,9 @@ LATE_RISE: Final = 0.15
 AHEAD: Final = 0.4
 """Part of the last proportional push that the mean of a scan does not show if the SCR is fired at the scan's end
 (decision)."""
+SLOW_PUSH: Final = 0.2
+SLOW_MOVE: Final = 0.06
+"""Proportional gain, and integral gain each scan, over KP where pulses are missing in each cycle (decision)."""
 PENDING: Final = 0.65
 """Part of the last push that is still to come where it was too late for its pulse: the loop gain that the proposed KP
 has (decision)."""
@@ -159,6 +162,13 @@ class Regulator(Stateful):
         self._move(gain, move, 0.0, min(0.5, self.delta_us / period_us + rise / 6.0) * period_us)
         # AHEAD is of a push in continuous conduction, PENDING of all that drives the current up.
         self.push_us = max(0.0, self.delta_us - self.integral_us) if self.late else 0.0
+
+    def slow(self, error: float, kp: float, lowest_us: float, highest_us: float) -> None:
+        """Move on by a scan of a cycle in which pulses are missing: by the mean error of the cycle, counts, alone."""
+        self._move(SLOW_MOVE * kp, SLOW_MOVE * kp * error, lowest_us, highest_us)
+        self.push_us = 0.0
+        delta = self.integral_us + SLOW_PUSH * kp * error
+        self.delta_us = lowest_us if delta < lowest_us else highest_us if delta > highest_us else delta
 
     def _move(self, gain: float, move_us: float, lowest_us: float, highest_us: float) -> None:
         """Move the integrator, and find DELTA between two bounds."""

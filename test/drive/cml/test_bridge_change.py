@@ -120,11 +120,24 @@ def test_a_reference_that_turns_back_before_zero_current_changes_nothing():
     assert scans[-1].feedback == pytest.approx(4095, abs=2)
 
 
-def test_a_reference_close_to_zero_does_not_change_bridges():
+def test_the_sign_of_the_reference_selects_the_bridge_from_one_count_on():
+    """52.1.2: a plus value turns bridge 1 on, a minus value bridge 2; 0 leaves the one that is on."""
     bench = running("150hp", 60, 200.0, 500)
-    for reference in (3, -3, 0, -3):
+    for reference, bridge in ((3, 1), (0, 1), (-1, 2), (0, 2), (1, 1)):
         bench.set(reference=reference)
-        assert {scan.bridge for scan in bench.run(0.2)} == {1}
+        assert bench.run(0.3)[-1].bridge == bridge
+
+
+def test_a_reference_that_turns_in_each_scan_is_slowed_by_the_change_itself():
+    """A change waits for a scan without current: a sign that turns in each scan is not followed in each."""
+    bench = running("150hp", 60, 200.0, 500)
+    changes, before, most = 0, 1, 0.0
+    for _ in range(180):
+        bench.set(reference=-400 if bench.loop.control.bridge == 1 else 400)
+        scan = bench.scan()
+        changes, before, most = changes + (scan.bridge != before), scan.bridge, max(most, abs(scan.feedback))
+    assert 1 <= changes < 180
+    assert most < 1000
 
 
 def test_old_bridge_is_blocked_until_its_scrs_have_recovered():
