@@ -53,7 +53,7 @@ class ReplaySource:
     """A task that is executed again.
 
     ``compiled`` is what runs; ``recorded`` is what ran when the recording was made, None if that cannot be told;
-    ``edited`` says whether their sources differ. ``versions`` are all sources that ran, by their hash: a task may have
+    ``edited`` says whether it runs in place of what ran. ``versions`` are all sources that ran, by their hash: a task may have
     been reloaded. An edited source runs in place of each of them (decision). ``keeps_locals``: over STOP ALL too.
     """
 
@@ -140,7 +140,8 @@ class StoredRack:
                 refused.append((source, result.diagnostics))
                 continue
             compiled = compile_program(result.program, views)
-            edited = stored is None or source.text != stored.text
+            # What is given runs in place of all that ran, also where it is what ran before a reload.
+            edited = stored is None or name in new
             recorded: CompiledTask | None = compiled
             if edited:
                 before = self._checked(stored, modules[name], name).program if stored else None

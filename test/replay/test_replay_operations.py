@@ -107,6 +107,19 @@ def test_an_edited_source_runs_in_place_of_each_that_ran(tmp_path):
     assert last == pytest.approx(0.9, abs=0.02)
 
 
+def test_a_source_that_is_given_runs_in_place_of_later_ones_too_where_it_is_the_first_that_ran(tmp_path):
+    doubled = edited(SPEED, ("INPUT2=100,", "INPUT2=200,"))
+    bag = operated(tmp_path, lambda rack: reload(rack, "SPEED", doubled), lambda rack: rack.operations.run_all())
+    report = replayed(bag, {"SPEED": SPEED})
+    assert not report.identical
+    assert report.tasks[0].edited
+    first = min(difference.first.time_s for difference in report.differences)
+    assert 0.9 <= first < 1.1, "nothing differs before the reload"
+    remarked = replayed(bag, {"SPEED": edited(SPEED, ("100 CALL", "99 REM as it was\n100 CALL"))}, only=("SPEED",))
+    alone = replayed(bag, {"SPEED": SPEED}, only=("SPEED",))
+    assert alone.tasks[0].different == remarked.tasks[0].different > 0
+
+
 def test_each_file_of_a_recording_has_the_source_that_ran_when_it_began(tmp_path):
     options = RecordingOptions(split_ns=500 * 10**6)
     first, then = (lambda rack: reload(rack, "SPEED", OTHER_SPEED)), (lambda rack: rack.operations.stop("WORK"))

@@ -64,6 +64,12 @@ def library_text() -> str:
     return "\n".join((f"#define MAX_TRAILING {MAX_TRAILING}", MACROS, *functions, _TEXT))
 
 
+class _Address(ctypes.c_void_p):
+    """Where an array stands. It holds the array, or memory that was given back would be read in the call."""
+
+    array: NDArray[Any]
+
+
 class _Texts(ctypes.Structure):
     """``automax_texts``."""
 
@@ -262,7 +268,12 @@ def _rules(rules: ValueRules) -> _Rules:
 
 
 def _address(array: NDArray[Any], kind: Any) -> ctypes.c_void_p:
-    """Return where an array stands that C reads or fills; TypeError if it is not as C expects it."""
+    """Return where an array stands that C reads or fills; it lives as long as what is returned does.
+
+    TypeError if it is not as C expects it.
+    """
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"{array.dtype} where {np.dtype(kind)} stands in one piece")
-    return ctypes.c_void_p(array.ctypes.data)
+    address = _Address(array.ctypes.data)
+    address.array = array
+    return address

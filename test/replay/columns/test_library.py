@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import random
 import shutil
 from pathlib import Path
@@ -22,6 +23,7 @@ from automax_ros.core.types import DataType
 from automax_ros.rack.config import CommonVariable
 from automax_ros.replay.columns.entries import Entries, ValueRules, first_other
 from automax_ros.replay.columns.latched import LatchedColumns
+from automax_ros.replay.columns.library import ColumnLibrary
 from automax_ros.replay.columns.native_messages import native_scans, native_writes
 from automax_ros.replay.columns.scans import SCAN, scans_by_task
 from automax_ros.replay.columns.writes import WRITE, write_columns
@@ -246,6 +248,26 @@ def test_chunks_that_follow_each_other_are_taken_apart_at_once(library):
     assert library.table(data, [ends[1], ends[0], *ends[1:]]) is None
     with pytest.raises(ValueError, match="do not end"):
         library.table(data, [len(data) + 1])
+
+
+def test_many_chunks_are_taken_apart_whatever_memory_is_given_back_meanwhile(library, monkeypatch):
+    """The ends of 128 chunks and more stand in memory of malloc's, which gives it to the next who asks."""
+    whole = (item for item in McapFile(next(GOLDEN.glob("*.mcap"))).chunks() if isinstance(item, WholeChunk))
+    chunk = min(whole, key=lambda item: len(item.data))
+    data = bytes(chunk.data) * 300
+    ends = [len(chunk.data) * number for number in range(1, 301)]
+    taken = []
+    count = ColumnLibrary._count
+
+    def counted(self, name, *arguments):
+        gc.collect()
+        taken.append([np.full(len(ends), -1, np.int64) for _ in range(64)])
+        return count(self, name, *arguments)
+
+    monkeypatch.setattr(ColumnLibrary, "_count", counted)
+    found = library.table(data, ends)
+    assert found is not None
+    assert len(found.places) == 300 * len(chunk.table().places)
 
 
 def test_other_records_and_cut_off_ones_are_left_to_the_reader(library):
