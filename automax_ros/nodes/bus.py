@@ -36,6 +36,7 @@ from automax_ros.rack.config import ModuleLoss
 from automax_ros.rack.plants.driven import driven_plants
 from automax_ros.running.health import FROM_STRANGERS
 from automax_ros.wire.bus import BUS, batch_of, image_message, picture_of, standing_of, with_standing, write_message
+from automax_ros.wire.bus_limits import AHEAD_NS, LONGEST_RUN_NS, BusLimits
 from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
 from automax_ros.wire.bus_peers import BEAT_NS, Heard, Peer, Peers
 from automax_ros.wire.cdr import encode
@@ -98,6 +99,7 @@ class RackBus:
             raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
         self._site, self._rack, self._node = site, rack, node
         self.seats = {min(slots): tuple(slots) for slots in seats}
+        self._limits = BusLimits(self.seats)
         self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
         process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         self._watch, self._lead_ns = ProcessWatch(), seating.lead_ns
@@ -163,7 +165,7 @@ class RackBus:
         """Tell the others that this process ends in order."""
         self.link.take_waiting()
         self.stage = Stage.LEAVING
-        self._tell()
+        self._guarded(self._tell)
         self._watch.close()
 
     # what goes out
@@ -278,6 +280,10 @@ class RackBus:
         if peer is None or message.seat != peer.presence.seat:
             self._refuse("bus", "a write of a process that is not of this run")
             return
+        wrong = self._limits.of_write(message, self._latest_ns())
+        if wrong:
+            self._refuse("bus", wrong)
+            return
         peer.got(message.sequence)
         batch = batch_of(message, self._texts)
         self._when_begun(lambda: self.link.receive(batch))
@@ -286,11 +292,21 @@ class RackBus:
         peer = self._peer(message, sender)
         if peer is None or message.asked_by not in (FOR_ALL, self.peers.process):
             return
+        wrong = self._limits.of_image(message, self._latest_ns())
+        if wrong:
+            self._refuse("bus/image", wrong)
+            return
         picture = picture_of(message, self._texts)
         if message.asked_by != FOR_ALL:
             peer.caught_up(message.sequence)
             self._has_image = True
         self._when_begun(lambda: self.link.merge(picture))
+
+    def _latest_ns(self, told_epoch_ns: int = 0) -> int:
+        """Return the latest rack time that another process can tell of."""
+        epoch_ns = self.peers.epoch_ns or told_epoch_ns
+        passed_ns = time.time_ns() - epoch_ns if epoch_ns else LONGEST_RUN_NS
+        return max(self._rack.now_ns, passed_ns) + AHEAD_NS
 
     def _peer(self, message: BusWrite | BusImage, sender: bytes) -> Peer | None:
         """Return the process that a message says it is of; None where that is not of this run, or not its sender."""
@@ -301,6 +317,11 @@ class RackBus:
     def _take_presence(self, presence: Presence, sender: bytes) -> None:
         if self._participants.get(presence.process, sender) != sender:
             self._refuse(PRESENCE, "a word in another process's name")
+            return
+        wall_ns = time.time_ns()
+        wrong = self._limits.of_presence(presence, wall_ns, self._latest_ns(presence.epoch_ns))
+        if wrong and presence.fingerprint == self.peers.fingerprint and presence.process != self.peers.process:
+            self._refuse(PRESENCE, wrong)
             return
         found = self.peers.heard(presence, time.monotonic_ns())
         if found is Heard.OWN:

@@ -53,8 +53,9 @@ class ReplaySource:
     """A task that is executed again.
 
     ``compiled`` is what runs; ``recorded`` is what ran when the recording was made, None if that cannot be told;
-    ``edited`` says whether it runs in place of what ran. ``versions`` are all sources that ran, by their hash: a task may have
-    been reloaded. An edited source runs in place of each of them (decision). ``keeps_locals``: over STOP ALL too.
+    ``edited`` says whether it runs in place of what ran. ``versions`` are all sources that ran, by their hash: a task
+    may have been reloaded. An edited source runs in place of each of them (decision). ``keeps_locals``: over STOP ALL
+    too.
     """
 
     name: str

@@ -107,6 +107,30 @@ def test_what_waits_on_the_bus_is_taken_before_it_counts_as_missing(racks):
     assert two.bus.peers.owing() is None
 
 
+@pytest.mark.parametrize(
+    "forged",
+    [{"seat": 9, "slots": (9,)}, {"standing_seat": 200}, {"standing_ns": (1 << 63) - 1}, {"epoch_ns": -5}],
+    ids=str,
+)
+def test_a_word_that_cannot_be_true_changes_nothing(racks, forged):
+    """A stop later than any other would decide for ever how the rack stands, and no later one could be told."""
+    _, one, two = racks["parts"]
+    word = two.bus.peers.by_seat[1].presence
+    seats = dict(two.bus.peers.by_seat)
+    standing = two.bus.link.standing
+    stop = {"stopped": True, "standing_ns": (1 << 63) - 1, "standing_seat": 1, "process": word.process + 1}
+    two.bus._take_presence(word._replace(**stop | forged), b"a stranger")
+    assert two.bus.link.standing == standing
+    assert two.bus.peers.by_seat == seats
+    one.rack.operations.stop_all("to be told")
+
+    def told() -> bool:
+        racks["executor"].spin_once(timeout_sec=0.01)
+        return two.rack.operations.stopped is not None
+
+    wait(told)
+
+
 def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
     home, one, two = (part.rack for part in racks["parts"])
     told = ask("ReadTasks", "tasks")

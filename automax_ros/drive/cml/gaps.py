@@ -27,7 +27,7 @@ STEP_COUNTS: Final = 12.0
 MEMORY: Final = 18
 """Scans for which the regulator stays slow after a gap (decision: three cycles)."""
 SURGE: Final = 1.4
-"""A scan that brings this times the greatest of the cycle before, and ``SURGE_COUNTS`` more, is no matter of gaps
+"""A scan that brings this times the greatest of the cycle before, and ``SURGE_COUNTS`` more, has another reason
 (decision)."""
 SURGE_COUNTS: Final = 400.0
 

@@ -87,7 +87,7 @@ def test_a_test_alpha_fires_as_in_ideal_execution(tmp_path, model, alpha):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_gates_are_fired_at_delta_whatever_the_scan_takes(tmp_path, model):
-    """Each pair is fired once a cycle, a sixth after the one before, to 1 us."""
+    """Each pair is fired once per cycle, a sixth after the one before, to 1 us."""
     rack = held(tmp_path, model, rpm=1000, alpha=65)
     fired = []
     bridge = rack.plants["MOTOR"].bridge
