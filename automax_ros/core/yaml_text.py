@@ -26,6 +26,8 @@ MAX_NODES = 100_000
 """Most keys and values of a rack file (decision: fewer variables than 16-bit ids can tell apart)."""
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """libyaml parses a megabyte in 0.7 s, PyYAML without it in 12 s."""
+_TOO_DEEP = "maximum nesting depth"
+"""What newer versions of libyaml say of a text that is nested too deep for them."""
 _WHOLE = re.compile(r"-?(0|[1-9][0-9]{0,17})")
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _TRUTH = {"true": True, "false": False}
@@ -173,6 +175,9 @@ class _Reader:
     def _syntax_error(self, error: yaml.MarkedYAMLError) -> None:
         mark = error.problem_mark or error.context_mark
         span = self._places.span(mark.index, mark.index + 1) if mark else Span(1, 1, 2)
+        if _TOO_DEEP in (error.problem or ""):  # its scanner looks ahead of what is read here
+            self._report(Flaw.SIZE, f"nested deeper than {self._depth} levels", span, None)
+            return
         message = quoted(error.problem or "not YAML", marks="", limit=120)
         context = f"{quoted(error.context, marks='', limit=80)}: " if error.context else ""
         self._report(Flaw.SYNTAX, f"{context}{message}", span, self._hint(mark.index if mark else 0))

@@ -35,7 +35,8 @@ _TOLD = QosProfile("reliable", "volatile", "keep_last", 10)
 _HEARD = QosProfile("best_effort", "volatile", "keep_last", 1000)
 """Publishers of ``/clock`` may be of either kind; this many wait while the rack is busy."""
 _MOST_BYTES = 64
-_LATEST_NS = (1 << 31) * NS_PER_S
+_LATEST_NS = ((1 << 31) - 366 * 24 * 3600) * NS_PER_S
+"""The stamps of ROS end in 2038: a clock that leaves a rack less than a year until then is refused (decision)."""
 _WAIT_S = 0.05
 _LOOK_INTERVAL_S = 1.0
 """Time between two looks for other publishers of ``/clock``."""

@@ -198,6 +198,23 @@ def test_same_clock_and_writes_give_the_same_scans_as_simulated_time(made, clien
         live.close()
 
 
+@pytest.mark.parametrize("second", [(1 << 31) - 1, (1 << 31) - 86400])
+def test_a_clock_at_the_end_of_time_is_refused_and_the_rack_goes_on(made, client, second):
+    """No stamp of ROS is later: a rack that took it could never send again."""
+    live = made("-p", "use_sim_time:=true")
+    following = Following(live, client)
+    try:
+        following.begin()
+        following.go_to(NS_PER_S)
+        following.tell(second * NS_PER_S)
+        wait_until(lambda: live.health.counts["malformed /clock"] == 1)
+        following.go_to(2 * NS_PER_S)
+        assert live.rack.now_ns == 2 * NS_PER_S
+        assert live.stream.stamp(live.rack.now_ns) == EPOCH_NS + 2 * NS_PER_S
+    finally:
+        following.end()
+
+
 def test_clock_that_goes_back_or_leaps_is_told_and_rack_time_goes_on(made, client):
     live = made("-p", "use_sim_time:=true")
     following = Following(live, client)

@@ -28,7 +28,7 @@ from automax_ros.nodes.process import RosProcess
 from automax_ros.running.health import Health
 
 TOPICS, CYCLES = [f"t{number}" for number in range(10)], 4
-other, over = Context(), threading.Event()
+other, over, met = Context(), threading.Event(), threading.Event()
 other.init(args=[])
 
 
@@ -36,6 +36,8 @@ def come_and_go() -> None:
     reader = Node("reader", context=other, enable_rosout=False)
     while not over.is_set():
         made = [reader.create_subscription(Int16, topic, print, 10) for topic in TOPICS]
+        while not met.is_set() and not over.wait(0.01):
+            pass
         over.wait(0.01)
         for subscription in made:
             reader.destroy_subscription(subscription)
@@ -46,7 +48,7 @@ comes.start()
 process, health = RosProcess(), Health()
 process.spin(Guard(health, print))
 for cycle in range(CYCLES):
-    met = threading.Event()
+    met.clear()
     with process.resting():
         node = Node("sender", context=process.context, enable_rosout=False)
         for topic in TOPICS:
