@@ -191,7 +191,8 @@ class Replay:
                 raise BagError("AMX6832", self.bag, what, "see `automax bag info`, or choose another range")
         if nothing:
             notes = "; ".join(f"{task.name}: {note}" for task in report.tasks for note in task.notes)
-            what = f"no scan of {', '.join(names)[:80]} can be executed again"
+            whose = f"no scan of {', '.join(names)[:80]}" if names else "it has no tasks, so no scan"
+            what = f"{whose} can be executed again"
             raise BagError("AMX6832", self.bag, f"{what}{f' ({notes})' if notes else ''}", "see `automax bag info`")
 
 
