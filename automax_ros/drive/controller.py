@@ -13,6 +13,7 @@ from typing import Final
 from automax_ros.drive.ac_line import Rotation
 from automax_ros.drive.cml.signals import (
     LATE_BIT,
+    LATEST_US,
     LINE,
     OVERCURRENT,
     RATED,
@@ -115,7 +116,7 @@ class DriveController:
             now_ns: the present where it is later, ns.
         """
         now_ns = max(now_ns, interrupt_ns)
-        self.late_us = (now_ns - interrupt_ns) // 1000
+        self.late_us = min(LATEST_US, (now_ns - interrupt_ns) // 1000)
         plant = self.plant
         if plant is None:
             return

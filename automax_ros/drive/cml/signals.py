@@ -32,6 +32,9 @@ LATE_BIT: Final = 16
 """From this bit of ``Measured.status`` on stands how long after its interrupt the last command came, us: the time that
 a scan computes, 0 in ideal execution."""
 
+LATEST_US: Final = 16_383
+"""Most of it that is told, us: the whole stays a number of 31 bits, and a command never comes so late in order."""
+
 RATED: Final = 100_000
 """The rated armature current in the units of ``Measured.current`` (thousandths of a percent)."""
 

@@ -6,6 +6,8 @@ from itertools import pairwise, product
 
 import pytest
 
+from automax_ros.drive.cml.signals import LATE_BIT, LATEST_US, OVERCURRENT, Command, late_us
+from automax_ros.drive.controller import DriveController
 from rack.modules.modeled_drives import follow, held
 
 MODELS = ("57C430A", "57C431", "57C435")
@@ -100,3 +102,12 @@ def test_gates_are_fired_at_delta_whatever_the_scan_takes(tmp_path, model):
     fired = sorted(set(fired))
     assert len(fired) == pytest.approx(0.06 * 360, abs=1)
     assert [late - early for early, late in pairwise(fired)] == pytest.approx([2_777_778] * (len(fired) - 1), abs=1000)
+
+
+def test_how_late_a_command_came_stays_a_number_that_a_record_keeps():
+    controller = DriveController(None)
+    for late_ns, told in ((0, 0), (1_900_000, 1900), (10**12, LATEST_US)):
+        controller.command(Command(2_777_778), 5, 5 + late_ns)
+        assert controller.late_us == told
+        assert late_us(told << LATE_BIT | OVERCURRENT) == told
+        assert told << LATE_BIT < 1 << 31
