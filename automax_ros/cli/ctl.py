@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
-    from automax_ros.nodes.operating import RackClient
+    from automax_ros.nodes.operating import ALONE_NS, RackClient
 
     action = ACTIONS[arguments.action]
     ros = ros_arguments(arguments)
@@ -69,7 +69,7 @@ def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
     asks = action.asks(arguments)
     with RackClient(space, ros, lambda: stop.requested) as client:
         if action.by_operator:
-            client.find(arguments.timeout)
+            client.find(arguments.timeout, 0 if action.read is not None else ALONE_NS)
         if action.repeats:
             return _watched(client, asks[0], arguments, stop)
         answers = [(ask, _answer(client, ask, arguments.timeout)) for ask in asks]

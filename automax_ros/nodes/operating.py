@@ -20,6 +20,9 @@ from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 _LOOK_S = 0.05
 _SETTLED_NS = 2 * NS_PER_S
 """A rack whose nodes have been seen for so long without its operator has none (decision)."""
+ALONE_NS = NS_PER_S
+"""A rack that is to be operated must be the only one of its name for so long (decision): programs of a host answer one
+that joins at once, but not in the same moment."""
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _HOME, _OPERATOR = "common_memory", "operator"
 
@@ -70,14 +73,15 @@ class RackClient:
         self._node.destroy_node()
         self._context.try_shutdown()
 
-    def find(self, wait_ns: int) -> None:
-        """Wait until the rack is seen with its operator.
+    def find(self, wait_ns: int, alone_ns: int = 0) -> None:
+        """Wait until the rack is seen with its operator, and no other of its name for ``alone_ns`` from then on.
 
         Raises:
             NotOperable: no such rack within the time, one without an operator, or several of the name.
         """
         deadline = time.monotonic_ns() + wait_ns
         seen: int | None = None
+        met: int | None = None
         while True:
             now = time.monotonic_ns()
             racks, operators = self._racks(), self._nodes(_OPERATOR)
@@ -88,11 +92,13 @@ class RackClient:
                 hint = "stop one of them, or give one another ROS_DOMAIN_ID"
                 raise NotOperable(f"{max(racks, operators)} racks are called {self._space}", hint)
             if operators:
-                return
-            if (seen is not None and now - seen > _SETTLED_NS) or (racks and now > deadline):
+                met = met or now
+                if now - met >= alone_ns:
+                    return
+            elif (seen is not None and now - seen > _SETTLED_NS) or (racks and now > deadline):
                 hint = "say `operator: true` in its YAML file and start it again"
                 raise NotOperable(f"rack {self._space} has no operator's services", hint)
-            if now > deadline:
+            elif now > deadline:
                 raise self._absent(wait_ns)
             self._go_on()
             time.sleep(_LOOK_S)

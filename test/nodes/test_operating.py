@@ -36,6 +36,19 @@ def test_a_rack_that_cannot_be_operated_is_named_with_the_reason(ros_domain_id, 
     assert refused.value.hint
 
 
+def test_a_second_rack_of_the_name_that_is_seen_later_is_not_operated_either(ros_domain_id, monkeypatch):
+    from automax_ros.nodes.operating import ALONE_NS, NotOperable, RackClient
+
+    Graph(monkeypatch, 1, 1)
+    looks = iter([1, 1, 1])
+    monkeypatch.setattr(RackClient, "_racks", lambda _: next(looks, 2))
+    with RackClient("/pm1") as client:
+        with pytest.raises(NotOperable, match="2 racks are called /pm1"):
+            client.find(100 * NS_PER_MS, ALONE_NS)
+        looks = iter([1, 1, 1])
+        client.find(100 * NS_PER_MS)  # who only reads does not wait
+
+
 def test_a_service_that_does_not_answer_is_an_error_and_not_a_wait(ros_domain_id, monkeypatch):
     from std_srvs.srv import Trigger
 
