@@ -91,7 +91,7 @@ class NativeCache:
         place = self._place()
         with _opened(place) as folder:
             try:
-                self._write(folder, name, content + hashlib.sha256(content).digest())
+                self._write(folder, name, content + _digest(name, content))
                 self._make_room(folder, name)
             except OSError as error:
                 raise NotNative(_unusable(place, error.strerror or str(error))) from error
@@ -194,7 +194,7 @@ def _content(path: Path) -> bytes | None:
             raise NotNative(_unusable(path, error.strerror or str(error))) from error
         try:
             _require_own(os.fstat(file), path, stat.S_ISREG)
-            content = _undamaged(file)
+            content = _undamaged(file, path.name)
             if content is not None:
                 with contextlib.suppress(OSError):
                     os.utime(file)
@@ -203,11 +203,16 @@ def _content(path: Path) -> bytes | None:
             os.close(file)
 
 
-def _undamaged(file: int) -> bytes | None:
+def _digest(name: str, content: bytes) -> bytes:
+    """Return the digest of a file of the cache: its name counts, or one could stand in for another."""
+    return hashlib.sha256(name.encode() + b"\0" + content).digest()
+
+
+def _undamaged(file: int, name: str) -> bytes | None:
     with os.fdopen(os.dup(file), "rb") as stream:
         stored = stream.read()
     content = stored[:-_DIGEST]
-    return content if hashlib.sha256(content).digest() == stored[-_DIGEST:] else None
+    return content if _digest(name, content) == stored[-_DIGEST:] else None
 
 
 def _unusable(path: Path, why: str) -> str:

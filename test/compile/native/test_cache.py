@@ -24,6 +24,14 @@ def test_what_is_stored_is_found(cache):
     assert cache.found(OTHER) is None
 
 
+def test_one_that_stands_under_the_name_of_another_is_not_loaded(cache):
+    one, other = cache.store(KEY, b"one library"), cache.store(OTHER, b"another")
+    first, second = one.read_bytes(), other.read_bytes()
+    one.write_bytes(second)
+    other.write_bytes(first)
+    assert (cache.found(KEY), cache.found(OTHER)) == (None, None)
+
+
 def test_only_the_user_can_read_and_write_it(cache):
     path = cache.store(KEY, b"library")
     assert path.stat().st_mode & 0o777 == 0o600
