@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from automax_ros.compile.cost import MOST_SHARED_TICKS
@@ -18,16 +18,20 @@ from automax_ros.rack.tasks_check import CheckedTask
 
 TABLES_SINCE = 34
 """Version of the Executive, in tenths, from which on tables 4 to 6 hold (53.1)."""
-_WHOLE = 100.0
+_WHOLE, _HALF = 100.0, 50.0
 
 
 @dataclass(frozen=True)
 class TaskLoad:
-    """The time of a task's scans; ``period_ns`` is None for a task that has none, and then it has no share."""
+    """The time of a task's scans; ``period_ns`` is None for a task that has none, and then it has no share.
+
+    ``fires``: it has a current minor loop, and its period is a sixth of a line cycle.
+    """
 
     task: str
     times: ScanTimes
     period_ns: int | None
+    fires: bool = False
 
     @property
     def percent(self) -> float | None:
@@ -65,7 +69,7 @@ def loads_of(config: RackConfig, checked: Iterable[CheckedTask]) -> list[ModuleL
 def _load_of(module: ModuleConfig, programs: Mapping[str, Program | None]) -> ModuleLoad:
     model = cost_model(module)
     tasks = tuple(
-        TaskLoad(task.name, scan_times(program, model), period_ns(program))
+        TaskLoad(task.name, scan_times(program, model), period_ns(program), program.cml is not None)
         for task in module.tasks
         if (program := programs[task.name]) is not None
     )
@@ -74,7 +78,20 @@ def _load_of(module: ModuleConfig, programs: Mapping[str, Program | None]) -> Mo
 
 def faults(config: RackConfig, loads: Iterable[ModuleLoad]) -> list[Diagnostic]:
     """Return what is wrong with the loads of a rack, each at the place of its module in the rack file."""
-    return [*_old_executive(config), *(found for load in loads for found in _overload(load))]
+    known = list(loads)
+    late = (found for load in known for found in _late_loops(load))
+    return [*_old_executive(config), *(found for load in known for found in _overload(load)), *late]
+
+
+def _late_loops(load: ModuleLoad) -> Iterator[Diagnostic]:
+    """Tell of current minor loops whose command comes in the second half of a sixth of a line cycle."""
+    for task in load.tasks:
+        if task.fires and task.percent is not None and task.percent > _HALF:
+            took, sixth = task.times.most_ns / NS_PER_US, (task.period_ns or 0) / NS_PER_US
+            due = f"half of a sixth of a line cycle ({sixth:.0f} us)"
+            message = f"{task.task} takes {took:.0f} us on {load.word}, more than {due}"
+            hint = "its DELTA counts one scan later: let another task do what it can, or take a faster Processor"
+            yield Diagnostic("AMX6774", message, Span(load.module.line, 1, 2), hint=hint)
 
 
 def _old_executive(config: RackConfig) -> list[Diagnostic]:

@@ -116,6 +116,18 @@ def test_more_than_all_of_the_time_is_warned_of(automax, plant):
     assert f"rack.yaml:9:1: warning[AMX6770]: the tasks of processor_2 take {percent:.2f} % of its time" in result.err
 
 
+@pytest.mark.parametrize(("model", "warned"), [("57C430A", True), ("57C431", True), ("57C435", False)])
+def test_a_current_minor_loop_that_takes_more_than_half_of_a_sixth_is_warned_of(automax, tmp_path, model, warned):
+    example = Path(__file__).parents[2] / "config" / "dc_drive"
+    for file in example.glob("*.B*"):
+        (tmp_path / file.name).write_text(file.read_text())
+    (tmp_path / "rack.yaml").write_text((example / "rack.yaml").read_text().replace("57C435", model))
+    result = automax("load", tmp_path)
+    assert result.code == 0
+    assert ("warning[AMX6774]: CML takes " in result.err) == warned
+    assert ("more than half of a sixth of a line cycle (2778 us)" in result.err) == warned
+
+
 @pytest.mark.parametrize(("version", "warned"), [("3.3", True), ("3.4", False), ("4.2", False)])
 def test_an_executive_older_than_the_tables(automax, plant, version, warned):
     result = automax("load", plant(f"executive: {version}\n"))

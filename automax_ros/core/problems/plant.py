@@ -9,6 +9,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6770", "tasks take more than all of a module's time", Severity.WARNING, hardware="14"),
     Problem("AMX6771", "tasks of a UDC fit in no TICKS", hardware="14"),
     Problem("AMX6773", "PC3000 that is not alone"),
+    Problem("AMX6774", "current minor loop that takes more than half of a sixth of a line cycle", Severity.WARNING),
     Problem("AMX6772", "Executive older than the tables of execution times", Severity.WARNING),
     # `automax import`: configuration tasks
     Problem("AMX6780", "statement that no configuration task has"),
