@@ -17,7 +17,9 @@ def test_operator_runs_the_section(ros_domain_id, tmp_path):
     bag = tmp_path / "bag"
     with Automax("run", CONFIG, "--record", bag) as process, Client() as client:
         process.wait_for_line("Ctrl-C ends the run")
-        assert client.first(Int16, "/pm1/common/LINE_SPEED_SP").data == 1500
+        # Who joins before the start sees what is installed first, then the preset.
+        wanted = client.listen(Int16, "/pm1/common/LINE_SPEED_SP", latched=True, depth=1)
+        client.until(lambda: bool(wanted) and wanted[-1].data == 1500, "the preset of the set-point")
         speed = client.listen(Int16, "/pm1/common/SPEED_FDBK", latched=True, depth=1)
         running = client.listen(Bool, "/pm1/common/RUN", latched=True, depth=1)
         client.until(lambda: bool(speed and running) and running[-1].data and speed[-1].data > 100, "the roll turns")
