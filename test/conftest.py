@@ -1,15 +1,13 @@
 """What all tests share: a ROS 2 environment that stays on this machine, and a domain of its own for each test."""
 
-import fcntl
 import itertools
 import os
 import signal
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from ros_domains import free_domain
 
 from automax_ros.nodes.environment import put_prefix_first
 
@@ -22,11 +20,6 @@ put_prefix_first()
 # A shell that starts the tests in the background lets them ignore Ctrl-C; programs that they start would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-
-# Fast DDS derives UDP ports from the domain; above 101 they run into Linux's ephemeral ports.
-DOMAINS = 101
-LOCKS = Path(tempfile.gettempdir()) / f"automax_ros_domains_{os.getuid()}"
-turns = itertools.count()
 
 
 @pytest.hookimpl(trylast=True)  # after those that leave tests out
@@ -44,25 +37,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     others = [path for path in longest_first if path.parent.name != "system"]
     order = itertools.chain.from_iterable(itertools.zip_longest(racks, others))
     items[:] = [item for path in order if path is not None for item in files[path]]
-
-
-@contextmanager
-def free_domain() -> Iterator[int]:
-    """A ROS domain (1 to 101) that no other test on this machine uses while the block lasts.
-
-    A lock file guards it, so pytest processes side by side do not hear each other.
-    """
-    LOCKS.mkdir(exist_ok=True)
-    start = os.getpid() * 7 + next(turns)
-    for domain in (1 + (start + offset) % DOMAINS for offset in range(DOMAINS)):
-        with (LOCKS / str(domain)).open("w") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            yield domain
-            return
-    pytest.fail("all ROS domains are taken by other tests")
 
 
 @pytest.fixture(autouse=True)

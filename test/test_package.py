@@ -340,7 +340,7 @@ def test_message_crosses_to_another_process(ros_domain_id):
         try:
             while not received and publisher.poll() is None:
                 executor.spin_once(timeout_sec=0.1)
-            publisher.communicate("done\n", timeout=30)
+            publisher.communicate("done\n", timeout=240)
         finally:
             publisher.kill()
             executor.shutdown()
@@ -377,7 +377,7 @@ def test_prepare_keeps_the_program_in_a_shell_with_another_ros(tmp_path, trouble
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=variables, cwd=ROOT
     ) as process:
-        output, _ = process.communicate("typed", timeout=60)
+        output, _ = process.communicate("typed", timeout=240)
     first, second = output.splitlines()
     assert first == f"['one', 'two words'] typed {process.pid}"
     assert Path(second).is_relative_to(sys.prefix)

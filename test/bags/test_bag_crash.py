@@ -146,7 +146,7 @@ def test_a_live_rack_killed(tmp_path: Path) -> None:
 def test_full_disk(tmp_path: Path, options: list[str], limit: int) -> None:
     """A file may not grow beyond a limit: the system answers as a full disk does."""
     process = started(tmp_path, "--simulated", "--duration", "12", *options, limit=limit)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=240)
     assert process.returncode == 1
     assert err.count("AMX6801") == 1
     assert "File too large" in err

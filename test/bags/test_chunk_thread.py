@@ -60,7 +60,7 @@ def test_others_may_wait_too() -> None:
         other.start()
     gate.set()
     for other in others:
-        other.join(10)
+        other.join(240)
     assert len(waited) == 3
     thread.end()
 
@@ -103,7 +103,7 @@ def test_the_thread_ends_with_its_object_and_with_the_writer(tmp_path: Path) -> 
         channel = writer.channel("/a", INT16, VALUE)
         for number in range(4):
             writer.write(channel, number * HALF, encode(Int16(number)))
-    end = time.monotonic() + 30
+    end = time.monotonic() + 240
     while recording_threads() > before:
         assert time.monotonic() < end
         time.sleep(0.01)

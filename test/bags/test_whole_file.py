@@ -99,7 +99,7 @@ def test_a_pipe_is_written_itself(tmp_path: Path, bag: Path) -> None:
     reader = threading.Thread(target=lambda: read.append(pipe.read_text()), daemon=True)
     reader.start()
     write_csv(CommonTable(bag), pipe)
-    reader.join(20)
+    reader.join(240)
     assert read == [(tmp_path / "OUT.csv").read_text()]
     assert pipe.is_fifo()
     write_csv(CommonTable(bag), Path("/dev/null"))
@@ -111,7 +111,7 @@ def test_standard_output_is_written_even_where_it_is_a_file(tmp_path: Path, bag:
     write_csv(CommonTable(bag), tmp_path / "OUT.csv")
     with (tmp_path / "log").open("wb") as stdout:
         command = [sys.executable, "-m", "automax_ros.cli.main", "export", str(bag), "-o", "/dev/stdout"]
-        subprocess.run(command, stdout=stdout, check=True, timeout=60)
+        subprocess.run(command, stdout=stdout, check=True, timeout=240)
         assert os.fstat(stdout.fileno()).st_ino == (tmp_path / "log").stat().st_ino
     assert (tmp_path / "log").read_text() == (tmp_path / "OUT.csv").read_text()
 
@@ -138,13 +138,13 @@ def test_a_signal_takes_the_half_file_away(tmp_path: Path, bag: Path, number: si
     command = [sys.executable, "-c", f"{heard}\n{ENDLESS}", "export", str(bag), "-o", str(tmp_path / "OUT.csv")]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     try:
-        end = time.monotonic() + 60
+        end = time.monotonic() + 240
         while not any(path.stat().st_size for path in tmp_path.iterdir()) and time.monotonic() < end:
             time.sleep(0.02)
         assert list(tmp_path.iterdir())
         assert not (tmp_path / "OUT.csv").exists()
         process.send_signal(number)
-        assert (process.wait(60), list(tmp_path.iterdir())) == (code, [])
+        assert (process.wait(240), list(tmp_path.iterdir())) == (code, [])
     finally:
         process.kill()
         process.communicate()

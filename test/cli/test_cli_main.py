@@ -101,14 +101,14 @@ def test_output_that_nobody_reads_any_more_is_no_error(tmp_path):
     os.close(reading)
     with started("compile", str(path), stdout=writing) as process:
         os.close(writing)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=240)
     assert (process.returncode, err) == (BROKEN_PIPE, "")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's /dev/full")
 def test_full_disk_is_told_without_a_traceback(tmp_path):
     with Path("/dev/full").open("w") as full, started("blocks", stdout=full) as process:
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=240)
     assert process.returncode == 2
     assert err == f"automax: error: the output cannot be written: {os.strerror(errno.ENOSPC)}\n"
 
@@ -153,7 +153,7 @@ def test_interrupt_while_imports_last_is_silent(tmp_path):
     )
     for module in ("argparse", "automax_ros.cli.usage", "automax_ros.cli.check", "automax_ros.blocks.catalogue"):
         with started(module, code=code) as process:
-            out, err = process.communicate(timeout=60)
+            out, err = process.communicate(timeout=240)
         assert (process.returncode, out, err) == (INTERRUPTED, "", ""), module
 
 
@@ -165,7 +165,7 @@ def test_interrupt_after_the_end_leaves_the_exit_code(tmp_path):
         "entry()"
     )
     with started("--version", code=code) as process:
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=240)
     assert (process.returncode, err) == (0, "")
 
 
@@ -176,7 +176,7 @@ def test_terminal_without_a_character_does_not_stop_the_program(tmp_path):
         "import sys; sys.stdout.reconfigure(encoding='ascii'); from automax_ros.cli.main import main; sys.exit(main())"
     )
     with started("check", str(path), code=code) as process:
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=240)
     assert process.returncode == 1
     assert "Gr\\xfc\\xdfe" in out
     assert err == ""
@@ -198,7 +198,7 @@ def test_check_starts_with_what_it_needs_only(tmp_path):
         "import sys; from automax_ros.cli.main import main; main(['check', sys.argv[1]]); print(*sorted(sys.modules))"
     )
     with started(str(path), code=code) as process:
-        out, _ = process.communicate(timeout=60)
+        out, _ = process.communicate(timeout=240)
     loaded = set(out.split())
     assert "automax_ros.language.checks.checker" in loaded
     heavy = {"numpy", "mcap", "rich", "rclpy", "yaml", "automax_ros.compile.compiler", "automax_ros.cli.trace"}

@@ -39,7 +39,7 @@ def shell(automax, command: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "A": f"{sys.executable} -m automax_ros.cli.main"}
     command = ["bash", "-c", command]
     return subprocess.run(
-        command, cwd=automax.folder, env=environment, capture_output=True, text=True, timeout=25, check=False
+        command, cwd=automax.folder, env=environment, capture_output=True, text=True, timeout=240, check=False
     )
 
 

@@ -20,7 +20,7 @@ def shell(name: str, program: str, *arguments: str) -> list[str]:
     path = shutil.which(name)
     if path is None:
         pytest.skip(f"{name} is not installed")
-    result = subprocess.run([path, *arguments, "-c", program], capture_output=True, text=True, timeout=30, check=False)
+    result = subprocess.run([path, *arguments, "-c", program], capture_output=True, text=True, timeout=240, check=False)
     assert (result.returncode, result.stderr) == (0, "")
     return result.stdout.split("\n")
 

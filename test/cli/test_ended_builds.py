@@ -74,7 +74,7 @@ def test_a_signal_ends_the_compilers_too(folder, tmp_path, command, number, code
     try:
         begun = int((tmp_path / "begun").read_text().split()[0])  # blocks until a compiler has begun
         process.send_signal(number)
-        _, err = process.communicate(timeout=60)  # a compiler has 120 s
+        _, err = process.communicate(timeout=110)  # a compiler has 120 s: it is not waited for
     finally:
         process.kill()
     told = "automax run: ended before its first scan; nothing was recorded or reported\n" if command is RUN else ""

@@ -18,7 +18,7 @@ from automax_ros.cli.seat_talk import Reported, Said, ToldScreen, heard, tell_re
 from automax_ros.cli.status_parts import Progress, Summary, merged_progress, merged_summary
 from automax_ros.cli.supervisor import Post, Supervisor
 
-PATIENCE_S = 30.0
+PATIENCE_S = 240.0
 REPORT = 'print(json.dumps({"report": {"ok": True}}), flush=True)'
 BEGINS = 'print(json.dumps({"progress": {"now_ns": 1}}), flush=True)\n'
 WAITS = """

@@ -16,7 +16,7 @@ import yaml
 
 from automax_ros.nodes import prepare
 
-PATIENCE_S = 60.0
+PATIENCE_S = 240.0
 
 
 def main() -> None:

@@ -120,7 +120,7 @@ def test_program_knows_its_source() -> None:
 
 
 def test_hostile_texts_are_checked_quickly() -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     names = ", ".join(f"V{number}%" for number in range(300))
     declarations = [f"{10 + index} LOCAL {names.replace('V', f'V{index}X')}" for index in range(60)]
     jumps = ",".join(str(20000 + number) for number in range(1000))
@@ -129,4 +129,4 @@ def test_hostile_texts_are_checked_quickly() -> None:
     check_text("\n".join([*declarations, f"900 {LOOP}", *body, *uses, "30000 END"]))
     nested = "(" * 60 + "A%" + ")" * 60
     check_text(task(f"A% = {nested}", f"A% = {'T%(' * 60}1{')' * 60}", f"A% = {'1/(' * 60}1{')' * 60}"))
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0

@@ -149,9 +149,9 @@ def test_much_soup_of_tokens(tokens: list[str], between: str) -> None:
 @pytest.mark.soak
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_texts_of_full_size_take_seconds(name: str) -> None:
-    begin = time.monotonic()
+    begin = time.process_time()
     parse(SourceText("TASK.BLK", HOSTILE[name][:SOURCE_LIMIT]))
-    assert time.monotonic() - begin < 60
+    assert time.process_time() - begin < 60
 
 
 @pytest.mark.parametrize("name", HOSTILE)

@@ -4,7 +4,8 @@ import time
 
 from automax_ros.core.ticks import NS_PER_S
 
-PATIENCE_NS = 60 * NS_PER_S
+PATIENCE_NS = 240 * NS_PER_S
+"""After this time a test gives up (``system.support.PATIENCE_S``)."""
 
 
 def until(live, client, condition):

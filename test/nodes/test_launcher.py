@@ -7,12 +7,12 @@ from itertools import pairwise
 import pytest
 from system.support import TYPES, Client
 
-from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.nodes import executor as executor_module
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 
-PATIENCE_NS = 60 * NS_PER_S
+from .support import PATIENCE_NS
 
 
 class Observer:

@@ -13,7 +13,8 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.rack import Rack
 from automax_ros.wire.rack_files import files_of
 
-PATIENCE_NS = 30 * NS_PER_S
+from .support import PATIENCE_NS
+
 RUN_ID = 77
 
 

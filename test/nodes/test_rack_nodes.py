@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from system.support import RACKS, TYPES, wait_until
+from system.support import PATIENCE_S, RACKS, TYPES, wait_until
 
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText
@@ -38,8 +38,8 @@ def nodes(context):
         yield made
 
 
-def spin_until(executor, condition, seconds=60.0):
-    deadline = time.monotonic() + seconds
+def spin_until(executor, condition):
+    deadline = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < deadline, "it never came true"
         executor.spin_once(timeout_sec=0.05)
@@ -77,9 +77,15 @@ def test_scans_go_on_while_a_callback_of_the_users_takes_long(context, nodes):
     nodes.add_to(executor)
     nodes.start()
     wait_until(lambda: nodes.rack.statistics["FAST"].scans > 0)
+    slow = threading.Event()
+    executor.create_task(slow.wait, PATIENCE_S)
+    spinning = threading.Thread(target=executor.spin_once)
+    spinning.start()
     before = nodes.rack.statistics["FAST"].scans
-    time.sleep(0.5)
-    assert nodes.rack.statistics["FAST"].scans > before + 20
+    wait_until(lambda: nodes.rack.statistics["FAST"].scans > before + 20)
+    assert spinning.is_alive(), "the callback goes on all the while"
+    slow.set()
+    spinning.join()
     executor.shutdown()
 
 
@@ -264,7 +270,7 @@ def test_what_is_done_under_the_lock_happens_in_the_present(context):
         nodes.start(paced=False)
         nodes.run(20 * NS_PER_MS)
         nodes.rack.operations.stop_tasks()
-        time.sleep(0.05)
+        time.sleep(0.05)  # rack time has to pass, and nothing happens in it
         with nodes.lock:
             assert nodes.rack.now_ns >= 70 * NS_PER_MS
         assert nodes.health.counts["failed callback"] == 0, "without an executor there is nothing to spin"
@@ -283,7 +289,7 @@ def test_a_rack_scans_while_a_new_source_is_compiled(context, executor, monkeypa
 
     def slow(*given):
         compiling.set()
-        assert go_on.wait(20), "nothing goes on"
+        assert go_on.wait(PATIENCE_S), "nothing goes on"
         return compile_program(*given)
 
     user = Node("user", context=context)
@@ -299,7 +305,7 @@ def test_a_rack_scans_while_a_new_source_is_compiled(context, executor, monkeypa
         first = client.call_async(Reload.Request(task="LINE", source=(folder / "LINE.BLK").read_text()))
         spin_until(executor, compiling.is_set)
         before = nodes.rack.statistics["SPEED"].scans
-        spin_until(executor, lambda: nodes.rack.statistics["SPEED"].scans > before + 10, 10)
+        spin_until(executor, lambda: nodes.rack.statistics["SPEED"].scans > before + 10)
         second = client.call_async(Reload.Request(task="LINE", source=source))
         spin_until(executor, second.done)
         assert not second.result().ok

@@ -4,9 +4,8 @@ import time
 from pathlib import Path
 
 import pytest
-from system.support import TYPES
+from system.support import TYPES, wait_until
 
-from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 
@@ -109,7 +108,7 @@ def test_callback_that_fails_does_not_end_the_loop(live, client, monkeypatch):
     assert_told(live)
 
 
-def test_failure_before_our_callback_is_reached_does_not_end_the_loop(live, monkeypatch):
+def test_failure_before_our_callback_is_reached_does_not_end_the_loop(live, client, monkeypatch):
     """Such as a string that is not UTF-8, on which rclpy itself fails."""
 
     class Failing:
@@ -118,8 +117,10 @@ def test_failure_before_our_callback_is_reached_does_not_end_the_loop(live, monk
             raise RuntimeError("unheard of")
 
     monkeypatch.setattr(live._process, "executor", Failing())
-    live.run(live.rack.now_ns + NS_PER_S // 5, lambda _: None)
+    wait_until(lambda: live.health.counts["failed callback"] >= 3)
     monkeypatch.undo()
+    scans = live.rack.statistics["FAST"].scans
+    until(live, client, lambda: live.rack.statistics["FAST"].scans > scans)
     assert_told(live)
 
 

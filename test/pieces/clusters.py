@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 TEST = Path(__file__).parent.parent
-PATIENCE_S = 60
+PATIENCE_S = 240
 
 SCHEDULER = """
 import asyncio, sys

@@ -14,7 +14,7 @@ from automax_ros.pieces.piece import MOST_TRIES, usable_cores
 from pieces import works
 
 ROOT = Path(__file__).parent.parent.parent
-PATIENCE_S = 60
+PATIENCE_S = 240
 
 
 def squares(count):

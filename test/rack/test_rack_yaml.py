@@ -197,9 +197,9 @@ SLOW = {"same slot", "many tasks", "unknown keys", "anchors", "many keys"}
 )
 def test_hostile_files_end_in_seconds_with_few_diagnostics(folder, name):
     text = HOSTILE[name][:MAX_BYTES]
-    began = time.monotonic()
+    began = time.process_time()
     assert len(survives(folder, text).diagnostics) <= 2 * MAX_FINDINGS
-    assert time.monotonic() - began < 60
+    assert time.process_time() - began < 60
 
 
 def test_file_of_exactly_the_largest_size_is_read(tmp_path):

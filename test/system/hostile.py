@@ -27,7 +27,7 @@ def publisher(node, type_name, name, topic=None):
     import std_msgs.msg
 
     made = node.create_publisher(getattr(std_msgs.msg, type_name), topic or f"{SET}/{name}/set", 10)
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 240.0
     while not made.get_subscription_count():
         assert time.monotonic() < deadline, "no rack"
         time.sleep(0.02)
@@ -101,7 +101,7 @@ def requests(node, context):
     answers = []
     for parameters in wanted:
         future = asking.call_async(SetParameters.Request(parameters=parameters))
-        executor.spin_until_future_complete(future, timeout_sec=30.0)
+        executor.spin_until_future_complete(future, timeout_sec=240.0)
         answers.append(future.result().results[0])
     assert not any(answer.successful for answer in answers), answers
     for _ in range(2000):

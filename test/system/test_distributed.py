@@ -21,7 +21,7 @@ from automax_ros.wire.cdr import decode
 from automax_ros.wire.messages import NAMES, Scan
 
 from .distributed import RINGS, SEATS, Distributed, Line, copied
-from .support import TYPES, Automax, automax, automax_here, wait_until
+from .support import PATIENCE_S, TYPES, Automax, automax, automax_here, wait_until
 
 TASKS = {"CML", "RING_1", "RING_2", "RING_3", "RING_4", "SPEED", "WIND_A"}
 STOP = "- {at: 3.0, stop: [CML, RING_1, RING_2, RING_3, RING_4, SPEED, WIND_A]}\n"
@@ -154,7 +154,7 @@ def test_processes_end_with_whoever_started_them(ros_domain_id, tmp_path):
 def test_seven_processes_scan_for_a_minute(ros_domain_id, tmp_path):
     """What part of their scans they skip is printed: a machine's cores decide it (bench/distributed.py)."""
     with Distributed(copied(tmp_path), "--duration", "60") as run:
-        run.process.wait(180)
+        run.process.wait(60 + PATIENCE_S)
         assert run.end().code == 0
     tasks = run.report["tasks"].values()
     skipped, done = (sum(task[key] for task in tasks) for key in ("skipped", "scans"))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from .support import TYPES, Automax, Client
+from .support import PATIENCE_S, TYPES, Automax, Client
 
 READY = "Ctrl-C ends the run"
 HOSTILE = Path(__file__).with_name("hostile.py")
@@ -72,7 +72,12 @@ def resident_mb(pid):
 
 def attack(kind):
     ended = subprocess.run(
-        [sys.executable, HOSTILE, kind], env=dict(os.environ), capture_output=True, text=True, timeout=90, check=False
+        [sys.executable, HOSTILE, kind],
+        env=dict(os.environ),
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
     )
     assert ended.stdout.startswith("sent "), ended.stderr[-2000:]
 

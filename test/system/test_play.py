@@ -77,7 +77,8 @@ def test_subscriber_gets_what_was_recorded(ros_domain_id, bag):
         resume(client)
         client.until(lambda: player.process.poll() is not None, "the end of the playback")
         took = time.monotonic() - began
-        client.spin(0.2)
+        client.until(lambda: len(writes) >= 454 and bool(values) and values[-1].data == 453, "the last messages")
+        client.until(lambda: bool(clocks) and ns(clocks[-1].clock) == SPAN_NS + 2, "the last time")
         ended = player.end()
     assert (ended.code, ended.err) == (0, "")
     print(ended.out)

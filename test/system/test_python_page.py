@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from .support import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.S)
@@ -28,7 +28,7 @@ def ran(program: str, domain: int, may_say: re.Pattern[str] | None = None) -> st
         text=True,
         cwd=ROOT,
         env=environment,
-        timeout=100,
+        timeout=PATIENCE_S,
         check=False,
     )
     said = result.stderr if may_say is None else may_say.sub("", result.stderr, count=1)
@@ -52,14 +52,12 @@ def test_a_rack_in_real_time_without_ros(ros_domain_id):
     assert ran(program, ros_domain_id).split()[1:] == ["500000000", "False"]
 
 
-@pytest.mark.timeout(110)
 def test_a_rack_in_a_process_and_executor_of_its_user(ros_domain_id):
     seen = json.loads(ran(IN_ROS, ros_domain_id))
     assert len(seen) == 20
     assert seen == sorted(seen), "the ramp of the line goes up"
 
 
-@pytest.mark.timeout(110)
 def test_two_racks_in_one_process_and_an_executor_with_threads(ros_domain_id):
     """What the winder knows of the line came over their network; the executor's thread has ended."""
     assert int(ran(TWO_RACKS, ros_domain_id, LEAVES)) > 10

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from automax_ros.compile import native
 
-PATIENCE_S = 60.0
+PATIENCE_S = 240.0
 
 ABI = (Path(native.__file__).parent / "abi.h").read_text(encoding="utf-8")
 
