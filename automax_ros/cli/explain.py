@@ -11,8 +11,8 @@ import sys
 from importlib import resources
 
 from automax_ros.cli.terminal import painted, wants_colour
-from automax_ros.cli.visible import write_control
 from automax_ros.cli.usage import UsageError
+from automax_ros.cli.visible import write_control
 from automax_ros.core.problems import PROBLEMS, Problem
 from automax_ros.core.text import quoted
 

@@ -196,6 +196,8 @@ def parsers(
     found: dict[str, argparse.ArgumentParser] = {}
     for name, text in SUBCOMMANDS.items():
         own = modules.get(name)
+        if modules and own is None:
+            continue  # a parser takes time, and nobody will ask for it
         found[name] = subcommands.add_parser(
             name,
             help=text,
