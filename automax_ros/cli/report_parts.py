@@ -23,7 +23,7 @@ def merged_report(
         **first,
         "stopped": min(stops, key=lambda stop: stop["time_s"]) if stops else None,
         "tasks": {task: told for part in there for task, told in part["tasks"].items()},
-        "displays": {module: shown for part in there for module, shown in part["displays"].items()},
+        "displays": {module: shown for part in there for module, shown in part.get("displays", {}).items()},
         "operations": _operations(item for part in there for item in part["operations"]),
         "processes": {
             name: {
