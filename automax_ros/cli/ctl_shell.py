@@ -46,7 +46,7 @@ class _Shell:
     def __init__(self, session: Session, arguments: argparse.Namespace) -> None:
         self._session, self._given = session, arguments
         self._names: list[str] | None = None
-        self._parser = argparse.ArgumentParser(prog="", usage="ACTION ...", add_help=False)
+        self._parser = argparse.ArgumentParser(prog="automax ctl", usage="ACTION ...", add_help=False)
         add_actions(self._parser)
 
     def obey_all(self, lines: Iterable[str]) -> bool:
