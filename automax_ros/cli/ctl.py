@@ -1,153 +1,104 @@
 """Operate a rack that runs, from any process of its ROS 2 domain.
 
 RACK is the rack's name or namespace, or its YAML file or folder. The rack must say `operator: true`; what is asked
-happens between two scans and is recorded. Exit code 0: done; 1: the rack refused something; 2: wrong usage, or
-no such rack.
+happens between two scans and is recorded. `shell`, or no action on a terminal, is a prompt that stays connected; it
+takes the same actions, from a pipe too. Exit code 0: done; 1: the rack refused something; 2: wrong usage, or no such
+rack.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
-import json
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from automax_ros.cli.ctl_actions import ACTIONS
-from automax_ros.cli.ctl_ask import Action, Ask
-from automax_ros.cli.ctl_watch import values_of, watch
+from automax_ros.cli.ctl_session import Session
 from automax_ros.cli.rack_space import space_of
 from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
-from automax_ros.cli.signals import StopRequest, stop_signals
+from automax_ros.cli.signals import stop_signals
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds_above_0
 
-if TYPE_CHECKING:
-    from automax_ros.nodes.operating import RackClient
-
 DEFAULT_TIMEOUT_S = "5"
+SHELL = "shell"
+
+
+class ActionParser(argparse.ArgumentParser):
+    """The parser of one action; what stands below its help is made when it is asked for."""
+
+    more: Callable[[], str] = str
+
+    def format_help(self) -> str:
+        """Return the help with what stands below it."""
+        below = self.more()
+        return super().format_help() + (f"\n{below}\n" if below else "")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``automax ctl`` and of its actions."""
     parser.add_argument("rack", metavar="RACK", help="the rack's name or namespace, or its YAML file or folder")
     add_ros_arguments(parser)
-    actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
+    actions = add_actions(parser, required=not sys.stdin.isatty())
+    shell = actions.add_parser(SHELL, help="a prompt that stays connected; commands from a pipe, too")
+    _add_common(shell)
+    parser.set_defaults(action=SHELL, json=False)
+    parser.set_defaults(timeout=seconds_above_0(DEFAULT_TIMEOUT_S))
+
+
+def add_actions(parser: argparse.ArgumentParser, *, required: bool = True) -> argparse._SubParsersAction[ActionParser]:
+    """Add all actions with their arguments."""
+    actions = parser.add_subparsers(
+        title="actions", metavar="ACTION", dest="action", required=required, parser_class=ActionParser
+    )
     for name, action in ACTIONS.items():
         own = actions.add_parser(name, help=action.help, description=action.help)
+        own.more = action.more
         action.add_arguments(own)
-        own.add_argument("--json", action="store_true", help="print the answers for programs to read")
-        own.add_argument(
-            "--timeout",
-            type=seconds_above_0,
-            metavar="S",
-            default=DEFAULT_TIMEOUT_S,
-            help=f"seconds to look for the rack, and to wait for each answer (default: {DEFAULT_TIMEOUT_S})",
-        )
+        _add_common(own)
+    return actions
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print the answers for programs to read")
+    parser.add_argument(
+        "--timeout",
+        type=seconds_above_0,
+        metavar="S",
+        default=DEFAULT_TIMEOUT_S,
+        help=f"seconds to look for the rack, and to wait for each answer (default: {DEFAULT_TIMEOUT_S})",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask the rack; 1 where it refused something, 2 where it could not be asked."""
-    with stop_signals() as stop:
-        domain = prepare_ros(arguments)
-        from automax_ros.nodes.operating import Interrupted, NotOperable
+    if arguments.action == SHELL:
+        from automax_ros.cli.ctl_shell import run_shell
+
+        return run_shell(arguments)
+    with stop_signals() as stop, connected(arguments, lambda: stop.requested) as session:
+        from automax_ros.nodes.operating import Interrupted
 
         try:
-            return _run(arguments, stop)
+            return session.do(ACTIONS[arguments.action], arguments)
         except Interrupted:
             return stop.code
-        except NotOperable as fault:
-            raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault
 
 
-def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
-    from automax_ros.nodes.operating import ALONE_NS, RackClient
+@contextmanager
+def connected(arguments: argparse.Namespace, should_stop: Callable[[], bool]) -> Iterator[Session]:
+    """Join the graph, and speak with the rack while the block lasts.
 
-    action = ACTIONS[arguments.action]
+    Raises:
+        UsageError: there is no such rack, several have the name, or it cannot be operated.
+    """
+    domain = prepare_ros(arguments)
+    from automax_ros.nodes import operating
+
     ros = ros_arguments(arguments)
-    space = space_of(arguments.rack, ros)
-    asks = action.asks(arguments)
-    with RackClient(space, ros, lambda: stop.requested) as client:
-        if action.by_operator:
-            client.find(arguments.timeout, 0 if action.read is not None else ALONE_NS)
-        if action.repeats:
-            return _watched(client, asks[0], arguments, stop)
-        answers = [(ask, _answer(client, ask, arguments.timeout)) for ask in asks]
-    if arguments.json:
-        _print_json(action, arguments.action, answers)
-    else:
-        _print(action, arguments.action, answers)
-    return 0 if all(_ok(answer) for _, answer in answers) else 1
-
-
-_NOW = ("status", "now", "forced", "powered", "message")
-"""Fields in which an answer says what is true now."""
-
-
-class _Refused(Exception):
-    """What was asked for was refused; the text says why."""
-
-
-def _watched(client: RackClient, ask: Ask, arguments: argparse.Namespace, stop: StopRequest) -> int:
-    from automax_ros.nodes.operating import Interrupted
-
-    def read() -> list[dict[str, str]]:
-        answer = _answer(client, ask, arguments.timeout)
-        if not _ok(answer):
-            raise _Refused(_reason(ask, answer))
-        return values_of(answer)
-
     try:
-        watch(read, arguments, lambda: stop.requested)
-    except Interrupted:
-        return 0
-    except _Refused as refusal:
-        print(f"automax ctl: watch {ask.of}: refused: {refusal}", file=sys.stderr)
-        return 1
-    return 0
-
-
-def _answer(client: RackClient, ask: Ask, wait_ns: int) -> Any:
-    package, _, name = ask.type_name.partition("/")
-    kind = getattr(importlib.import_module(f"{package}.srv"), name)
-    return client.call(kind, ask.service, kind.Request(**ask.fields), wait_ns)
-
-
-def _ok(answer: Any) -> bool:
-    """Return whether the rack did what was asked: the readings that cannot be refused do not say."""
-    return bool(getattr(answer, "ok", getattr(answer, "success", True)))
-
-
-def _reason(ask: Ask, answer: Any) -> str:
-    return ask.worded(getattr(answer, "reason", getattr(answer, "message", "")))
-
-
-def _print(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
-    for ask, answer in answers:
-        for text in getattr(answer, "findings", ()):
-            print(ask.worded(text), file=sys.stderr)
-        if not _ok(answer):
-            print(f"automax ctl: {' '.join((what, ask.of)).strip()}: refused: {_reason(ask, answer)}", file=sys.stderr)
-        elif action.read is None:
-            done = f"{what} {ask.of}: done" if ask.of else f"{what}: done"
-            told = getattr(answer, "message", "")
-            print(f"{done}, {told}" if told else done)
-        else:
-            for line in action.lines(action.read(answer)):
-                print(line)
-
-
-def _print_json(action: Action, what: str, answers: list[tuple[Ask, Any]]) -> None:
-    found = []
-    for ask, answer in answers:
-        ok = _ok(answer)
-        entry: dict[str, Any] = {"what": what, "of": ask.of, "ok": ok, "reason": "" if ok else _reason(ask, answer)}
-        if ok and action.read is None:
-            told = [shown for name in _NOW if (shown := getattr(answer, name, "")) != ""]
-            entry |= {"now": told[0]} if told else {}
-        if getattr(answer, "findings", ()):
-            entry["findings"] = [ask.worded(text) for text in answer.findings]
-        if action.read is not None and _ok(answer):
-            entry["answer"] = action.read(answer)
-        found.append(entry)
-    print(json.dumps(found, indent=2))
+        with operating.RackClient(space_of(arguments.rack, ros), ros, should_stop) as client:
+            yield Session(client, should_stop)
+    except operating.NotOperable as fault:
+        raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault

@@ -7,17 +7,29 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from automax_ros.cli.ctl_ask import Action, Ask
+from automax_ros.cli.ctl_ask import Action, Ask, Means
 from automax_ros.cli.ctl_lifecycle import LIFECYCLE
-from automax_ros.cli.ctl_watch import add_watch_arguments, values_of
+from automax_ros.cli.ctl_press import add_press_arguments, press_asks
+from automax_ros.cli.ctl_text import (
+    error_lines,
+    fields_of,
+    message_told,
+    reload_told,
+    status_lines,
+    step_lines,
+    task_lines,
+    value_lines,
+    value_told,
+)
+from automax_ros.cli.ctl_watch import NAMES_HELP, add_watch_arguments, values_of
 from automax_ros.cli.numbers import whole_number
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds_above_0
-from automax_ros.core.text import count_of, quoted
+from automax_ros.core.text import quoted, table
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.task_source import read_task_source
@@ -40,7 +52,7 @@ def _assignments(parser: argparse.ArgumentParser) -> None:
 
 
 def _names(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", nargs="+", metavar="NAME", help="REF%%, TABLE%%(3), SPEED.ERROR%%")
+    parser.add_argument("names", nargs="+", metavar="NAME", help=NAMES_HELP)
 
 
 def _released(parser: argparse.ArgumentParser) -> None:
@@ -171,109 +183,78 @@ def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[As
     return lambda _: [Ask(service, type_name)]
 
 
-def _value_lines(data: Any) -> Iterable[str]:
-    return (f"{item['name']} = {item['value']}" for item in data)
+def _plant_verbs() -> str:
+    from automax_ros.drive.plant_faults import VERBS
 
-
-def _fields(item: Any) -> dict[str, Any]:
-    """Return the fields of a message of plain values."""
-    return {name: getattr(item, name) for name in item.get_fields_and_field_types() if name not in ("ok", "reason")}
-
-
-def _task_lines(data: Any) -> Iterable[str]:
-    yield f"{'task':8} {'module':14} {'status':14} {'prio':>4} {'ms':>8} {'scans':>10} {'skipped':>8} {'errors':>7}"
-    for item in data:
-        period = f"{item['period_ms']:g}" if item["period_ms"] else "-"
-        yield (
-            f"{item['task']:8} {item['module']:14} {item['status']:14} {item['priority']:4} {period:>8} "
-            f"{item['scans']:10} {item['skipped']:8} {item['errors']:7}"
-        )
-
-
-def _error_lines(data: Any) -> Iterable[str]:
-    for item in data:
-        place = f"scan {item['scan']}, line {item['line']}"
-        yield f"{item['task']:8} {item['place']:6} {place}: {item['code']} {item['text']}"
-    if not data:
-        yield "no errors are logged"
-
-
-def _step_lines(data: Any) -> Iterable[str]:
-    yield f"step: {data['why']} at {data['time_s']:.9g} s, {count_of(data['scans'], 'scan')}"
-
-
-def _status_lines(data: Any) -> Iterable[str]:
-    power = "" if data["powered"] else ", the power is off"
-    yield f"rack {data['rack']}: {data['time_s']:.3f} s, {data['running']} of {data['tasks']} tasks run{power}"
-    if data["halted"]:
-        yield "halted: rack time stands still"
-    if data["stopped"]:
-        code = f" (code {data['stopped_code']})" if data["stopped_code"] else ""
-        yield f"stopped at {data['stopped_at_s']:.3f} s{code}: {data['stopped_reason']}"
-    if data["forced"]:
-        yield f"forced: {data['forced']}"
+    rows = [[f"  {name}", verb.wants] for name, verb in VERBS.items()]
+    return "\n".join(["what, and its values:", *table(rows)])
 
 
 ACTIONS: Mapping[str, Action] = {
     "run": Action("put tasks into RUN", _each_task("run"), _tasks),
     "stop": Action("stop tasks", _each_task("stop"), _tasks),
     "delete": Action("take stopped tasks out; a reload brings them back", _each_task("delete"), _tasks),
-    "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger")),
-    "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger")),
+    "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger"), told=message_told),
+    "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger"), told=message_told),
     "power": Action("switch the power off and on", _power, _powered),
-    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger")),
+    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger"), told=message_told),
     "step": Action(
         "let a halted rack go on by scans, ticks, or until a rack time at most 1 s later",
         _step,
         _stepped,
-        _fields,
-        _step_lines,
+        fields_of,
+        step_lines,
+        acts=True,
     ),
-    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger")),
-    "set": Action("write commons once", _each_assignment("set"), _assignments),
+    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger"), told=message_told),
+    "set": Action("write commons once", _each_assignment("set"), _assignments, told=value_told),
+    "press": Action("hold BOOLEANs at TRUE for a while", press_asks, add_press_arguments, means=Means.PRESS),
     "get": Action(
         "read commons, array elements, variables of tasks",
         lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names})],
         _names,
         values_of,
-        _value_lines,
+        value_lines,
     ),
     "watch": Action(
         "read them again and again, and print what has changed",
         lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names}, " ".join(given.names))],
         add_watch_arguments,
         values_of,
-        _value_lines,
-        repeats=True,
+        value_lines,
+        means=Means.WATCH,
     ),
     "force": Action("hold commons or TASK.NAME at values against every write", _each_assignment("force"), _assignments),
     "unforce": Action("end forces", _release, _released),
-    "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=values_of, lines=_value_lines),
-    "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments),
+    "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=values_of, lines=value_lines),
+    "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments, told=value_told),
     "module": Action("move a switch of a module", _moved("module"), _control("SLOT", "the module's slot")),
     "plant": Action(
-        "break, mend or load the plant of a drive", _moved("plant"), _control("PLANT", "its name in the rack's file")
+        "break, mend or load the plant of a drive",
+        _moved("plant"),
+        _control("PLANT", "its name in the rack's file"),
+        more=_plant_verbs,
     ),
-    "reload": Action("replace the source of a task while the others run", _reload, _reloaded),
+    "reload": Action("replace the source of a task while the others run", _reload, _reloaded, told=reload_told),
     "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),
     "errors": Action(
         "the error logs",
         lambda given: [Ask("errors", "automax_msgs/ReadErrors", {"task": name}) for name in given.tasks or [""]],
         _some_tasks,
-        lambda answer: [_fields(item) for item in answer.errors],
-        _error_lines,
+        lambda answer: [fields_of(item) for item in answer.errors],
+        error_lines,
     ),
     "tasks": Action(
         "how the tasks stand",
         _one("tasks", "automax_msgs/ReadTasks"),
-        read=lambda answer: [_fields(item) for item in answer.tasks],
-        lines=_task_lines,
+        read=lambda answer: [fields_of(item) for item in answer.tasks],
+        lines=task_lines,
     ),
     "status": Action(
         "how the rack stands, and what stopped it",
         _one("status", "automax_msgs/ReadStatus"),
-        read=_fields,
-        lines=_status_lines,
+        read=fields_of,
+        lines=status_lines,
     ),
     "lifecycle": LIFECYCLE,
 }

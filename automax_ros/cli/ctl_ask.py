@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
 
@@ -22,12 +23,26 @@ class Ask:
     worded: Callable[[str], str] = str
 
 
+class Means(Enum):
+    """How the requests of an action are sent: each once, again and again, or as a press of buttons."""
+
+    ONCE = "once"
+    WATCH = "watch"
+    PRESS = "press"
+
+
+def _done(_: Ask, __: Any) -> str:
+    return "done"
+
+
 @dataclass(frozen=True)
 class Action:
     """An action: its line of help, its arguments, its requests, and for a reading what an answer holds.
 
-    ``read`` returns data for JSON, ``lines`` how a person reads them. One that ``repeats`` asks again and again.
-    ``by_operator``: it needs a rack with an operator's services.
+    ``read`` returns data for JSON, ``lines`` how a person reads them, ``told`` what a person is told of an operation
+    that was carried out. ``by_operator``: it needs a rack with an operator's services; ``acts``: it
+    changes something, though its answer is read. ``more`` returns what stands
+    below its help.
     """
 
     help: str
@@ -35,5 +50,13 @@ class Action:
     add_arguments: Callable[[argparse.ArgumentParser], None] = lambda _: None
     read: Callable[[Any], Any] | None = None
     lines: Callable[[Any], Iterable[str]] = lambda _: ()
-    repeats: bool = False
+    told: Callable[[Ask, Any], str] = _done
+    means: Means = Means.ONCE
     by_operator: bool = True
+    acts: bool = False
+    more: Callable[[], str] = str
+
+    @property
+    def reads(self) -> bool:
+        """Whether it changes nothing in the rack."""
+        return self.read is not None and not self.acts

@@ -6,13 +6,15 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from automax_ros.cli.window import seconds_above_0
+from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 
 DEFAULT_EVERY_S = "0.5"
+NAMES_HELP = "REF%%, TABLE%%(3), SPEED.ERROR%%; patterns in quotes: 'F_*', 'SPEED.*'"
 _LOOK_S = 0.05
 
 Read = Callable[[], list[dict[str, str]]]
@@ -21,7 +23,7 @@ Read = Callable[[], list[dict[str, str]]]
 
 def add_watch_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is watched, how often, and for how long."""
-    parser.add_argument("names", nargs="+", metavar="NAME", help="REF%%, TABLE%%(3), SPEED.ERROR%%")
+    parser.add_argument("names", nargs="+", metavar="NAME", help=NAMES_HELP)
     parser.add_argument(
         "--every",
         type=seconds_above_0,
@@ -46,7 +48,7 @@ def watch(read: Read, arguments: argparse.Namespace, is_over: Callable[[], bool]
         for item in read():
             if shown.get(item["name"]) != item["value"]:
                 shown[item["name"]] = item["value"]
-                print(json.dumps(item) if arguments.json else f"{item['name']} = {item['value']}")
+                print(json.dumps(item) if arguments.json else printable(value_line(item)))
         sys.stdout.flush()
         next_ns = time.monotonic_ns() + arguments.every
         if end_ns is not None and next_ns > end_ns:
@@ -58,5 +60,14 @@ def watch(read: Read, arguments: argparse.Namespace, is_over: Callable[[], bool]
 
 
 def values_of(answer: Any) -> list[dict[str, str]]:
-    """Return the names and values of an answer."""
-    return [{"name": name, "value": text} for name, text in zip(answer.found, answer.values, strict=True)]
+    """Return the names and values of an answer; ``shown`` where a value has a unit."""
+    items = zip(answer.found, answer.values, answer.shown, strict=True)
+    return [{"name": name, "value": text} | ({"shown": shown} if shown else {}) for name, text, shown in items]
+
+
+def value_line(item: Mapping[str, str]) -> str:
+    """Return a value for a person: ``LEVEL% = 2048 (5.001 bar)``, ``SPEED% = 1500 fpm`` where the unit is all."""
+    value, shown = item["value"], item.get("shown", "")
+    if shown.startswith(f"{value} "):
+        return f"{item['name']} = {shown}"
+    return f"{item['name']} = {value}" + (f" ({shown})" if shown else "")

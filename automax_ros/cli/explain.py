@@ -12,6 +12,7 @@ from importlib import resources
 
 from automax_ros.cli.terminal import painted, wants_colour
 from automax_ros.cli.usage import UsageError
+from automax_ros.cli.visible import write_control
 from automax_ros.core.problems import PROBLEMS, Problem
 from automax_ros.core.text import quoted
 
@@ -29,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print a page, or the list of all codes."""
     found = list(PROBLEMS.values()) if arguments.code is None else _problems(arguments.code)
     if len(found) == 1:
-        sys.stdout.write(_page(found[0], colour=wants_colour(sys.stdout)))
+        write_control(sys.stdout, _page(found[0], colour=wants_colour(sys.stdout)))
     else:
         sys.stdout.write("".join(f"{_line(problem)}\n" for problem in found))
     return 0

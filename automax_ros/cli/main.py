@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from types import ModuleType
     from typing import NoReturn
 
+    from automax_ros.cli.visible import VisibleOutput
     from automax_ros.nodes.ros_arguments import RosArguments
 
 SUBCOMMANDS: dict[str, str] = {
@@ -81,6 +82,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         _open_closed_streams()
         _accept_every_character()
+        output = _make_output_visible()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    try:
         code = _run(sys.argv[1:] if argv is None else list(argv))
         sys.stdout.flush()
     except KeyboardInterrupt:
@@ -93,6 +98,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         what = "the output cannot be written" if error.filename is None else error.filename
         print(f"automax: error: {what}: {error.strerror or error}", file=sys.stderr)
         return 2
+    finally:
+        if argv is not None:  # else it is the process's output, a traceback of Python's included
+            output.undo()
     return code
 
 
@@ -188,6 +196,8 @@ def parsers(
     found: dict[str, argparse.ArgumentParser] = {}
     for name, text in SUBCOMMANDS.items():
         own = modules.get(name)
+        if modules and own is None:
+            continue  # a parser takes time, and nobody will ask for it
         found[name] = subcommands.add_parser(
             name,
             help=text,
@@ -244,6 +254,12 @@ def _accept_every_character() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+
+
+def _make_output_visible() -> VisibleOutput:
+    from automax_ros.cli.visible import VisibleOutput
+
+    return VisibleOutput()
 
 
 def _discard_output() -> None:

@@ -11,6 +11,8 @@ from types import TracebackType
 
 from automax_ros.cli.status_line import erasing, fitting
 from automax_ros.cli.terminal import rewrites_lines
+from automax_ros.cli.visible import write_control
+from automax_ros.core.text import visible
 
 _PATIENCE_S = 2.0
 _PERIOD_S = 0.1
@@ -43,7 +45,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     ) -> None:
         """Take the bar away."""
         if self._drawn:
-            sys.stderr.write(erasing(self._drawn, shutil.get_terminal_size().columns))
+            write_control(sys.stderr, erasing(self._drawn, shutil.get_terminal_size().columns))
             sys.stderr.flush()
 
     def _draw(self, share: float, seconds: float) -> None:
@@ -53,7 +55,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             parts.append(f"{seconds / share - seconds:.0f} s left")
         columns = shutil.get_terminal_size().columns
         line = fitting(parts, columns - 1)
-        sys.stderr.write(erasing(self._drawn, columns) + line)
+        write_control(sys.stderr, erasing(self._drawn, columns) + visible(line))
         sys.stderr.flush()
         self._drawn = len(line)
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from automax_ros.cli.rack_file import is_rack_folder, load_rack_file
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.text import quoted
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
-from automax_ros.rack.config import RackConfig
 from automax_ros.rack.ros_names import namespace
+
+if TYPE_CHECKING:
+    from automax_ros.rack.config import RackConfig
 
 _SPACE = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*){0,7}")
 
@@ -19,7 +20,15 @@ _SPACE = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*){0,7}")
 def names_file(text: str) -> bool:
     """Return whether a text names a rack's YAML file, or a folder with a ``rack.yaml``, rather than a rack."""
     path = Path(text)
-    return path.suffix.lower() in {".yaml", ".yml"} or path.is_file() or is_rack_folder(path)
+    return path.suffix.lower() in {".yaml", ".yml"} or path.is_file() or _is_rack_folder(path)
+
+
+def _is_rack_folder(path: Path) -> bool:
+    if not path.is_dir():
+        return False
+    from automax_ros.cli.rack_file import is_rack_folder
+
+    return is_rack_folder(path)
 
 
 def config_of(path: Path) -> RackConfig:
@@ -28,6 +37,10 @@ def config_of(path: Path) -> RackConfig:
     Raises:
         UsageError: it has errors, cannot be read or is a task.
     """
+    # A rack that is called by its name needs none of this: it takes longer to load than the rack takes to answer.
+    from automax_ros.cli.rack_file import load_rack_file
+    from automax_ros.core.diagnostics import has_errors
+
     result = load_rack_file(path, allow_outside=True)
     if result.config is None or has_errors(result.diagnostics):
         raise UsageError(f"{path} is not a sound rack file", f"`automax check {path}` shows what is wrong")

@@ -12,9 +12,9 @@ def merged_report(
     """Return the report of a rack, from those of its processes by name.
 
     ``names`` are those of all processes, that of common memory first. Commons, forces and time are the first's; tasks
-    are of their own processes; what was done in several processes at one instant was done once, and is refused where
-    one of them has refused it. ``processes`` says of each how often it died, whether it has told its part, and which
-    commons had another value there at its end: those that were written in the last moment (decision).
+    and displays are of their own processes; what was done in several processes at one instant was done once, and is
+    refused where one of them has refused it. ``processes`` says of each how often it died, whether it has told its
+    part, and which commons had another value there at its end: those that were written in the last moment (decision).
     """
     there = [parts[name] for name in names if name in parts]
     first = there[0] if there else {}
@@ -23,6 +23,7 @@ def merged_report(
         **first,
         "stopped": min(stops, key=lambda stop: stop["time_s"]) if stops else None,
         "tasks": {task: told for part in there for task, told in part["tasks"].items()},
+        "displays": {module: shown for part in there for module, shown in part.get("displays", {}).items()},
         "operations": _operations(item for part in there for item in part["operations"]),
         "processes": {
             name: {

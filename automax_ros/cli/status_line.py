@@ -8,6 +8,8 @@ import time
 from collections.abc import Sequence
 
 from automax_ros.cli.terminal import rewrites_lines
+from automax_ros.cli.visible import write_control
+from automax_ros.core.text import visible
 from automax_ros.core.ticks import NS_PER_S
 
 _TERMINAL_PERIOD_NS = NS_PER_S // 5
@@ -38,7 +40,7 @@ class StatusLine:
         if self._terminal:
             columns = shutil.get_terminal_size().columns
             line = fitting(parts, columns - 1)
-            sys.stdout.write(erasing(self._drawn, columns) + line)
+            write_control(sys.stdout, erasing(self._drawn, columns) + visible(line))
             self._drawn = len(line)
         else:
             sys.stdout.write("  ".join(parts) + "\n")
@@ -52,7 +54,7 @@ class StatusLine:
     def clear(self) -> None:
         """Take the line away."""
         if self._drawn:
-            sys.stdout.write(erasing(self._drawn, shutil.get_terminal_size().columns))
+            write_control(sys.stdout, erasing(self._drawn, shutil.get_terminal_size().columns))
             self._drawn = 0
 
 

@@ -8,14 +8,11 @@ rack that goes on; Ctrl-D or `quit` leaves.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 
+from automax_ros.cli.prompt import Interrupt, edit_lines, typed_lines
 from automax_ros.cli.rack_arguments import config_of, print_refused, settings_of
 from automax_ros.cli.rack_file import add_outside_argument, add_set_argument
 from automax_ros.cli.step_commands import completions, obey
@@ -30,8 +27,6 @@ from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.stepping.stepper import Stepper
 
 PROMPT = "step> "
-_DELIMITERS = " \t\n=:"
-"""What ends a word for completion: not the type characters of names."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.ideal:
         config = replace(config, execution=Timing.IDEAL)
     settings = settings_of(config, arguments.settings)
-    interrupt = _Interrupt()
+    interrupt = Interrupt()
     try:
         stepper = Stepper(config, interrupted=interrupt.taken)
         happening = stimulation(stepper.rack, arguments.stimuli, allow_outside=arguments.allow_outside)
@@ -73,15 +68,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if failed or happening.refused else 0
 
 
-def _obey_all(session: Session, interrupt: _Interrupt) -> bool:
+def _obey_all(session: Session, interrupt: Interrupt) -> bool:
     """Carry out commands until their end; return whether one of them failed."""
     interactive = sys.stdin.isatty()
     if interactive:
-        _edit_lines(session)
+        edit_lines(lambda text: completions(session, text))
         _tell("help lists the commands, quit leaves")
     _tell(place_text(session.stepper.rack, *session.stepper.place))
     failed = False
-    for line in _typed(interrupt) if interactive else sys.stdin:
+    for line in typed_lines(PROMPT, interrupt) if interactive else sys.stdin:
         failed |= not _obeyed(session, line)
         if session.over:
             break
@@ -102,73 +97,5 @@ def _obeyed(session: Session, line: str) -> bool:
     return True
 
 
-def _typed(interrupt: _Interrupt) -> Iterator[str]:
-    """Yield the lines that a person types; Ctrl-C gives up the present one."""
-    while True:
-        try:
-            with interrupt.prompting():
-                line = input(PROMPT)
-        except EOFError:
-            _tell("")
-            return
-        except KeyboardInterrupt:
-            _tell("")
-            continue
-        yield line
-
-
-def _edit_lines(session: Session) -> None:
-    """Give the prompt editing, history and completion, where Python has readline."""
-    try:
-        import readline
-    except ImportError:
-        return
-
-    def complete(text: str, state: int) -> str | None:
-        found = completions(session, text)
-        return found[state] if state < len(found) else None
-
-    readline.set_completer(complete)
-    readline.set_completer_delims(_DELIMITERS)
-    readline.parse_and_bind("tab: complete")
-
-
 def _tell(line: str) -> None:
     print(printable(line), flush=True)
-
-
-@dataclass
-class _Interrupt:
-    """Ctrl-C: at the prompt it gives the line up, while the rack goes on it halts it between two events."""
-
-    _pending: bool = False
-    _prompting: bool = False
-
-    def taken(self) -> bool:
-        """Return whether Ctrl-C came since the last call."""
-        pending, self._pending = self._pending, False
-        return pending
-
-    @contextmanager
-    def watching(self) -> Iterator[None]:
-        """Take SIGINT while the block lasts."""
-
-        def note(_: int, __: FrameType | None) -> None:
-            if self._prompting:
-                raise KeyboardInterrupt
-            self._pending = True
-
-        before = signal.signal(signal.SIGINT, note)
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, before)
-
-    @contextmanager
-    def prompting(self) -> Iterator[None]:
-        """Let SIGINT raise KeyboardInterrupt while the block lasts."""
-        self._prompting, self._pending = True, False
-        try:
-            yield
-        finally:
-            self._prompting = False

@@ -165,7 +165,7 @@ def _carry_out(sweep: _Sweep, arguments: argparse.Namespace, stop: StopRequest) 
     if arguments.output is not None:
         output.write(arguments.output)
     if arguments.json:
-        print(json.dumps(records(plan, rows, output.repeat), indent=1, allow_nan=False, ensure_ascii=False))
+        print(json.dumps(records(plan, rows, output.repeat), indent=1, allow_nan=False))
     else:
         print_best(output)
     if len(rows) < len(points):

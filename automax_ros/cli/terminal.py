@@ -6,8 +6,10 @@ import os
 from collections.abc import Iterable
 from typing import TextIO
 
+from automax_ros.cli.visible import write_control
 from automax_ros.core.diagnostics import Diagnostic, SourceText, in_order, render
 from automax_ros.core.problems import Severity
+from automax_ros.core.text import visible
 
 _COLOURS = {Severity.ERROR: "1;31", Severity.WARNING: "1;33"}
 _HINT = "  hint:"
@@ -27,8 +29,8 @@ def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, str
     """Print diagnostics of one text in the order of their places, in colour if the stream wants it."""
     colour = wants_colour(stream)
     for item in in_order(diagnostics):
-        text = render(item, source)
-        stream.write((_painted(item, text) if colour else text) + "\n")
+        text = visible(render(item, source))
+        write_control(stream, (_painted(item, text) if colour else text) + "\n")
 
 
 def painted(text: str, colour: str) -> str:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-from automax_ros.bags.series import Window
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.ticks import seconds_ns
+
+if TYPE_CHECKING:
+    from automax_ros.bags.series import Window
 
 
 def add_window_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +33,8 @@ def window_of(arguments: argparse.Namespace) -> Window:
     Raises:
         UsageError: it ends before it begins.
     """
+    from automax_ros.bags.series import Window
+
     start = arguments.start or 0
     if arguments.end is not None and arguments.end < start:
         raise UsageError("--to lies before --from")

@@ -116,7 +116,7 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
 
 
 def _place(source: SourceText, span: Span) -> str:
-    return f"{source.name}:{span.line}:{span.column}"
+    return f"{printable(source.name)}:{span.line}:{span.column}"
 
 
 def _excerpt(span: Span, lines: list[str]) -> list[str]:

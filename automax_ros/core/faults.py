@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from automax_ros.core.text import printable
+
 
 class Fault(Exception):
     """Something that the person who uses the emulator can mend.
@@ -18,6 +20,6 @@ class Fault(Exception):
         self.place = place
 
     def __str__(self) -> str:
-        head = f"{self.place}: " if self.place else ""
+        head = f"{printable(self.place)}: " if self.place else ""
         head += f"error[{self.code}]: " if self.code and self.place else ""
         return f"{head}{self.message}\n  hint: {self.hint}" if self.hint else f"{head}{self.message}"

@@ -18,8 +18,20 @@ _LIKENESS = 0.62
 
 
 def printable(text: str) -> str:
-    """Return a text with control characters but the tab replaced, so that a hostile source cannot drive a terminal."""
+    """Return a text with control characters but the tab replaced, so that a hostile source cannot drive a terminal.
+
+    Line ends, C0, DEL, C1, bidirectional controls and what else Python does not count as printable.
+    """
+    if text.isprintable():
+        return text
     return "".join(char if char == "\t" or char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)
+
+
+def visible(text: str) -> str:
+    """Return a text of several lines with the control characters of each replaced; line ends stay."""
+    if text.isprintable():
+        return text
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def quoted(text: str, *, marks: str = "'", limit: int = 40) -> str:

@@ -28,6 +28,14 @@ def choose_range(chosen: str | None) -> None:
         os.environ[_VARIABLE] = "LOCALHOST"
 
 
+def is_this_host_alone() -> bool:
+    """Return whether this process reaches nobody on other hosts."""
+    if is_on_loopback():
+        return True
+    local = os.environ.get(_OLD) == "1" or os.environ.get(_VARIABLE, "").upper() == "LOCALHOST"
+    return local and not os.environ.get(_PEERS, "").strip("; ")
+
+
 def range_text() -> str:
     """Return in words whom this process reaches."""
     name = os.environ.get(_VARIABLE, "").upper()

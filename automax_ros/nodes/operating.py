@@ -20,9 +20,6 @@ from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 _LOOK_S = 0.05
 _SETTLED_NS = 2 * NS_PER_S
 """A rack whose nodes have been seen for so long without its operator has none (decision)."""
-ALONE_NS = NS_PER_S
-"""A rack that is to be operated must be the only one of its name for so long (decision): programs of a host answer one
-that joins at once, but not in the same moment."""
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _HOME, _OPERATOR = "common_memory", "operator"
 
@@ -88,9 +85,7 @@ class RackClient:
             # The names of a program's nodes come in a message of their own, on a busy host long after its topics.
             if seen is None and racks and self._nodes(_HOME):
                 seen = now
-            if racks > 1 or operators > 1:
-                hint = "stop one of them, or give one another ROS_DOMAIN_ID"
-                raise NotOperable(f"{max(racks, operators)} racks are called {self._space}", hint)
+            self.refuse_several(max(racks, operators))
             if operators:
                 met = met or now
                 if now - met >= alone_ns:
@@ -102,6 +97,16 @@ class RackClient:
                 raise self._absent(wait_ns)
             self._go_on()
             time.sleep(_LOOK_S)
+
+    def refuse_several(self, racks: int) -> None:
+        """Do nothing where at most one rack of the name is known.
+
+        Raises:
+            NotOperable: there are several.
+        """
+        if racks > 1:
+            hint = "stop one of them, or give one another ROS_DOMAIN_ID"
+            raise NotOperable(f"{racks} racks are called {self._space}", hint)
 
     def call(self, kind: Any, name: str, request: Any, wait_ns: int) -> Any:
         """Ask a service of the rack and return its answer.

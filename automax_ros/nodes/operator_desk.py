@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from automax_msgs.msg import LoggedError, TaskInfo
@@ -28,11 +30,15 @@ from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.nodes.later import Later, allow_later
 from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.operator_forward import Forwarding
+from automax_ros.nodes.participants import ALONE_NS, racks_of
 from automax_ros.nodes.reloading import Reloading
 from automax_ros.nodes.tables import status_of_task, task_fields
+from automax_ros.rack.display import displays_of
+from automax_ros.rack.drive_trips import DriveTrips
 from automax_ros.rack.halting import Halting
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.orders import Orders
+from automax_ros.rack.reading import Reading
 from automax_ros.running.task import Status
 
 PLACES = ("first", "second", "last")
@@ -62,6 +68,8 @@ class OperatorDesk:
         self.forward_by: Forwarding | None = None
         orders = self._orders = Orders(self._rack)
         self._halting = Halting(self._rack, self._site.pacer)
+        self._trips = DriveTrips(self._rack)
+        self._begun_ns = time.monotonic_ns()
         self._serve(OperateTask, "run", lambda request, _: orders.run(request.task), self._task_now)
         self._serve(OperateTask, "stop", lambda request, _: orders.stop(request.task), self._task_now)
         self._serve(OperateTask, "delete", lambda request, _: orders.delete(request.task), self._task_now)
@@ -73,16 +81,15 @@ class OperatorDesk:
         self._serve(Trigger, "resume", lambda *_: self._halting.resume(), self._time_now)
         self._serve(Step, "step", self._step, self._stepped_now)
         self._serve(Power, "power", self._power, self._powered_now)
-        self._serve(SetValue, "set", lambda request, _: orders.set(request.name, request.value), self._value_now)
-        self._serve(SetValue, "force", lambda request, _: orders.force(request.name, request.value), self._value_now)
-        self._serve(SetValue, "tune", lambda request, _: orders.tune(request.name, request.value), self._value_now)
+        for name, act in (("set", orders.set), ("force", orders.force), ("tune", orders.tune)):
+            self._serve(SetValue, name, partial(self._give, act), self._value_now)
         self._serve(Unforce, "unforce", lambda request, _: orders.unforce(list(request.names)), self._forced_now)
         self._serve(OperateControl, "module", lambda request, _: orders.module(*_moved(request)))
         self._serve(OperateControl, "plant", lambda request, _: orders.plant(*_moved(request)))
         self._reloading = Reloading(node, orders, self._reloaded)
         self._create(Reload, "reload", self._reloading.answer)
-        self._serve(ReadValues, "get", lambda request, response: _fill(response, orders.get(list(request.names))))
-        self._serve(ReadValues, "forces", lambda _, response: _fill(response, orders.forces()))
+        self._serve(ReadValues, "get", lambda request, response: _fill(response, orders.read(list(request.names))))
+        self._serve(ReadValues, "forces", lambda _, response: _fill(response, _readings(orders.forces())))
         self._serve(ReadErrors, "errors", self._errors)
         self._serve(ReadTasks, "tasks", self._tasks)
         self._serve(ReadStatus, "status", self._status)
@@ -172,10 +179,20 @@ class OperatorDesk:
     def _powered_now(self, _: Any, response: Any) -> None:
         response.powered = self._rack.operations.powered
 
+    def _give(self, act: Callable[[str, str], None], request: Any, response: Any) -> None:
+        """Give a variable a value; what it held before is told, too."""
+        with suppress(OperationRefused):
+            response.before = self._held(request.name)
+        act(request.name, request.value)
+
+    def _held(self, name: str) -> str:
+        ((_, value),) = self._orders.get([name])
+        return value
+
     def _value_now(self, request: Any, response: Any) -> None:
         """Tell what a variable holds; nothing where no such variable is meant."""
         if request.name.strip():
-            ((_, response.now),) = self._orders.get([request.name])
+            response.now = self._held(request.name)
 
     def _forced_now(self, _: Any, response: Any) -> None:
         response.forced = [name for name, _ in self._orders.forces()]
@@ -229,13 +246,31 @@ class OperatorDesk:
             response.stopped_reason = cause.reason
         response.tasks = len(rack.tasks)
         response.running = sum(task.status is Status.RUNNING for task in rack.tasks)
+        response.ended = sum(task.is_done for task in rack.tasks)
         response.forced = len(rack.forces())
+        displays = displays_of(rack)
+        response.display_modules = [item.module for item in displays]
+        response.display_codes = [item.code for item in displays]
+        response.display_meanings = [item.meaning for item in displays]
+        response.drive_faults = self._trips.lines()
+        response.racks = self._racks()
+
+    def _racks(self) -> int:
+        """Return how many racks of this name are seen, 0 where it was not looked for long enough (decision: 1 s)."""
+        if time.monotonic_ns() - self._begun_ns < ALONE_NS:
+            return 0
+        return len(racks_of(self._node, self._node.get_namespace()))
 
 
 def _moved(request: Any) -> tuple[str, str, str]:
     return request.name, request.control, request.value
 
 
-def _fill(response: Any, values: list[tuple[str, str]]) -> None:
-    response.found = [name for name, _ in values]
-    response.values = [text for _, text in values]
+def _readings(values: list[tuple[str, str]]) -> list[Reading]:
+    return [Reading(name, text) for name, text in values]
+
+
+def _fill(response: Any, values: list[Reading]) -> None:
+    response.found = [item.name for item in values]
+    response.values = [item.value for item in values]
+    response.shown = [item.shown for item in values]

@@ -213,9 +213,9 @@ def _merged(response: Any, request: Any, shares: Sequence[Share], answers: dict[
 def _in_order(response: Any, names: list[str]) -> None:
     """Put what was read into the order in which it was asked for, each once."""
     places = {name.strip().upper(): place for place, name in reversed(list(enumerate(names)))}
-    read = dict(zip(response.found, response.values, strict=True))
-    pairs = sorted(read.items(), key=lambda pair: places.get(pair[0].upper(), len(places)))
-    response.found, response.values = [name for name, _ in pairs], [value for _, value in pairs]
+    read = {item[0]: item for item in zip(response.found, response.values, response.shown, strict=True)}
+    items = sorted(read.values(), key=lambda item: places.get(item[0].upper(), len(places)))
+    response.found, response.values, response.shown = ([item[column] for item in items] for column in range(3))
 
 
 def _is_ok(answer: Any) -> bool:
@@ -274,7 +274,7 @@ def _everybody(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
     return forwarding.everybody(request)
 
 
-_ADDED = ("tasks", "running")
+_ADDED = ("tasks", "running", "ended")
 """Numbers of a status that are those of one process each."""
 _NOT_TOGETHER = ("pause", "resume", "step")
 _SHARING: dict[str, Callable[[Forwarding, Any, Any], list[Share]]] = {

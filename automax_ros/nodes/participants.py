@@ -9,7 +9,12 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
+from automax_ros.core.ticks import NS_PER_S
+
 PREFIX_BYTES = 12
+ALONE_NS = NS_PER_S
+"""A rack that is to be operated must be the only one of its name for so long (decision): programs of a host answer one
+that joins at once, but not in the same moment."""
 HOME_TOPICS = ("variables", "config", "backplane", "backplane/snapshot", "operations")
 """Whoever publishes all of these below a namespace is the rack of that name, or its process of common memory."""
 

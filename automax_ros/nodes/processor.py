@@ -23,6 +23,7 @@ from automax_ros.nodes.managed_module import ManagedModuleNode
 from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.tunable_parameters import TunableParameters
+from automax_ros.rack.display import displays_of
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.observers import Operation
 from automax_ros.running.error_log import LogEntry
@@ -108,6 +109,9 @@ class ProcessorNode(ManagedModuleNode):
             "skipped": str(sum(item.skipped for item in statistics)),
             "errors": str(sum(task.errors.count for task in self._tasks)),
         }
+        for shown in displays_of(self._rack):
+            if shown.module == config.name:
+                values |= {"display": shown.code, "display_meaning": shown.meaning}
         text = f"{running} of {count_of(len(self._tasks), 'task')} run"
         if level != DiagnosticStatus.OK:
             item = next(item for item in tasks if item.level == level)

@@ -51,7 +51,7 @@ class Reloading:
                     if not self._orders.is_current(prepared):
                         begin(respond)
                         return
-                    self._orders.install(prepared, keep_state=request.keep_state)
+                    response.lost = self._orders.install(prepared, keep_state=request.keep_state)
                 except Exception as raised:
                     error = raised
                     response.findings = list(raised.findings) if isinstance(raised, ReloadRefused) else []

@@ -6,12 +6,12 @@ are. Everything but ``prepare`` happens between two scans: whoever calls has see
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from automax_ros.compile.layout import Role, StateField
 from automax_ros.core.diagnostics import SourceText, render
-from automax_ros.core.faults import Fault
 from automax_ros.core.names import NameFault
 from automax_ros.core.text import printable, quoted
 from automax_ros.core.ticks import seconds_ns
@@ -23,14 +23,11 @@ from automax_ros.rack.installation import Prepared, RackError
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.reading import MAX_NAME, MAX_NAMES, Reading, Readings
 from automax_ros.rack.settings import common_named
 
-MAX_NAME = 100
-"""Longest name that is looked at, in characters (decision: a bound on what strangers send)."""
 MAX_VALUE = 1000
 """Longest text of a value that is looked at, in characters (decision: likewise)."""
-MAX_NAMES = 1000
-"""Most names in one request (decision: likewise)."""
 MOST_OFF_S = 86_400
 """Longest time for which the power is switched off, s (decision: a day)."""
 _MOST_FINDINGS = 100
@@ -53,6 +50,7 @@ class Orders:
 
     def __init__(self, rack: Rack) -> None:
         self._rack = rack
+        self._readings = Readings(rack)
 
     def run(self, task: str) -> None:
         """Put a task into RUN."""
@@ -154,17 +152,37 @@ class Orders:
         """Return whether a source was prepared for the tasks as they are now; else it is prepared again."""
         return self._rack.operations.installation.is_current(prepared)
 
-    def install(self, prepared: Prepared, *, keep_state: bool = False) -> None:
+    def install(self, prepared: Prepared, *, keep_state: bool = False) -> str:
         """Let the task have its prepared source: last part of a reload, short.
+
+        Returns in words which tuned values it has lost, "" where none: an installation takes them from the source.
 
         Raises:
             ReloadRefused: the source has errors; the old one goes on.
         """
+        tuned = self._tuned(prepared.task)
         try:
             self._rack.operations.install(prepared, keep_state=keep_state)
         except RackError as error:
             found = [render(item, where) for where, items in error.findings for item in items]
             raise ReloadRefused(str(error), found[:_MOST_FINDINGS]) from error
+        return self._lost(prepared.task, tuned)
+
+    def _tuned(self, name: str) -> dict[str, Value]:
+        """Return the tunables of a task that are not as its source says, with their values."""
+        task = self._rack.task(name)
+        values = {item.name: (task.value(item.name), item.initial) for item in task.layout.fields if _is_tunable(item)}
+        return {key: held for key, (held, initial) in values.items() if held != initial and not isinstance(held, list)}
+
+    def _lost(self, name: str, tuned: Mapping[str, Value]) -> str:
+        task = self._rack.task(name)
+        now = {item.name: task.value(item.name) for item in task.layout.fields if _is_tunable(item)}
+        lost = [
+            f"{key} was tuned to {source_text(held)} and is {_source_value(now.get(key))}"
+            for key, held in tuned.items()
+            if now.get(key) != held
+        ]
+        return ", ".join(lost)
 
     def refuse_reload(self, task: str, reason: str) -> NoReturn:
         """Refuse a reload for a reason of the caller's."""
@@ -172,7 +190,11 @@ class Orders:
 
     def get(self, names: Sequence[str]) -> list[tuple[str, str]]:
         """Return commons, their elements, and variables of tasks (``TASK.NAME``): each name with its value's text."""
-        return [self._shown(name) for name in self._few("get", names)]
+        return [(item.name, item.value) for item in self.read(names)]
+
+    def read(self, names: Sequence[str]) -> list[Reading]:
+        """Return the same with units, and what patterns mean."""
+        return self._readings.get(self._few("get", names))
 
     def forces(self) -> list[tuple[str, str]]:
         """Return the force table."""
@@ -180,31 +202,11 @@ class Orders:
 
     def tasks_named(self, task: str) -> list[str]:
         """Return a task, all of the rack without a name."""
-        return [self._known(task)] if task.strip() else [item.name for item in self._rack.tasks]
+        return self._readings.tasks_named(task)
 
     def task_word(self, task: str) -> str:
         """Return what a task's name is looked up as, "" where none is given."""
         return self._task("step", task)
-
-    def _shown(self, name: str) -> tuple[str, str]:
-        if len(name) > MAX_NAME:
-            raise OperationRefused(f"a name of {len(name)} characters: the longest has {MAX_NAME}")
-        plain = "".join(name.split()).upper()
-        owner, dot, local = plain.partition(".")
-        if dot:
-            return plain, self._local(self._known(owner), local)
-        try:
-            found = common_named(self._rack.config, name)
-        except NameFault as fault:
-            raise OperationRefused(_reason(fault)) from fault
-        return found.label, source_text(self._rack.value(found.name, found.index))
-
-    def _local(self, task: str, name: str) -> str:
-        try:
-            value = self._rack.task(task).value(name)
-        except KeyError as error:
-            raise OperationRefused(f"task {task} has no variable {quoted(name)} of its own") from error
-        return ", ".join(map(source_text, value)) if isinstance(value, list) else source_text(value)
 
     def _common_value(self, what: str, name: str, text: str) -> Value:
         """Return the value that a text writes for a variable; a name that is none is left for the rack to refuse."""
@@ -235,14 +237,6 @@ class Orders:
         self._short(what, name, MAX_NAME)
         return name.strip().upper()
 
-    def _known(self, name: str) -> str:
-        """Return a task's name; a question is not an operation, so nobody is told of its refusal."""
-        known = {item.name for item in self._rack.tasks}
-        plain = name.strip().upper()
-        if plain not in known:
-            raise OperationRefused(f"the rack has no task {quoted(name)}: it has {', '.join(sorted(known))}")
-        return plain
-
     def _few(self, what: str, names: Sequence[str]) -> Sequence[str]:
         if len(names) > MAX_NAMES:
             self._refuse(what, f"{len(names)} names: at most {MAX_NAMES} are taken at once")
@@ -258,5 +252,9 @@ class Orders:
         raise OperationRefused(reason)
 
 
-def _reason(fault: Fault) -> str:
-    return f"{fault.message}: {fault.hint}" if fault.hint else fault.message
+def _is_tunable(field: StateField) -> bool:
+    return field.role is Role.TUNABLE
+
+
+def _source_value(value: Value | list[Value] | None) -> str:
+    return f"{source_text(value)} again" if value is not None and not isinstance(value, list) else "not there any more"

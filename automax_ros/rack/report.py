@@ -8,6 +8,7 @@ from typing import Any
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.rack.config import CommonVariable
+from automax_ros.rack.display import displays_of
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.standing import StopCause
 from automax_ros.rack.stimuli.stage import Happened
@@ -33,6 +34,9 @@ def report_of(rack: Rack, happened: Iterable[Happened] = ()) -> dict[str, Any]:
             variable.name: _nested(rack.memory.present(view), variable)
             for view, variable in enumerate(rack.config.variables)
             if variable.bank is None
+        },
+        "displays": {
+            shown.module: {"code": shown.code or None, "meaning": shown.meaning} for shown in displays_of(rack)
         },
         "forced": [item.name for item in rack.forces()],
         "operations": [_operation(item) for item in happened],

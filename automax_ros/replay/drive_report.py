@@ -13,6 +13,7 @@ from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
 from automax_ros.bags.traces import MAX_LINES, ErrorMarks, Traces
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.display import meaning_of
 from automax_ros.replay.drive_run import DriveRun
 from automax_ros.replay.drive_signals import ReportDrive, report_drives
 from automax_ros.replay.stored_rack import stored_rack
@@ -136,4 +137,6 @@ def error_text(code: int, line: int) -> str:
 def operation_text(operation: Operation) -> str:
     """Return an operation in words."""
     words = " ".join(text for text in (operation.what, operation.task, operation.detail) if text)
+    if operation.what == "stop_all" and operation.detail:
+        words += f": code {operation.detail}, {meaning_of(operation.detail)}"
     return words if operation.ok else f"{words}: refused, {operation.reason}"

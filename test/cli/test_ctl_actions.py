@@ -86,6 +86,7 @@ def test_every_action_asks_a_service_with_fields_that_it_has(name, tmp_path):
         "module": ("7", "test_switch", "A"),
         "power": ("on",),
         "lifecycle": ("activate",),
+        "press": ("A@",),
         "unforce": ("--all",),
     }
     assigned, named = {"set", "force", "tune"}, {"run", "stop", "delete", "get", "watch"}

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from automax_ros.rack.controls import Controls
+from automax_ros.rack.display import Display, displays_of
+from automax_ros.rack.drive_trips import DriveTrips
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
 
@@ -123,6 +126,7 @@ def test_a_shorted_scr_trips_and_is_named_at_the_next_start(tmp_path):
     assert reset(rack)
     assert not start(rack)
     assert (active(rack), rack.value("NUM%"), logged(rack)) == ({"BAD@"}, 3, [7110, 7116])
+    assert displays_of(rack) == [Display("processor_0", "87", "shorted SCR")]
     controls.plant("UNWIND", "repair", "all")
     assert reset(rack)
     assert start(rack)
@@ -131,11 +135,20 @@ def test_a_shorted_scr_trips_and_is_named_at_the_next_start(tmp_path):
 
 def test_a_lost_tachometer_stops_a_drive_that_would_run_away(tmp_path):
     rack = turning(tmp_path)
+    trips = DriveTrips(rack)
+    assert trips.lines() == []
+    at_s = rack.now_ns / 1e9
     Controls(rack).plant("UNWIND", "lose_tach", "true")
     rack.run(0.3)
     assert tripped(rack, "TACH@")
     assert rack.plants["UNWIND"].motor.speed_rad_s < 200.0
+    (line,) = trips.lines()
+    found = re.fullmatch(r"CML: tach loss at ([0-9.]+) s, not cleared", line)
+    assert found
+    assert at_s - 0.05 <= float(found[1]) <= at_s + 0.35
+    assert DriveTrips(rack).lines() == ["CML: tach loss, not cleared"], "nobody was there to note the time"
     assert reset(rack)
+    assert trips.lines() == []
 
 
 @pytest.mark.parametrize("verb", [("line_hz", "55"), ("lose_phase", "1")])
