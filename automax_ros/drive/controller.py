@@ -80,7 +80,8 @@ class DriveController:
         if self.watch() or self.overspeed.sees:
             status |= OVERSPEED
             self.overspeed.told()
-        if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.rated_v:
+        sync = plant.sync
+        if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.rated_v and sync.is_there:
             status |= LINE
         if line.rotation is Rotation.CBA:
             status |= ROTATION_ABC
@@ -96,7 +97,7 @@ class DriveController:
             voltage = _word(volts * VOLTS / plant.rated_v)
         if status & LINE:
             turn = fmod(line.angle(now_ns), TURN)
-            since_ns = round((turn if turn >= 0.0 else turn + TURN) / line.omega * 1e9)
+            since_ns = round(sync.since(turn if turn >= 0.0 else turn + TURN) / line.omega * 1e9)
         values = (
             status,
             _word(amps / rated_a * RATED),
