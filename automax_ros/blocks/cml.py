@@ -90,7 +90,11 @@ INPUTS = (
     _integer("TEST_ALPHA", "firing angle in test mode in degrees; read in run", 180),
     _integer("IOC_THRESH", "instantaneous overcurrent in % of the rated current; fixed", required=True),
     _integer("LIM_BAR", "largest current in % of the rated current; fixed", required=True),
-    _boolean("DIGITAL_TACH", "TRUE: the drive has a digital tachometer; fixed", default=True),
+    _boolean(
+        "DIGITAL_TACH",
+        "TRUE: digital tachometer; the hardware watches its speed; fixed",
+        default=True,
+    ),
     _symbol("SPEED_FDBK", DataType.INTEGER, "speed for the tach loss fault, 4095 = 100 %; cannot be forced"),
     _boolean("TACH_LOSS_STOP", "TRUE: tach loss stops the drive, FALSE: it is shown alone; fixed", default=True),
     _symbol("OSV_FDBK", DataType.INTEGER, "speed or voltage for the overspeed fault; cannot be forced"),

@@ -183,8 +183,21 @@ class AcLine(Stateful):
         require("time constant in s", tau_s, 0.0, above=True)
         self._schedule(at_ns, ("voltage", _voltage(v_ll_v), 0.0, tau_s))
 
+    @property
+    def is_moving(self) -> bool:
+        """Whether voltage or frequency move, or a change is to come."""
+        return self._frequency.moving or self._voltage.moving or bool(self._pending)
+
     def generator_transient(
-        self, at_ns: int, dip: float, frequency_dip_hz: float, fall_s: float, recovery_s: float
+        self,
+        at_ns: int,
+        dip: float,
+        frequency_dip_hz: float,
+        fall_s: float,
+        recovery_s: float,
+        *,
+        volts: float | None = None,
+        hertz: float | None = None,
     ) -> None:
         """Imitate a generator that takes a load: voltage and frequency sag with one time constant, then recover.
 
@@ -194,9 +207,12 @@ class AcLine(Stateful):
             frequency_dip_hz: how far the frequency sags, Hz.
             fall_s: time constant of the sag, s; the recovery begins after three of them (decision).
             recovery_s: time constant of the recovery, s.
+            volts: the voltage from which it sags and to which it recovers, V rms; None for where it is going.
+            hertz: the same of the frequency, Hz.
         """
         require("dip of the voltage", dip, 0.0, 0.99)
-        volts, hertz = self._voltage.target, self._frequency.target
+        volts = self._voltage.target if volts is None else volts
+        hertz = self._frequency.target if hertz is None else hertz
         turn_ns = at_ns + round(3 * fall_s * 1e9)
         self.settle_voltage(at_ns, volts * (1 - dip), fall_s)
         self.settle_frequency(at_ns, hertz - frequency_dip_hz, fall_s)

@@ -16,6 +16,7 @@ from automax_ros.drive.cml.signals import (
     LATEST_US,
     LINE,
     OVERCURRENT,
+    OVERSPEED,
     RATED,
     ROTATION_ABC,
     VOLTAGE,
@@ -24,6 +25,7 @@ from automax_ros.drive.cml.signals import (
     Measured,
     gate_numbers,
 )
+from automax_ros.drive.overspeed import OverspeedCircuit
 from automax_ros.drive.plant import DrivePlant
 from automax_ros.drive.scr import mask_of
 
@@ -50,9 +52,10 @@ def _gate_mask(word: int) -> int:
 class DriveController:
     """Measures a plant at interrupts and carries out commands; without a plant there is no line."""
 
-    def __init__(self, plant: DrivePlant | None) -> None:
-        """Begin with gates off."""
+    def __init__(self, plant: DrivePlant | None, full_rpm: float | None = None) -> None:
+        """Begin with gates off; ``full_rpm``: what the digital tachometer shows as 4095, None for base speed."""
         self.plant = plant
+        self.overspeed = OverspeedCircuit(plant, full_rpm)
         self.level = 400
         self.late_us = 0
         self._ahead = (0, 0)
@@ -74,7 +77,11 @@ class DriveController:
         circuit, line = plant.circuit, plant.line
         sample = plant.sample()
         status |= self.late_us << LATE_BIT
-        if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.rated_v:
+        if self.watch() or self.overspeed.sees:
+            status |= OVERSPEED
+            self.overspeed.told()
+        sync = plant.sync
+        if 0 not in line.missing and line.v_ll_v >= LEAST_SYNC * plant.rated_v and sync.is_there:
             status |= LINE
         if line.rotation is Rotation.CBA:
             status |= ROTATION_ABC
@@ -90,7 +97,7 @@ class DriveController:
             voltage = _word(volts * VOLTS / plant.rated_v)
         if status & LINE:
             turn = fmod(line.angle(now_ns), TURN)
-            since_ns = round((turn if turn >= 0.0 else turn + TURN) / line.omega * 1e9)
+            since_ns = round(sync.since(turn if turn >= 0.0 else turn + TURN) / line.omega * 1e9)
         values = (
             status,
             _word(amps / rated_a * RATED),
@@ -122,6 +129,8 @@ class DriveController:
             return
         plant.advance(now_ns)
         self.level = command.level
+        if self.overspeed.holds(ok=command.ok):
+            return
         plant.relay(on=command.relays != 0)
         if command.block:
             plant.bridge.cancel(plant.now_ns)
@@ -142,21 +151,36 @@ class DriveController:
             if after_ns >= command.next_ns:
                 self._ahead = (on_ns, gates)
 
+    def watch(self) -> bool:
+        """Let the overspeed circuit look at the plant's present; return whether it has tripped and was not told.
+
+        As it trips gates and contactor are off, whatever the loop commands, or where none does.
+        """
+        if self.overspeed.look():
+            self._suppress()
+        return self.overspeed.is_news
+
     def state(self) -> list[int]:
         """Return what the future depends on, besides the plant."""
-        return [self.level, self.late_us, *self._ahead, *self._fired]
+        return [self.level, self.late_us, *self._ahead, *self._fired, *self.overspeed.state()]
 
     def load(self, state: Sequence[int]) -> None:
         """Take over what ``state`` gave."""
-        self.level, self.late_us, ahead_ns, ahead, fired_ns, fired = state
+        self.level, self.late_us, ahead_ns, ahead, fired_ns, fired, *overspeed = state
         self._ahead, self._fired = (ahead_ns, ahead), (fired_ns, fired)
+        self.overspeed.load(overspeed)
 
     def off(self, now_ns: int) -> None:
         """Suppress all gates at an instant, ns, and turn the contactor's relay off: nobody commands any more."""
         self.late_us = 0
+        if self.plant is not None:
+            self.plant.advance(now_ns)
+        self._suppress()
+
+    def _suppress(self) -> None:
+        """Suppress all gates and turn the contactor's relay off, at the plant's present."""
         self._ahead = self._fired = (0, 0)
         plant = self.plant
         if plant is not None:
-            plant.advance(now_ns)
             plant.bridge.cancel(plant.now_ns)
             plant.relay(on=False)

@@ -20,6 +20,7 @@ from automax_ros.drive.motor import FieldWinding, Motor
 from automax_ros.drive.nameplate import DriveParameters
 from automax_ros.drive.plant_meter import PlantMeter
 from automax_ros.drive.state import SavedState, Stateful, check_names
+from automax_ros.drive.sync_signal import SyncSignal
 
 PICK_UP_NS: Final = 60_000_000
 DROP_OUT_NS: Final = 20_000_000
@@ -94,10 +95,13 @@ class DrivePlant(Stateful):
         rated_v: nominal line-to-line voltage, V rms.
         meter: what an observer measures by, None while nobody does.
         notes: what is broken, as the verbs of ``plant_faults`` that broke it.
+        sag: percentage of the line's voltage that a sag leaves.
         sag_end_ns: until when the line's voltage sags (ns), 0 where no end is known.
+        usual_hz: the line's frequency but for a generator's transient, Hz.
+        sync: the line as the sync transformer sees it.
     """
 
-    _kept = ("_contacts", "_relay", "_load_nm", "notes", "sag_end_ns")
+    _kept = ("_contacts", "_relay", "_load_nm", "notes", "sag", "sag_end_ns", "usual_hz")
 
     def __init__(self, data: PlantData, *, energy: bool = False) -> None:
         """Begin at rest, without current, the contactor open."""
@@ -121,7 +125,10 @@ class DrivePlant(Stateful):
         self._relay = False
         self._contacts: list[tuple[int, bool]] = []
         self.notes: list[str] = []
+        self.sag = 100.0
         self.sag_end_ns = 0
+        self.usual_hz = parameters.line_hz
+        self.sync = SyncSignal()
         self._together: Callable[[int], None] | None = None
 
     def _motor(self) -> Motor:
@@ -209,7 +216,7 @@ class DrivePlant(Stateful):
 
     def state(self) -> SavedState:
         """Return all that its future depends on."""
-        return super().state() | {"circuit": self.circuit.state()}
+        return super().state() | {"circuit": self.circuit.state(), "sync": self.sync.state()}
 
     def restore(self, state: SavedState) -> None:
         """Take a state over.
@@ -217,10 +224,11 @@ class DrivePlant(Stateful):
         Raises:
             ParameterError: it is not the state of such a plant.
         """
-        check_names("plant", state, (*self._kept, "circuit"))
+        check_names("plant", state, (*self._kept, "circuit", "sync"))
         super().restore({name: state[name] for name in self._kept})
         # Whether energies are metered is the observer's choice, and nothing else depends on it.
         self.circuit.energy = None if state["circuit"].get("energy") is None else EnergyMeter()
         self.circuit.restore(state["circuit"])
+        self.sync.restore(state["sync"])
         if self.meter is not None:
             self.begin_metering()

@@ -64,7 +64,10 @@ class Controls:
         except ParameterError as error:
             self._refuse("plant", told, str(error))
         plant.advance(self._rack.now_ns)
-        work_on(plant, verb, values)
+        try:
+            work_on(plant, verb, values)
+        except ParameterError as error:
+            self._refuse("plant", told, str(error))
         self._tell("plant", told)
 
     def load(self, name: str, torque_nm: float) -> None:

@@ -27,6 +27,7 @@ from automax_ros.rack.modules.kind import Module, Parts
 from automax_ros.rack.observers import Observers, RackObserver
 from automax_ros.rack.operations import Operations
 from automax_ros.rack.part import RackPart
+from automax_ros.rack.plants.config import full_speeds
 from automax_ros.rack.plants.feeding import PlantFeeds
 from automax_ros.rack.plants.running import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
@@ -119,6 +120,7 @@ class Rack:
             tell_writes=self.observers.tell_writes,
             writer={item.name: item.id for item in self.writers if item.kind is WriterKind.IO}.__getitem__,
             plants=self.plants,
+            full_speeds=full_speeds(config.feeds),
         )
         self.modules: list[Module] = [module.build(parts) for module in self.part.modules]
         self.operations = Operations(

@@ -57,6 +57,9 @@ class RecordedDrive:
     def initialise(self) -> None:
         """Do nothing: what a 57C406 did stands in the recording."""
 
+    def watch_speed(self, counts: int) -> None:
+        """Do nothing: what the circuit saw stands in the recording."""
+
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
         """Do nothing: scans come from the recording."""
 

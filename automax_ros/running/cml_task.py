@@ -57,6 +57,7 @@ class _LoopScans:
         self._recording = io if isinstance(io, RecordingIo) else None
         self._latched_ns = 0
         self._command = Command(0)
+        self._initialised = False
         self._take_latch = io.latch
         io.latch = self._latch_at
 
@@ -74,7 +75,7 @@ class _LoopScans:
             if recording is not None:
                 recording.record.reads.append((view, 0, value))
         outcome = task.loop.scan(now_ns, measured, _new(Inputs, inputs))
-        self._command = outcome.command
+        self._command, self._initialised = outcome.command, outcome.initialised
         if recording is not None:
             reads = recording.record.reads
             reads += noted_measured(measured)
@@ -97,7 +98,10 @@ class _LoopScans:
         return self._task.sense(self._latched_ns)
 
     def _give(self) -> None:
-        self._task.port.command(self._command)
+        port = self._task.port
+        if self._initialised:
+            port.watch_speed(self._task.loop.overspeed_counts)
+        port.command(self._command)
 
     def _clear(self, records: list[Value] | None) -> None:
         """Zero the diagnostic data at task initialisation (52.2.2)."""

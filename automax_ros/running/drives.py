@@ -26,6 +26,10 @@ class DrivePort(Protocol):
         """Give the registers 4136, 4137, 4138 and 4146 their defaults: the task is put into RUN (52.4 to 52.7)."""
         ...
 
+    def watch_speed(self, counts: int) -> None:
+        """Set up the hardware's overspeed circuit with a threshold, 4095 at full speed; 0 for none (52.1.5)."""
+        ...
+
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
         """Interrupt at ``first_ns`` and from then on.
 
@@ -105,6 +109,9 @@ class _NoModule:
     next_ns = None
 
     def initialise(self) -> None:
+        pass
+
+    def watch_speed(self, counts: int) -> None:
         pass
 
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:

@@ -269,7 +269,9 @@ def test_a_verb_that_is_not_there_is_refused_with_the_nearest():
 
 WORK = (
     ("short_scr", "4"), ("open_gate", "2"), ("blow_fuse", "1"), ("lose_phase", "B"), ("lose_tach", "true"),
-    ("lose_field", "true"), ("line_sag", "60 0.03"), ("line_hz", "59"), ("load_torque_nm", "200"), ("repair", "all"),
+    ("lose_field", "true"), ("line_sag", "60 0.03"), ("line_hz", "59"), ("load_torque_nm", "200"),
+    ("line_notches", "40"), ("line_noise", "2 5"), ("line_harmonic", "5 8 30"), ("generator_load", "15 1 0.02 0.05"),
+    ("repair", "all"),
 )  # fmt: skip
 
 

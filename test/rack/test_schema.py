@@ -198,6 +198,10 @@ def test_stimuli_know_the_verbs_of_a_rack():
         "{at: 1, reload: {A: {keep_state: true}}}",
         "{at: 1, plant: {P: {shrt_scr: 3}}}",
         "{at: 1, plant: {P: {line_sag: {for_s: 3}}}}",
+        "{at: 1, plant: {P: {line_noise: {seed: 3}}}}",
+        "{at: 1, plant: {P: {line_harmonic: {order: 5, phase_deg: 3}}}}",
+        "{at: 1, plant: {P: {generator_load: {dip_percent: 5}}}}",
+        "{at: 1, plant: {P: {line_notches: {depth_percent: 5, wide: 3}}}}",
         "{at: 1, stop_all: false}",
     ],
 )

@@ -50,6 +50,9 @@ class PlantPort:
         self.calls.append("initialise")
         self.registers = REGISTERS
 
+    def watch_speed(self, counts: int) -> None:
+        self.controller.overspeed.counts = counts
+
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:  # noqa: ARG002
         self.calls.append("arm")
 

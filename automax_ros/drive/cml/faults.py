@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from automax_ros.drive.cml.signals import EXTERNAL_TRIP, LINE, OVERCURRENT, ROTATION_ABC, Measured
+from automax_ros.drive.cml.signals import EXTERNAL_TRIP, LINE, OVERCURRENT, OVERSPEED, ROTATION_ABC, Measured
 from automax_ros.drive.state import Stateful
 
 if TYPE_CHECKING:
@@ -26,6 +26,11 @@ OSV: Final = 1 << 3
 EXT_IET: Final = 1 << 4
 PHROT: Final = 1 << 5
 BAD_SCR: Final = 1 << 6
+HARDWARE: Final = 1 << 7
+"""Stands beside OSV among the causes where the hardware's overspeed circuit saw it and OSV_FDBK does not."""
+OSV_PROBLEM: Final = 7113
+OVERSPEED_TRIP: Final = 7119
+"""What an OSV is logged as, and what it is logged as then."""
 
 
 class FaultKind(NamedTuple):
@@ -40,7 +45,7 @@ KINDS: Final = (
     FaultKind(IOC, "ioc_out", 7110),
     FaultKind(SYNC_LOSS, "sync_loss_out", 7111),
     FaultKind(TACH_LOSS, "tach_loss_out", 7112),
-    FaultKind(OSV, "osv_out", 7113),
+    FaultKind(OSV, "osv_out", OSV_PROBLEM),
     FaultKind(EXT_IET, "ext_iet_out", 7114),
     FaultKind(PHROT, "phrot_flt_out", 7115),
     FaultKind(BAD_SCR, "bad_scr_out", 7116),
@@ -100,6 +105,8 @@ class Faults(Stateful):
             found |= SYNC_LOSS
         if inputs.osv_fdbk is not None and abs(inputs.osv_fdbk) > settings.osv_thresh:
             found |= OSV
+        elif status & OVERSPEED and settings.digital_tach:
+            found |= OSV | HARDWARE
         if status & LINE and bool(status & ROTATION_ABC) != inputs.nonstand_phrot and not settings.auto_phrot:
             found |= PHROT
         if running and inputs.speed_fdbk is not None and self._tach_lost(measured, inputs.speed_fdbk, pll):
@@ -108,11 +115,14 @@ class Faults(Stateful):
 
     def latch(self, causes: int) -> list[int]:
         """Latch the faults of these bits; return the problems to log: those of the new ones."""
-        new = causes & ~self.active
+        new = causes & ~(self.active | HARDWARE)
         if not new:
             return []
         self.active |= new
-        return [kind.problem for kind in KINDS if kind.bit & new]
+        told = [kind.problem for kind in KINDS if kind.bit & new]
+        if causes & HARDWARE and new & OSV:
+            told[told.index(OSV_PROBLEM)] = OVERSPEED_TRIP
+        return told
 
     def blame(self, pair: int) -> list[int]:
         """Latch a shorted SCR of a pair, 1 to 6; return the problems to log."""

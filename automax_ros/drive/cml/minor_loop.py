@@ -88,6 +88,16 @@ class CurrentMinorLoop(Stateful):
             *self.control.parts,
         )  # fmt: skip
 
+    @property
+    def overspeed_counts(self) -> int:
+        """The threshold of the hardware's overspeed circuit, counts; 0 where it is not set up (52.1.5).
+
+        DIGITAL_TACH sets it up with OSV_THRESH, which it needs: without one, or with a bad fixed input, there is no
+        circuit (decision).
+        """
+        latched = self.latched
+        return latched.osv_thresh if latched.digital_tach and latched.usable else 0
+
     def scan(self, now_ns: int, measured: Measured, inputs: Inputs) -> Outcome:
         """Execute one scan at an interrupt.
 

@@ -27,6 +27,9 @@ RESET_SWITCH: Final = 1 << 7
 """The fault reset switch of the 57C406 is closed."""
 VOLTAGE: Final = 1 << 8
 """A 57C405 gives the armature voltage."""
+OVERSPEED: Final = 1 << 9
+"""The hardware's overspeed circuit, which DIGITAL_TACH sets up, has tripped since it was last told, or sees the speed
+above OSV_THRESH still (52.1.5)."""
 
 LATE_BIT: Final = 16
 """From this bit of ``Measured.status`` on stands how long after its interrupt the last command came, us: the time that

@@ -49,7 +49,8 @@ class DriveConfig(WithoutTasks):
     def build(self, parts: Parts) -> Module:
         """Return the module of a running rack."""
         plant = None if self.plant is None else parts.plants.get(self.plant.name)
-        return DriveControllerModule(self, parts, plant)
+        full_rpm = None if self.plant is None else parts.full_speeds.get(self.plant.name)
+        return DriveControllerModule(self, parts, plant, full_rpm)
 
 
 class DriveControllerKind:

@@ -41,14 +41,19 @@ class DriveControllerModule:
     kept: frozenset[tuple[int, int]] = frozenset()
     tasks: Sequence[ScheduledTask] = ()
 
-    def __init__(self, config: ModuleConfig, parts: Parts, plant: DrivePlant | None) -> None:
-        """Attach itself to the rack's drives; nothing happens before a task arms it."""
+    def __init__(
+        self, config: ModuleConfig, parts: Parts, plant: DrivePlant | None, full_rpm: float | None = None
+    ) -> None:
+        """Attach itself to the rack's drives; nothing happens before a task arms it.
+
+        ``full_rpm`` is the speed that the plant's tachometer shows as 4095, None for the motor's base speed.
+        """
         bank = parts.backplane.bank(config.slot)
         assert bank is not None
         self.config, self._parts, self._view, self._plant = config, parts, bank.view, plant
         self._memory, self._scheduler = parts.memory, parts.scheduler
         self._writer = parts.writer(config.name)
-        self._controller = DriveController(plant)
+        self._controller = DriveController(plant, full_rpm)
         self._interrupts = DriveInterrupts(parts.scheduler, config.slot, self._measure)
         self._switches = FrontSwitches(parts.scheduler, config.slot)
         self._digital = DriveDigital(parts.memory, parts.backplane, parts.scheduler, self._writer)
@@ -70,8 +75,9 @@ class DriveControllerModule:
             self._rest_from(self._scheduler.now_ns + REST_NS)
 
     def power_off(self) -> None:
-        """Nothing more: the task that has armed it was stopped, or has not begun."""
+        """Forget the overspeed circuit; the task that has armed it was stopped, or has not begun."""
         self.disarm()
+        self._controller.overspeed.unpower()
 
     def stopped_all(self) -> None:
         """Nothing more: the task that has armed it was stopped."""
@@ -125,6 +131,10 @@ class DriveControllerModule:
         for register, value in DEFAULTS.items():
             memory.write_now(self._view, value, self._writer, register, WriteKind.OUTSIDE)
 
+    def watch_speed(self, counts: int) -> None:
+        """Set up the overspeed circuit: it stays so when the task ends."""
+        self._controller.overspeed.counts = counts
+
     def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
         """Interrupt at ``first_ns`` and from then on."""
         self._end_rest()
@@ -162,13 +172,17 @@ class DriveControllerModule:
     def command(self, command: Command) -> None:
         """Carry out what shall happen up to the next interrupt; its times count from the last one."""
         self._controller.command(command, self._interrupts.at_ns, self._scheduler.now_ns)
-        self._digital.show(command.relays, ok=command.ok)
+        tripped = self._controller.overspeed.tripped
+        self._digital.show(0 if tripped else command.relays, ok=command.ok and not tripped)
         self._interrupts.follow(command.next_ns)
 
     def _measure(self, now_ns: int) -> None:
         """Measure at an interrupt; a 57C405 that is wired to the armature shows its voltage."""
         feedback = self._parts.drives.voltage(self.config.slot)
         self._measured = self._controller.measure(now_ns, VOLTAGE if feedback is not None else 0)
+        if self._controller.overspeed.tripped:
+            # A loop that hangs commands nothing: the hardware needs none.
+            self._digital.show(0, ok=False)
         if feedback is not None and self._plant is not None:
             line_v = self._plant.data.parameters.line_v
             feedback(self._measured.voltage * line_v / VOLTS, line_v)
@@ -189,6 +203,7 @@ class DriveControllerModule:
         plant = self._plant
         if plant is not None:
             plant.advance(now_ns)
+            self._controller.watch()
             feedback = self._parts.drives.voltage(self.config.slot)
             if feedback is not None:
                 feedback(plant.circuit.armature_v, plant.data.parameters.line_v)

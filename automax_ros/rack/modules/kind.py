@@ -260,7 +260,8 @@ class Parts:
     ``install`` makes their tasks; ``execution`` makes, by a module's name, what executes them. ``tell_writes`` tells
     observers of writes that no scan has made. ``writer`` returns the id under which a module writes registers.
     A 57C406 attaches itself to ``drives``.
-    ``plants`` are those with a motor, by name; the rack keeps their states.
+    ``plants`` are those with a motor, by name; the rack keeps their states. ``full_speeds`` has the speed (rpm) that a
+    plant's tachometer shows as 4095, by name, where a feed brings it in counts.
     """
 
     memory: CommonMemory
@@ -276,6 +277,7 @@ class Parts:
     tell_writes: Callable[[], None]
     writer: Callable[[str], int]
     plants: Mapping[str, DrivePlant]
+    full_speeds: Mapping[str, float]
 
 
 class Module(Protocol):

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from automax_ros.core.json_schema import Schema, named
 from automax_ros.drive.nameplate import EXAMPLES, NamePlate
+from automax_ros.drive.overspeed import FULL
 from automax_ros.drive.plant_coupling import CouplingData
 from automax_ros.rack.scale import Scale
 
@@ -152,3 +154,15 @@ class FeedConfig:
     every_ns: int
     scale: Scale | None = None
     line: int = 0
+
+
+def full_speeds(feeds: Iterable[FeedConfig]) -> dict[str, float]:
+    """Return by plant the speed (rpm) that its tachometer shows as 4095, of those whose feed brings it in counts.
+
+    A plant with several such feeds has that of the first (decision).
+    """
+    found: dict[str, float] = {}
+    for feed in feeds:
+        if feed.signal == "tach_rpm" and feed.scale is not None:
+            found.setdefault(feed.plant, abs(feed.scale.value_of(FULL)))
+    return found

@@ -5,7 +5,8 @@ from __future__ import annotations
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.plant_faults import VERBS, PlantVerb, values_of
+from automax_ros.drive.plant_faults import VERBS, values_of
+from automax_ros.drive.plant_verbs import PlantVerb
 from automax_ros.rack.controls import Controls
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.rack import Rack
@@ -55,7 +56,8 @@ def _text(verb: Scalar, node: Node, where: str, findings: Findings) -> str | Non
     try:
         values_of(verb.text, text)
     except ParameterError:
-        message = f"{verb.text} of {where} cannot be {kind_of(node)}: it takes {known.wants}"
+        given = quoted(text) if isinstance(node, Mapping) and known.keys else kind_of(node)
+        message = f"{verb.text} of {where} cannot be {given}: it takes {known.wants}"
         findings.add("AMX6736", message, node.span)
         return None
     return text
@@ -66,9 +68,16 @@ def _plain(node: Node) -> str:
 
 
 def _joined(verb: PlantVerb, node: Mapping, what: str, findings: Findings) -> str:
-    """Return the values of a form with keys, one after the other; "" where there was something to report."""
+    """Return the values of a form with keys, one after the other; "" where there was something to report.
+
+    A value that is left out before another is the usual one.
+    """
     section = Section(node.entries, what, verb.keys, findings)
-    if not section.require(verb.keys[:1], what, node.span, findings):
+    if not section.require(verb.keys[: verb.needed], what, node.span, findings):
         return ""
-    values = [section.get(key) for key in verb.keys]
-    return " ".join(_plain(value) for value in values if value is not None)
+    given = [section.get(key) for key in verb.keys]
+    last = max(place for place, value in enumerate(given) if value is not None)
+    return " ".join(
+        f"{verb.usual[place - verb.needed]:g}" if value is None else _plain(value)
+        for place, value in enumerate(given[: last + 1])
+    )

@@ -17,7 +17,8 @@ from automax_ros.core.json_schema import (
     words,
 )
 from automax_ros.core.ticks import MOST_SECONDS
-from automax_ros.drive.plant_faults import VERBS, PlantVerb
+from automax_ros.drive.plant_faults import VERBS
+from automax_ros.drive.plant_verbs import PlantVerb
 from automax_ros.rack.stimuli.reader import MOST_ENTRIES
 from automax_ros.rack.stimuli.values import LEAST_HZ
 from automax_ros.rack.stimuli.waves import MOST_HZ
@@ -72,7 +73,9 @@ def _of_plant(verb: PlantVerb) -> Schema:
     if not verb.keys:
         return scalar(text)
     keys = {key: {"type": "number"} for key in verb.keys}
-    return either(text, scalar("The first alone, or all with blanks between them."), section(text, keys, verb.keys[:1]))
+    first = "The first alone" if verb.needed == 1 else f"The first {verb.needed}"
+    plain = scalar(f"{first}, or more of them, with blanks between them.")
+    return either(text, plain, section(text, keys, verb.keys[: verb.needed]))
 
 
 _HZ = number("Periods per second.", LEAST_HZ, MOST_HZ)
