@@ -74,7 +74,9 @@ class LiveSession:
             self._ending.callback(self.live.close)
             begin_with(rack, plan.tunings)
             rack.observers.add(self._operated)
-            self._display = StatusDisplay(rack, plan.watch, live=True, health=self.live.health, screen=plan.screen)
+            self._display = StatusDisplay(
+                rack, plan.shown(rack), live=True, health=self.live.health, screen=plan.screen
+            )
             self._recording = RecordingWatch(self._recorder(), self._display)
         except BaseException:
             self._ending.close()

@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: 0.4)",
     )
     add_set_argument(parser)
-    add_watch_argument(parser, "the first published ones")
+    add_watch_argument(parser, "those of the rack file's `watch`")
     parser.add_argument(
         "--state",
         type=folder,
@@ -116,7 +116,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
         None,
         RecordingOptions(),
         tuple(settings_of(config, arguments.settings)),
-        tuple(watched_commons(config, arguments.watch)) if seat.is_home or arguments.watch else (),
+        watched_commons(config, arguments.watch),
         arguments.state,
         arguments.stimuli,
         arguments.report,

@@ -32,10 +32,10 @@ from automax_ros.cli.window import seconds_above_0
 from automax_ros.core.faults import Fault
 from automax_ros.core.types import bare_name
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS
-from automax_ros.rack.config import RackConfig
+from automax_ros.rack.config import CommonElement, RackConfig
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.retention import RetentionFault
-from automax_ros.rack.settings import CommonElement, watched
+from automax_ros.rack.settings import watched
 from automax_ros.running.simulated_pacer import SimulatedTime
 
 MOST_RATE = 1000.0
@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
     add_set_argument(parser, tunables=True)
     add_record_arguments(parser)
-    add_watch_argument(parser, "the first published ones")
+    add_watch_argument(parser, "those of the rack file's `watch`")
     parser.add_argument(
         "--state",
         type=folder,
@@ -198,7 +198,7 @@ def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
         arguments.record,
         recording_options(arguments, config),
         tuple(settings),
-        tuple(watched_commons(config, arguments.watch)),
+        watched_commons(config, arguments.watch),
         arguments.state,
         arguments.stimuli,
         arguments.report,
@@ -249,13 +249,13 @@ def check_files(arguments: argparse.Namespace) -> None:
         require_different_files(given, {"--report": arguments.report})
 
 
-def watched_commons(config: RackConfig, texts: list[str] | None) -> list[CommonElement]:
-    """Return what ``--watch`` names, or what is shown without it.
+def watched_commons(config: RackConfig, texts: list[str] | None) -> tuple[CommonElement, ...] | None:
+    """Return what ``--watch`` names, None without it.
 
     Raises:
         UsageError: the rack has no such variable.
     """
     try:
-        return watched(config, watch_list(texts))
+        return None if texts is None else tuple(watched(config, watch_list(texts)))
     except Fault as error:
         raise UsageError(f"--watch: {error.message}", error.hint) from error

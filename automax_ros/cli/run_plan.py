@@ -17,14 +17,15 @@ from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.types import Value
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
-from automax_ros.rack.config import RackConfig
+from automax_ros.rack.config import CommonElement, RackConfig
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.report import report_of
 from automax_ros.rack.retention import default_folder
 from automax_ros.rack.seating import Seat
-from automax_ros.rack.settings import CommonElement
+from automax_ros.rack.settings import watched
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.stage import Happened
+from automax_ros.rack.tasks_check import check_tasks
 from automax_ros.rack.tunings import Tuning
 from automax_ros.running.simulated_pacer import SimulatedTime
 
@@ -50,7 +51,8 @@ class RunPlan:
     """A run.
 
     ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the one that was
-    named for values that outlive the run, if any. ``stimuli`` is the file of what happens to the rack, ``report`` that
+    named for values that outlive the run, if any. ``watch`` is what ``--watch`` names, None without it.
+    ``stimuli`` is the file of what happens to the rack, ``report`` that
     in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
     command line says to ROS. ``seat`` is the part of the rack that is run, None for all of it.
     ``simulated`` is simulated time where the rack has ROS nodes all the same. ``tunings`` is what ``--set`` tunes.
@@ -62,7 +64,7 @@ class RunPlan:
     record: Path | None
     recording: RecordingOptions
     settings: tuple[tuple[str, Value], ...]
-    watch: tuple[CommonElement, ...]
+    watch: tuple[CommonElement, ...] | None
     state: Path | None = None
     stimuli: Path | None = None
     report: Path | None = None
@@ -91,6 +93,17 @@ class RunPlan:
             return self.state
         whole = default_folder(self.config)
         return whole if self.seat is None else whole / self.seat.seat.name
+
+    def shown(self, rack: Rack) -> Sequence[CommonElement]:
+        """Return the commons that the status line of a rack, or of this process's part of it, shows."""
+        if self.watch is not None:
+            return self.watch
+        if self.seat is not None and not self.seat.seat.is_home:
+            return ()
+        if self.seat is None or rack.config.watch is not None:
+            return watched(rack.config, None, rack.operations.installation.programs.values())
+        programs = [item.result.program for item in check_tasks(rack.config)]  # tasks are in other processes
+        return watched(rack.config, None, [program for program in programs if program is not None])
 
     @property
     def screen(self) -> Screen:

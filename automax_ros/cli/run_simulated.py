@@ -34,7 +34,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
         stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
     stream = RackStream(rack, rack.fingerprint)
     recorder = Recorder(rack, stream, plan.record, plan.recording) if plan.record is not None else None
-    display = StatusDisplay(rack, plan.watch, live=False)
+    display = StatusDisplay(rack, plan.shown(rack), live=False)
     recording = RecordingWatch(recorder, display)
     state = StateKeeping(rack, plan.state)
     begin_with(rack, plan.tunings)

@@ -11,11 +11,12 @@ from automax_ros.cli.status_line import StatusLine
 from automax_ros.cli.status_parts import Progress, Summary
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Value
 from automax_ros.core.values import value_text
+from automax_ros.rack.config import CommonElement
 from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import CommonElement
 from automax_ros.running.health import Health
 
 
@@ -167,5 +168,13 @@ class StatusDisplay:
         return dict(self._health.counts) if self._health else errors
 
     def _values(self) -> tuple[str, ...]:
-        values = [value_text(self._rack.value(item.name, item.index)) for item in self._watch]
-        return tuple(f"{item.label}={printable(value)}" for item, value in zip(self._watch, values, strict=True))
+        return tuple(f"{item.label}={_shown(item, self._rack.value(item.name, item.index))}" for item in self._watch)
+
+
+def _shown(item: CommonElement, value: Value) -> str:
+    """Return a value as the rack file means it: by its scale, with its unit."""
+    variable = item.variable
+    text = value_text(value)
+    if variable.scale is not None and isinstance(value, int):
+        text = f"{variable.scale.value_of(value):.6g}"
+    return printable(f"{text} {variable.unit}".rstrip())

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 
 from automax_ros.core.kinds import Direction
+from automax_ros.core.names import Element
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.executive import NEWEST
 from automax_ros.rack.modules.kind import ModuleConfig, Registers
@@ -105,6 +106,10 @@ class CommonVariable:
         return self.preset if isinstance(self.preset, tuple) else (self.preset,) * self.elements
 
 
+CommonElement = Element[CommonVariable]
+"""A simple common variable, or one element of an array."""
+
+
 @dataclass(frozen=True)
 class RackConfig:
     """A rack without errors.
@@ -113,7 +118,8 @@ class RackConfig:
     stand in the order of slots, variables in the order of the file; after them the registers of the modules that have
     some, each as one variable with a ``bank``. ``executive`` is the version of the Programming Executive in tenths (42
     is 4.2), ``auto_run`` whether the tasks that ran are put into RUN after a power cycle. ``plants`` stand in the order
-    of the file, ``feeds`` and ``joint_commands`` in that of their plants.
+    of the file, ``feeds`` and ``joint_commands`` in that of their plants. ``watch`` are the commons that are worth
+    looking at, None where the file does not say.
     """
 
     name: str
@@ -130,6 +136,7 @@ class RackConfig:
     plants: tuple[PlantConfig, ...] = ()
     feeds: tuple[FeedConfig, ...] = ()
     joint_commands: tuple[JointCommand, ...] = ()
+    watch: tuple[CommonElement, ...] | None = None
 
     @cached_property
     def by_name(self) -> Mapping[str, CommonVariable]:

@@ -30,6 +30,8 @@ from automax_ros.rack.slots import SCHEMA as SLOTS_SCHEMA
 from automax_ros.rack.slots import SlotReader
 from automax_ros.rack.tasks import TaskReader
 from automax_ros.rack.views import bank_variables
+from automax_ros.rack.watching import SCHEMA as WATCH_SCHEMA
+from automax_ros.rack.watching import read_watch
 
 _START = Span(1, 1, 2)
 _NAME = re.compile(r"""^rack[ ]*:[ ]*(?:["']?)(\w{1,8})(?:["']?)[ ]*(?:#.*)?$""", re.MULTILINE)
@@ -48,6 +50,7 @@ KEYS: Keys = {
     "slots": SLOTS_SCHEMA,
     "plants": PLANTS_SCHEMA,
     "common": COMMON_SCHEMA,
+    "watch": WATCH_SCHEMA,
 }
 """What a rack file may say at its top."""
 _REQUIRED = ("rack", "slots")
@@ -151,6 +154,9 @@ class _RackReader:
             self._check_size(variables, modules, section.key_span("common"))
         feeds = read_feeds(plants.feeds, variables, modules, self._findings)
         commands = read_commands(plants.joints, variables, self._findings)
+        everything = (*variables, *bank_variables(modules))
+        watch = section.get("watch")
+        shown = read_watch(watch, everything, self._findings) if watch is not None else None
         if name is None or self._findings.errors:
             return None
         return RackConfig(
@@ -160,7 +166,7 @@ class _RackReader:
             text=self._text,
             operator=operator,
             modules=modules,
-            variables=(*variables, *bank_variables(modules)),
+            variables=everything,
             execution=execution,
             executive=executive,
             auto_run=auto_run,
@@ -168,6 +174,7 @@ class _RackReader:
             plants=tuple(plants.known.values()),
             feeds=feeds,
             joint_commands=commands,
+            watch=shown,
         )
 
     def _name(self, node: Node | None) -> str | None:

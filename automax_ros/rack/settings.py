@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import Element, NameFault, element
 from automax_ros.core.settings import setting as core_setting
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.language.program import Program
+from automax_ros.language.written import lines_that_write
+from automax_ros.rack.config import CommonElement, RackConfig
 from automax_ros.rack.names import PREDEFINED
 
-CommonElement = Element[CommonVariable]
-"""A simple common variable, or one element of an array."""
 DEFAULT_WATCHED = 5
 """How many variables a status line shows when nobody chose any."""
 _ABSENT = "the rack has no common variable"
@@ -30,19 +30,28 @@ def setting(config: RackConfig, text: str) -> tuple[str, Value]:
     return meant.label, value
 
 
-def watched(config: RackConfig, names: Sequence[str] | None) -> list[CommonElement]:
-    """Return what the given names mean, such as ``REF%`` and ``TABLE%(3)``; without names the first published commons.
+def watched(
+    config: RackConfig, names: Sequence[str] | None, programs: Iterable[Program] = ()
+) -> Sequence[CommonElement]:
+    """Return what the given names mean, such as ``REF%`` and ``TABLE%(3)``; without names what the rack file watches.
+
+    Where it says nothing either, these are the first published commons that control-block tasks among ``programs``
+    write, and after them the first others: a panel's push-buttons stand first in many files, and say least.
 
     Raises:
         NameFault: there is no such simple common or element.
     """
     if names is not None:
         return [common_named(config, name) for name in names]
+    if config.watch is not None:
+        return config.watch
+    written = {name for program in programs if not program.is_basic for name in lines_that_write(program)}
     published = [
         variable
         for variable in config.variables
         if variable.direction is not Direction.CLOSED and not variable.is_array and variable.type is not DataType.STRING
     ]
+    published.sort(key=lambda variable: variable.name not in written)
     return [Element(variable) for variable in published[:DEFAULT_WATCHED]]
 
 

@@ -40,6 +40,7 @@ def test_counts_are_those_of_the_summary() -> None:
     counts = {
         channel.topic: (expected.schemas[channel.schema_id].name, expected.statistics.channel_message_counts[number])
         for number, channel in expected.channels.items()
+        if number in expected.statistics.channel_message_counts  # nobody operates the rack: that topic is empty
     }
     assert {name: (topic.type_name, topic.messages) for name, topic in info.topics.items()} == counts
     (file,) = info.files

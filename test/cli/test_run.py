@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from pathlib import Path
 
 import pytest
 
@@ -52,7 +53,7 @@ def test_summary_of_a_run(run):
     assert re.fullmatch(r"ran 1\.100 s in \d+\.\d\d s \(\d+ times real time\)", first)
     assert header.split() == ["task", "slot", "period", "ms", "scans", "late", "errors"]
     assert task.split() == ["TASK", "0", "11", "100", "0", "0"]
-    assert values.split() == ["REF%=5", "RUN@=0", "GAIN=1.5", "TOTAL!=500"]
+    assert values.split() == ["TOTAL!=500", "REF%=5", "RUN@=0", "GAIN=1.5"]
 
 
 def test_run_time_errors_stand_in_the_summary(run):
@@ -383,6 +384,32 @@ def test_plain_line_comes_every_five_seconds(rack, capsys, monkeypatch):
     lines = capsys.readouterr().out.splitlines()
     # 91 scans per second of 110 us each are 1 % of the Processor's time.
     assert [line.split("  ")[-3:] for line in lines] == [["91 scans/s", "P0 1.0 % late 0", "REF%=5"]] * 2
+
+
+def test_a_value_is_shown_by_its_scale_and_with_its_unit(automax, capsys):
+    rack = (
+        "rack: D\nwatch: [P%, D%, A%]\nslots: {0: {module: 57C435}, 6: {module: 57C409}}\ncommon:\n  A%: {}\n"
+        "  P%: {slot: 6, register: 0, ros: in, scale: {counts: [0, 4095], value: [0, 10]}, unit: bar}\n"
+        "  D%: {unit: fpm}\n"
+    )
+    config = load(automax.write("rack.yaml", rack)).config
+    assert config is not None
+    rack = Rack(config)
+    rack.start([("P%", 1000), ("D%", 7)])
+    StatusDisplay(rack, watched(config, None), live=False).finish(None)
+    assert "P%=2.442 bar  D%=7 fpm  A%=0\n" in capsys.readouterr().out
+
+
+def test_the_example_that_make_run_runs_shows_the_motor(automax):
+    """Finding 14: its panel's push-buttons stood there."""
+    example = Path(__file__).parents[2] / "config" / "dc_drive"
+    last = automax("run", example, "--simulated", "--duration", "0.1").out.splitlines()[-1]
+    assert [part.partition("=")[0] for part in last.split("  ")[1:]][:5] == [
+        "RPM", "SPD%", "SPEED_REF%", "CUR_FB%", "DELTA%"
+    ]  # fmt: skip
+    assert " rpm  " in last
+    chosen = automax("run", example, "--simulated", "--duration", "0.1", "--watch", "FAULT@")
+    assert chosen.out.splitlines()[-1] == "  FAULT@=0"
 
 
 def test_text_of_a_string_cannot_drive_the_terminal(rack, capsys):

@@ -9,6 +9,7 @@ from automax_ros.core.kinds import Direction
 from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType
 from automax_ros.rack.config import CommonVariable, RackConfig
+from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import DEFAULT_WATCHED, setting, watched
 
 from .helpers import HEAD, good
@@ -36,6 +37,25 @@ def test_default_is_the_first_published_numbers_and_booleans(config):
     names = [item.name for item in watched(config, None)]
     assert names == ["REF%", "A%", "B@", "C!", "D"]
     assert len(names) == DEFAULT_WATCHED
+
+
+def test_what_control_block_tasks_write_comes_before_inputs(tmp_path):
+    """Finding 14: the first published commons of a rack are its panel's push-buttons."""
+    head = HEAD.replace("LINE: {priority: 5}", "LINE: {priority: 5}, DIAG: {priority: 11, file: DIAG.BAS}")
+    (tmp_path / "DIAG.BAS").write_text("10 COMMON B@\n20 B@=TRUE\n30 END\n")
+    config = good(tmp_path, head + COMMON)
+    (tmp_path / "LINE.BLK").write_text(
+        "10 COMMON REF%, A%, D\n20 CALL SCAN_LOOP(TICKS=2)\n30 CALL LIMIT(INPUT=REF%, OUTPUT=A%)\n40 D=1.0\n50 END\n"
+    )
+    programs = Rack(config).operations.installation.programs.values()
+    assert [item.name for item in watched(config, None, programs)] == ["A%", "D", "REF%", "B@", "C!"]
+
+
+def test_what_the_rack_file_watches_comes_first_of_all(tmp_path):
+    config = good(tmp_path, HEAD + COMMON + "watch: [e%, 'GRID%(1,2)', NOTE$]\n")
+    assert [item.label for item in watched(config, None)] == ["E%", "GRID%(1,2)", "NOTE$"]
+    assert [item.label for item in watched(config, ["A%"])] == ["A%"]
+    assert watched(good(tmp_path, HEAD + COMMON + "watch: []\n"), None) == ()
 
 
 def test_names_of_the_command_line_keep_their_order(config):

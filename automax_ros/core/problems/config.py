@@ -32,6 +32,9 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6210", "tick rate"),
     # rack files: tasks
     Problem("AMX6300", "task name"),
+    Problem("AMX6220", "common that watch names"),
+    Problem("AMX6221", "common that watch names twice"),
+    Problem("AMX6222", "too many commons to watch"),
     Problem("AMX6301", "task name used twice in the rack"),
     Problem("AMX6302", "priority of a task"),
     Problem("AMX6303", "too many tasks on one Processor"),

@@ -14,6 +14,7 @@ from automax_ros.core.types import DataType
 from automax_ros.core.values import value_of, wanted
 from automax_ros.core.yaml_text import Mapping as Keys
 from automax_ros.core.yaml_text import Node, Scalar, Sequence
+from automax_ros.rack.config import CommonElement
 from automax_ros.rack.files import FileFault, stays_next_to
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.local_names import local_named
@@ -21,7 +22,7 @@ from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.scalars import boolean_value, is_plain_word, kind_of, text_value, wrong_kind
 from automax_ros.rack.sections import Section, entries_of
-from automax_ros.rack.settings import CommonElement, common_named
+from automax_ros.rack.settings import common_named
 from automax_ros.rack.stimuli.controls import control_verbs
 from automax_ros.rack.stimuli.operating import OnRack, OnTask, OnValue, Reload
 from automax_ros.rack.stimuli.reading import Read, Verb, cut_short, named, time_of, value_for

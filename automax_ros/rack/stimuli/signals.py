@@ -9,10 +9,11 @@ from typing import Protocol
 
 from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType, Value
+from automax_ros.rack.config import CommonElement
 from automax_ros.rack.local_names import LocalElement
 from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import CommonElement, common_named
+from automax_ros.rack.settings import common_named
 from automax_ros.rack.writers import OPERATOR_WRITER
 from automax_ros.running.lone_task import LoneTask
 
