@@ -35,9 +35,11 @@ def _facts(case: DriveCase | None) -> list[str]:
     rated = f"{case.armature_v:.4g} V, {parameters.amps:.4g} A, {case.base_rpm:.4g} rpm, {case.rated_n_m:.4g} N m"
     armature = f"{motor.resistance_ohm:.4g} ohm, {motor.inductance_h * 1e3:.4g} mH"
     line = f"{parameters.line_v:.4g} V, {parameters.line_hz:g} Hz, {parameters.source_h * 1e3:.4g} mH a phase"
+    computing = case.computing
+    loop = "" if computing is None else f" on a {computing.model}, {computing.execution} execution"
     return [
         f"motor: {rated}; armature {armature}; inertia {motor.inertia_kg_m2 * case.inertia:.4g} kg m2 with its load",
-        f"line: {line}" + (f"; current minor loop: task {case.task}" if case.task else ""),
+        f"line: {line}" + (f"; current minor loop: task {case.task}{loop}" if case.task else ""),
     ]
 
 
@@ -59,11 +61,20 @@ def records_of(found: Iterable[DriveFindings]) -> list[dict[str, Any]]:
             "drive": drive.name,
             "where": drive.where,
             "task": drive.case.task or None if drive.case is not None else None,
+            **_execution(drive.case),
             "verdict": drive.verdict.value,
             "findings": [_record(item) for item in drive.findings],
         }
         for drive in found
     ]
+
+
+def _execution(case: DriveCase | None) -> dict[str, str | None]:
+    """Return how the loop's task is executed, and on what Processor; null where there is no such task."""
+    computing = case.computing if case is not None else None
+    if computing is None:
+        return {"execution": None, "model": None}
+    return {"execution": computing.execution, "model": computing.model}
 
 
 def _record(item: Finding) -> dict[str, Any]:

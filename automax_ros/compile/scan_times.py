@@ -80,6 +80,11 @@ def scan_times(program: Program, model: CostModel) -> ScanTimes:
     return ScanTimes(times.least, times.most, estimated)
 
 
+def command_ns(program: Program, model: CostModel) -> int:
+    """Return the time from the beginning of a current minor loop's scan to its command for the 57C406."""
+    return model.scan_loop_ns(program) + _loop_ns(program, model)
+
+
 def period_ns(program: Program) -> int | None:
     """Return the time from scan to scan; of a BASIC task that of its START EVERY, None without a constant one."""
     if not program.is_basic:

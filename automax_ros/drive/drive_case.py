@@ -30,6 +30,32 @@ class Given:
 
 
 @dataclass(frozen=True)
+class Computing:
+    """How long a scan computes until the 57C406 has its DELTA.
+
+    Attributes:
+        modeled: whether the rack's execution takes that time; in ideal execution it is none.
+        model: the Processor that runs the task.
+        delay_us: the time on that Processor, us.
+        slowest: the slowest Processor that may run it.
+        slowest_us: the time there, us.
+        sixth_us: the time from scan to scan, a sixth of a line cycle, us.
+    """
+
+    modeled: bool
+    model: str
+    delay_us: float
+    slowest: str
+    slowest_us: float
+    sixth_us: float
+
+    @property
+    def execution(self) -> str:
+        """The rack's mode of execution."""
+        return "modeled" if self.modeled else "ideal"
+
+
+@dataclass(frozen=True)
 class DriveCase:
     """A drive, as far as it is known.
 
@@ -45,6 +71,7 @@ class DriveCase:
         fast_change: bit 0 of register 4146; value None where it may be either.
         voltage: whether the armature voltage is wired to a 57C405.
         registers: whether it is driven by a 57C406, with registers and a loop in a task.
+        computing: how long the scans of that task compute, None without one.
     """
 
     name: str
@@ -58,6 +85,7 @@ class DriveCase:
     fast_change: Given = Given(0, "default")
     voltage: bool = False
     registers: bool = True
+    computing: Computing | None = None
 
     @property
     def armature_v(self) -> float:

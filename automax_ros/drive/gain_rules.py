@@ -26,6 +26,9 @@ from automax_ros.drive.drive_case import DriveCase, Finding, Verdict
 
 NEAR = 2.0
 """A factor between programmed and proposed up to which all is well."""
+MOST_DELAY = 0.7
+"""Part of a sixth of a line cycle up to which the proposed gains keep their damping, whenever in it the scan's DELTA
+takes effect (decision; test/rack/modules/test_drive_modeled_time.py)."""
 
 
 def _kp(circuit: Circuit) -> tuple[float, str]:
@@ -72,6 +75,32 @@ _PROPOSALS: dict[str, tuple[Callable[[Circuit], tuple[float, str]], str]] = {
 """For each gain what computes it with its numbers, and the formula."""
 
 
+def computing_delay(case: DriveCase) -> Finding:
+    """Tell how late after its interrupt a scan's DELTA takes effect, and with what delay the gains are reckoned.
+
+    The loop hears of each delay and reckons with it, so the same gains are right for all Processors (decision).
+    """
+    formula = f"SCAN_LOOP with its latch + DC_DRIVE_CML (53) <= {MOST_DELAY:g} of a sixth of a line cycle (ours)"
+    computing = case.computing
+    if computing is None:
+        result = "no task with DC_DRIVE_CML fires it: the delay is not known"
+        return Finding("computing delay", Verdict.ATTENTION, result, formula)
+    delay_us = computing.delay_us if computing.modeled else 0.0
+    reckoned_us, most_us = max(delay_us, computing.slowest_us), MOST_DELAY * computing.sixth_us
+    if delay_us > most_us:
+        verdict, why = Verdict.ATTENTION, "too late for the proposed gains: declare fewer commons in this task"
+    elif reckoned_us > most_us:
+        verdict, why = Verdict.FINE, f"too slow for a {computing.slowest}, where it takes {reckoned_us:.0f} us"
+    else:
+        slowest = f"a {computing.slowest}, the slowest Processor that may run this task"
+        verdict, why = Verdict.FINE, f"the gains are reckoned with the {reckoned_us:.0f} us of {slowest}"
+    when = f"{delay_us:.0f} us after the interrupt" if delay_us else "at the interrupt"
+    result = f"{computing.execution} execution on a {computing.model}: DELTA takes effect {when}; {why}"
+    numbers = f"{reckoned_us:.0f} us of {computing.sixth_us:.0f} us = {reckoned_us / computing.sixth_us:.2f}"
+    values = {"delay_us": delay_us, "reckoned_us": reckoned_us, "sixth_us": computing.sixth_us}
+    return Finding("computing delay", verdict, result, formula, numbers, values)
+
+
 def gain(keyword: str, case: DriveCase) -> Finding:
     """Compare a gain with the proposal for this motor, its line and LIM_BAR."""
     compute, formula = _PROPOSALS[keyword]
@@ -93,5 +122,8 @@ def gain(keyword: str, case: DriveCase) -> Finding:
     )
 
 
-GAIN_RULES = tuple(partial(gain, keyword) for keyword in _PROPOSALS)
-"""A rule for each gain."""
+GAIN_RULES: tuple[Callable[[DriveCase], Finding], ...] = (
+    computing_delay,
+    *(partial(gain, keyword) for keyword in _PROPOSALS),
+)
+"""The delay with which the gains are reckoned, and a rule for each gain."""

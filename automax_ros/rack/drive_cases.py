@@ -6,14 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from automax_ros.compile.cost import CostModel, Model
+from automax_ros.compile.scan_times import command_ns
+from automax_ros.core.ticks import NS_PER_US
 from automax_ros.core.types import Value
-from automax_ros.drive.drive_case import DriveCase, Given, Unjudged
+from automax_ros.drive.drive_case import Computing, DriveCase, Given, Unjudged
 from automax_ros.drive.errors import ParameterError
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Scope
-from automax_ros.rack.config import Point, RackConfig
+from automax_ros.rack.config import Point, RackConfig, Timing
 from automax_ros.rack.drives import RackDrive, given_inputs, rack_drives, written_constants
 from automax_ros.rack.modules.drive_controller import DEFAULTS, OPTIONS, TACH_THRESHOLD
+from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.register_writes import numbered_writes
 
 
@@ -54,7 +58,20 @@ def _case(
         fast_change=registers.bit_0(OPTIONS),
         voltage=any(_is_wired(module, drive.slot) for module in config.modules),
         registers=not drive.letter,
+        computing=_computing(drive, config),
     )
+
+
+def _computing(drive: RackDrive, config: RackConfig) -> Computing | None:
+    """Return how long the scans of a drive's task compute, on its Processor and on the slowest that may run it."""
+    program = drive.program
+    if program is None:
+        return None
+    model = next(module.model for module, task in config.placed_tasks if task.name == program.name)
+    times_us = {item: command_ns(program, CostModel(Model(item))) / NS_PER_US for item in PROCESSOR.models}
+    slowest = max(times_us, key=lambda item: times_us[item])
+    modeled, sixth_us = config.execution is Timing.MODELED, program.period_ns / NS_PER_US
+    return Computing(modeled, model, times_us[model], slowest, times_us[slowest], sixth_us)
 
 
 def _is_wired(module: object, slot: int) -> bool:

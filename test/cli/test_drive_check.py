@@ -243,6 +243,47 @@ def test_gains_are_proposed_for_the_motor(judged, motor):
     assert told == pytest.approx(proposed, rel=1e-3)
 
 
+@pytest.mark.parametrize(("execution", "model"), [("ideal", "57C435"), ("modeled", "57C435"), ("modeled", "57C430A")])
+def test_the_gains_are_reckoned_with_the_delay_of_the_slowest_processor(automax, execution, model):
+    """Table 4: SCAN_LOOP and the estimate of the block; of all Processors a 57C430A takes longest."""
+    rack = rack_file().replace("slots:", f"execution: {execution}\nslots:").replace("57C435", model)
+    write_rack(automax.folder, rack, LOOP=loop_task())
+    (drive,) = json.loads(automax("drive-check", "rack.yaml", "--json").out)
+    assert (drive["execution"], drive["model"]) == (execution, model)
+    found = {item["rule"]: item for item in drive["findings"]}
+    values = found["computing delay"]["values"]
+    assert values["sixth_us"] == pytest.approx(2777.8, abs=0.1)
+    assert 1400 < values["reckoned_us"] < 1500
+    if (execution, model) == ("modeled", "57C435"):
+        assert 350 < values["delay_us"] < 420
+    else:
+        assert values["delay_us"] == (0 if execution == "ideal" else values["reckoned_us"])
+    assert f"{execution} execution on a {model}: DELTA takes effect " in found["computing delay"]["result"]
+    assert "the slowest Processor that may run this task" in found["computing delay"]["result"]
+    assert found["KP"]["values"]["proposed"] == 0.224609375  # the same for all
+    assert f"task LOOP on a {model}, {execution} execution" in automax("drive-check", "rack.yaml").out
+
+
+@pytest.mark.parametrize(
+    ("execution", "model", "verdict"),
+    [("ideal", "57C430A", "fine"), ("modeled", "57C435", "fine"), ("modeled", "57C430A", "attention")],
+)
+def test_a_scan_that_takes_longer_than_the_gains_bear_is_told(judged, execution, model, verdict):
+    names = [f"X{number}%" for number in range(90)]
+    lines = [f"COMMON {', '.join(names[place : place + 9])}" for place in range(0, 90, 9)]
+    rack = rack_file(more="".join(f"  {name}: {{}}\n" for name in names))
+    rack = rack.replace("slots:", f"execution: {execution}\nslots:").replace("57C435", model)
+    found = judged(rack, task=loop_task(*lines))["computing delay"]
+    assert found["verdict"] == verdict
+    assert ("declare fewer commons" in found["result"]) == (verdict == "attention")
+    assert ("too slow for a 57C430A" in found["result"]) == (verdict == "fine")
+
+
+def test_no_delay_is_known_of_a_drive_without_a_task(judged):
+    found = judged(task="10 LOCAL A%\n20 CALL SCAN_LOOP(TICKS=2)\n30 A% = 1\n40 END\n")["computing delay"]
+    assert (found["verdict"], found["values"]) == ("attention", {})
+
+
 @pytest.mark.parametrize(
     ("text", "verdict", "source"),
     [

@@ -128,7 +128,10 @@ class Regulator(Stateful):
         fired = (0.5 * period_us - self.delta_us) * 6.0 / period_us % 1.0
         unseen_us = AHEAD * fired * self.push_us
         if self.late and kp > 0.0:
-            error -= PENDING * (fired + self.missed) * self.push_us / kp
+            pending_us = fired * self.push_us
+            if self.missed:  # the push before is where the last one would be, and that is still to come as a whole
+                pending_us = self.push_us + fired * (self.before_us - self.integral_us)
+            error -= PENDING * pending_us / kp
             unseen_us = 0.0
         self.push_us = kp * error - unseen_us
         self._move(gain, gain * error, lowest_us, 0.5 * period_us)

@@ -6,16 +6,24 @@ from pathlib import Path
 from statistics import fmean
 from typing import NamedTuple
 
+from automax_ros.drive.assessment import assess
+from automax_ros.drive.drive_case import DriveCase
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.drive_cases import drive_cases
 from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks_check import check_tasks
 
+MOTORS = ("dc_10hp_240v", "dc_150hp_500v", "dc_800hp_700v")
+GAINS = {"KP": "KP=0.2", "PI_W_LEAD": "PI_W_LEAD=60.0", "AG_FACTOR": "AG_FACTOR=40", "CC_THRESH": "CC_THRESH=700"}
+"""What stands in the task for each gain until ``drive-check`` has proposed one."""
 COMMONS = (
     "REF%", "RUN@", "RESET@", "STATE@", "I_FDBK%", "DELTA%", "BRIDGE@", "IOC@", "BAD@", "TEST@", "ALPHA%",
 )  # fmt: skip
 TASK = f"""\
 10 COMMON {", ".join(COMMONS)}
-100 CALL DC_DRIVE_CML(IO_CNTL_SLOT=7, DIG_IO_SLOT=8, AC_LINE_FREQ=HERTZ, REFERENCE=REF%, REF_LAG=400.0, KP=0.225, &
-PI_W_LEAD=61.0, AG_FACTOR=61, CC_THRESH=682, CML_RUN=RUN@, IOC_THRESH=250, LIM_BAR=150, CML_TEST=TEST@, &
+100 CALL DC_DRIVE_CML(IO_CNTL_SLOT=7, DIG_IO_SLOT=8, AC_LINE_FREQ=HERTZ, REFERENCE=REF%, REF_LAG=400.0, &
+{", ".join(GAINS.values())}, CML_RUN=RUN@, IOC_THRESH=250, LIM_BAR=150, CML_TEST=TEST@, &
 TEST_ALPHA=ALPHA%, FAULT_RESET=RESET@, DC_CML_STATE=STATE@, BRIDGE_POL=BRIDGE@, I_FDBK=I_FDBK%, DELTA=DELTA%, &
 IOC_OUT=IOC@, BAD_SCR_OUT=BAD@)
 110 END
@@ -30,7 +38,7 @@ slots:
   8: {module: 57C408}
   9: {module: 57C405, drive: 7}
 plants:
-  MOTOR: {motor: dc_150hp_500v, line: {v_ll: 460, hz: HERTZ, ls_mh: 0.14, rs_mohm: 5}, load: {speed_rpm: RPM}}
+  MOTOR: {motor: MOTOR_NAME, line: {hz: HERTZ}, load: {speed_rpm: RPM}}
 common:
   PERMIT@: {slot: 8, register: 0, bit: 0, ros: in}
   FAST@: {slot: 7, register: 4146, bit: 0, ros: in}
@@ -45,24 +53,57 @@ class Current(NamedTuple):
     delta: int
 
 
+def config_of(file: Path) -> RackConfig:
+    """Return a rack file that is sound."""
+    found = load(file)
+    assert found.config is not None, found.diagnostics
+    return found.config
+
+
+def case_of(file: Path) -> DriveCase:
+    """Return the one drive of a rack as ``drive-check`` judges it."""
+    config = config_of(file)
+    programs = [item.result.program for item in check_tasks(config) if item.result.program is not None]
+    (case,) = drive_cases(config, programs, {})
+    assert isinstance(case, DriveCase)
+    return case
+
+
+def proposals(file: Path) -> dict[str, float]:
+    """Return what ``drive-check`` proposes for the gains of the one drive of a rack."""
+    found = {item.rule: item.values for item in assess(case_of(file)).findings}
+    return {keyword: float(found[keyword]["proposed"] or 0) for keyword in GAINS}
+
+
 def held(
     folder: Path,
     model: str,
     *,
     rpm: float,
+    motor: str = "dc_150hp_500v",
     hertz: int = 60,
     execution: str = "modeled",
     fast: bool = False,
     alpha: int | None = None,
+    latched: int = 0,
 ) -> Rack:
-    """Return a rack whose drive runs without a reference, its shaft held at a speed; ``alpha``: in test mode."""
-    (folder / "CML.BLK").write_text(TASK.replace("HERTZ", str(hertz)))
+    """Return a rack whose drive runs without a reference, its shaft held at a speed; ``alpha``: in test mode.
+
+    It has the gains that ``drive-check`` proposes for it. ``latched``: how many commons more its task latches, which
+    lets its scans compute longer.
+    """
+    more = [f"X{number}%" for number in range(latched)]
     text = YAML.replace("EXECUTION", execution).replace("MODEL", model).replace("HERTZ", str(hertz))
-    text = text.replace("RPM", f"{rpm:g}") + "".join(f"  {name}: {{}}\n" for name in COMMONS)
-    (folder / "rack.yaml").write_text(text)
-    found = load(folder / "rack.yaml")
-    assert found.config is not None, found.diagnostics
-    rack = Rack(found.config)
+    text = text.replace("MOTOR_NAME", motor).replace("RPM", f"{rpm:g}")
+    (folder / "rack.yaml").write_text(text + "".join(f"  {name}: {{}}\n" for name in (*COMMONS, *more)))
+    declared = "".join(f"{20 + place} COMMON {', '.join(more[place : place + 9])}\n" for place in range(0, latched, 9))
+    source = TASK.replace("HERTZ", str(hertz)).replace("100 CALL", f"{declared}100 CALL")
+    (folder / "CML.BLK").write_text(source)
+    for keyword, proposed in proposals(folder / "rack.yaml").items():
+        shown = f"{proposed:.10g}" if keyword in ("AG_FACTOR", "CC_THRESH") else f"{proposed:.4f}"
+        source = source.replace(GAINS[keyword], f"{keyword}={shown}")
+    (folder / "CML.BLK").write_text(source)
+    rack = Rack(config_of(folder / "rack.yaml"))
     rack.start()
     rack.write("PERMIT@", True)
     rack.run(0.6)
