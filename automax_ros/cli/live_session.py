@@ -159,7 +159,8 @@ class LiveSession:
         if seat is None:
             return None
         lead_ns = LEAD_NS if seat.lead_ns is None else seat.lead_ns
-        return Seating([item.slots for item in seat.seats], seat.run_id, lambda: self._stimulation.is_common, lead_ns)
+        seats = [item.slots for item in seat.seats]
+        return Seating(seats, seat.run_id, lambda: self._stimulation.is_common, lead_ns, seat.awaits_recorder)
 
     def _all_are_there(self, stop: StopRequest) -> bool:
         """Wait for the other processes of a distributed rack; FALSE where a stop is requested first."""

@@ -61,6 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="seconds from the moment at which all processes are there to the start, as that of common memory has it "
         "(default: 0.4)",
     )
+    parser.add_argument(
+        "--await-recorder",
+        action="store_true",
+        help="do not start before a recorder that was given the rack's file (`automax record CONFIG`) hears it",
+    )
     add_set_argument(parser)
     add_watch_argument(parser, "those of the rack file's `watch`")
     parser.add_argument(
@@ -122,7 +127,7 @@ def _run(arguments: argparse.Namespace, config: RackConfig, seats: tuple[Seat, .
         arguments.report,
         arguments.allow_outside,
         ros,
-        SeatPlan(seat, seats, arguments.run_id, arguments.watched, arguments.lead),
+        SeatPlan(seat, seats, arguments.run_id, arguments.watched, arguments.lead, arguments.await_recorder),
         native=native_forms(arguments, arguments.duration, wall_clock=True),
         verbose=arguments.verbose,
     )

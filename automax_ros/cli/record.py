@@ -1,6 +1,7 @@
 """Record a rack that runs, from any process of its ROS 2 domain.
 
-RACK is the rack's name or namespace, or its YAML file or folder. The bag is the one that `automax run --record` makes:
+RACK is the rack's name or namespace, or its YAML file or folder: then a rack that is started after its recorder is
+recorded from its first scan on. The bag is the one that `automax run --record` makes:
 it begins where the rack has sent an image of its common memory, and tasks can be replayed from their first full scan
 and state on; the recorder asks the rack for both. Ctrl-C ends it.
 """
@@ -37,6 +38,7 @@ from automax_ros.wire.rack_files import RACK_FILE, RackFile, RackFilesError, sou
 if TYPE_CHECKING:
     from automax_ros.nodes.recorder import LiveRecorder
     from automax_ros.nodes.ros_arguments import RosArguments
+    from automax_ros.rack.config import RackConfig
 
 DEFAULT_WAIT_S = "10"
 _PATIENCE_S = 3.0
@@ -81,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     with stop_signals() as stop:
         domain = prepare_ros(arguments)
         ros = ros_arguments(arguments)
-        own, own_files = _rack(arguments.rack, ros)
+        own, own_files, config = _rack(arguments.rack, ros)
         folder = arguments.output or Path(f"{own.strip('/').replace('/', '_')}_{datetime.now():%Y-%m-%d_%H-%M-%S}")
         if folder.exists():
             print(RecordingError("AMX6800", folder, "exists already, not overwriting"), file=sys.stderr)
@@ -91,6 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
         recorder = LiveRecorder(own, ros)
         session = _Session(recorder, own, domain, stop)
         try:
+            if config is not None:
+                recorder.expect(config)
             return session.record(folder, arguments.wait, arguments.duration, how, own_files)
         finally:
             recorder.close()
@@ -114,6 +118,7 @@ class _Session:
         self._shown = (0, 0)
         self._gone_since = 0.0
         self._next_presence = 0.0
+        self._expects_scans = True
 
     def record(
         self, folder: Path, wait_ns: int, duration_ns: int | None, how: _Storing, own_files: list[RackFile]
@@ -122,6 +127,7 @@ class _Session:
         if table is None:
             return 0
         chosen = _chosen(table, how.tasks)
+        self._expects_scans = bool(_tasks(table))
         files = self._files(own_files)
         if self._stop.requested:
             return 0
@@ -274,16 +280,19 @@ class _Session:
             return 1
         size = sum(item.stat().st_size for item in folder.iterdir())
         self._line.message(f"recorded {folder}: {size / 1e6:.2f} MB")
-        return 1 if recording.ended is not None or recording.first_stamp is None else 0
+        empty = self._expects_scans and not recording.scans
+        if empty and recording.first_stamp is not None:
+            self._line.message("  it holds no scan: nothing of it can be replayed; do the tasks run?")
+        return 1 if recording.ended is not None or recording.first_stamp is None or empty else 0
 
 
-def _rack(text: str, ros: RosArguments) -> tuple[str, list[RackFile]]:
-    """Return the namespace with its slash, and the files where RACK is a YAML file."""
+def _rack(text: str, ros: RosArguments) -> tuple[str, list[RackFile], RackConfig | None]:
+    """Return the namespace with its slash, and files and configuration where RACK is a YAML file."""
     if not names_file(text):
-        return space_of(text, ros), []
+        return space_of(text, ros), [], None
     config = config_of(Path(text))
     sources = [RackFile(source_name(task.name, task.file.name), source.text) for task, source, _ in check_tasks(config)]
-    return f"/{ros.placed(config.namespace)}", [RackFile(RACK_FILE, config.text), *sources]
+    return f"/{ros.placed(config.namespace)}", [RackFile(RACK_FILE, config.text), *sources], config
 
 
 def _tasks(table: VariableTable) -> list[str]:

@@ -31,8 +31,6 @@ _SEATS, _HOME, _RECORDER = range(3)
 _RECORDER_NAME = "recorder"
 _RECORDER_WAIT_S = "60"
 """How long the recorder waits for a rack whose processes take their time to start, s (decision)."""
-_RECORDER_LEAD_S = "3"
-"""Time before the start in which the recorder finds the rack, s (decision): so a recording has all of the run."""
 _WHOLE = "distributed"
 """The seat in the lock of who has started all the others."""
 
@@ -68,10 +66,10 @@ def _posts(plan: RunPlan, seats: Sequence[Seat], arguments: argparse.Namespace) 
     if plan.record is not None:
         command = [*automax, "record", str(plan.config.path), "--output", str(plan.record), "--wait", _RECORDER_WAIT_S]
         command += [*_recording(arguments), *_ros(plan, arguments)]
-        yield Post(_RECORDER_NAME, command, _RECORDER, reports=False)
+        yield Post(_RECORDER_NAME, command, _RECORDER, reports=False, begins_run=True)
     for seat in seats:
         own = ["--state", str(plan.state / seat.name)] if plan.state is not None else []
-        own += ["--lead", _RECORDER_LEAD_S] if plan.record is not None else []
+        own += ["--await-recorder"] if plan.record is not None else []
         own += _given("--set", arguments.settings) + _given("--watch", arguments.watch) if seat.is_home else []
         command = [*automax, "node", *common, "--module", seat.name, *own, *_ros(plan, arguments)]
         yield Post(seat.name, command, _HOME if seat.is_home else _SEATS, ends_run=seat.is_home)

@@ -36,7 +36,7 @@ class SeatPlan:
 
     ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 to take that of the processes that
     are there, or a new one. ``watched``: another process has started this one. ``lead_ns`` is how long after all are
-    there the rack starts, None for the usual.
+    there the rack starts, None for the usual. ``awaits_recorder``: not before a recorder hears this process.
     """
 
     seat: Seat
@@ -44,6 +44,7 @@ class SeatPlan:
     run_id: int = 0
     watched: bool = False
     lead_ns: int | None = None
+    awaits_recorder: bool = False
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ class Post:
         stage: those of the lowest stage end first; all others end when one of ``ends_run`` has.
         ends_run: whether the run ends with it.
         reports: whether it tells a report when it ends in order; without one it is never started again.
+        begins_run: whether the run, which ``ends_run`` tells of, cannot begin without it.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Post:
     stage: int = 0
     ends_run: bool = False
     reports: bool = True
+    begins_run: bool = False
 
 
 class Listener(Protocol):
@@ -166,8 +168,9 @@ class Supervisor:
         if in_order or self._stage >= 0 or refused:
             # Who was asked to end before it could heed a signal has ended as it should.
             place.code = 0 if code == -signal.SIGTERM and self._stage >= 0 else code
-            if place.post.ends_run or not in_order:
-                self._end(GRACE_NS if in_order else 0)
+            keeps_from_beginning = place.post.begins_run and not self._has_begun
+            if place.post.ends_run or not in_order or keeps_from_beginning:
+                self._end(GRACE_NS if in_order and not keeps_from_beginning else 0)
             return
         again_ns = place.restarts.died(self._clock())
         place.start_ns = again_ns if self._restart else None
@@ -177,6 +180,10 @@ class Supervisor:
             place.code = code
             if place.post.ends_run:
                 self._end(0)
+
+    @property
+    def _has_begun(self) -> bool:
+        return any(place.has_begun for place in self._places if place.post.ends_run)
 
     def _end(self, grace_ns: int) -> None:
         """Begin to end all, after a grace; a second time this does nothing."""

@@ -29,6 +29,7 @@ from automax_ros.core.types import DataType
 from automax_ros.nodes.bus_way import BusWay, Terms
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.nodes.process_watch import ProcessWatch, this_host
+from automax_ros.nodes.recorder_wait import RecorderWait
 from automax_ros.nodes.topics import ros_qos
 from automax_ros.rack.bus.link import Batch, BusLink, Picture
 from automax_ros.rack.bus.part_name import part_name
@@ -72,13 +73,15 @@ class Seating:
 
     ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the one that is there. ``is_common``
     says whether what happens now happens in every process by itself, as stimuli do. ``lead_ns``: so far the start
-    lies ahead of the moment at which all are there, as the home says it.
+    lies ahead of the moment at which all are there, as the home says it. ``awaits_recorder``: it waits for one that
+    hears this process.
     """
 
     seats: Sequence[tuple[int, ...]]
     run_id: int = 0
     is_common: Callable[[], bool] = lambda: False
     lead_ns: int = LEAD_NS
+    awaits_recorder: bool = False
 
 
 class RackBus:
@@ -105,6 +108,7 @@ class RackBus:
         self._watch, self._lead_ns = ProcessWatch(), seating.lead_ns
         self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
         self.link = BusLink(rack, min(own), self._send, seating.is_common, self._guarded)
+        self._recorder = RecorderWait(site, node, PRESENCE) if seating.awaits_recorder else None
         self.stage, self.joining = Stage.JOINING, False
         self.fault: SeatTaken | None = None
         self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
@@ -136,9 +140,10 @@ class RackBus:
 
     @property
     def missing(self) -> list[str]:
-        """The processes that are not there, by their first modules."""
+        """The processes that are not there, by their first modules; with all of them, the recorder that is awaited."""
         there = {*self.peers.by_seat, self.peers.seat}
-        return [part_name(self._rack.config, slots) for seat, slots in self.seats.items() if seat not in there]
+        found = [part_name(self._rack.config, slots) for seat, slots in self.seats.items() if seat not in there]
+        return found or ([] if self._recorder is None else ["the recorder"])
 
     @property
     def lost(self) -> list[str]:
@@ -219,6 +224,8 @@ class RackBus:
             peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
         if not peers.run_id and self._rack.part.is_home and peers.by_seat and not any(peers.running()):
             peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        if self._recorder is not None and self._recorder.is_over():
+            self._recorder = None
         starting = peers.epoch_ns > time.time_ns()
         if any(peers.running()):
             if starting and self.stage is Stage.READY:

@@ -32,6 +32,7 @@ from automax_ros.nodes.participants import participant
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.nodes.taking import Taken, taker_of
 from automax_ros.nodes.topics import message_class
+from automax_ros.rack.config import RackConfig
 from automax_ros.wire.bus_messages import Presence
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import table_of
@@ -62,11 +63,16 @@ class SeveralRacks(Fault):
     """Several racks have one name in this ROS domain."""
 
 
+def recorder_name(arguments: RosArguments) -> str:
+    """Return the name of the node ``recorder`` in a process with these arguments."""
+    return arguments.name_of("recorder", main=True)
+
+
 class RawSubscription:
     """Takes the messages of one topic as bytes."""
 
     def __init__(self, node: Node, topic: str, kind: TopicKind) -> None:
-        self.topic = topic
+        self.topic, self.kind = topic, kind
         self._node = node
         self._class = message_class(kind.type_name)
         latched = kind.qos.durability == "transient_local"
@@ -125,7 +131,7 @@ class LiveRecorder:
         self.lost_values: Counter[str] = Counter()
         self._space = space
         self._context = joined_context(arguments)
-        self._node = RecorderNode(space, self._context, arguments.name_of("recorder", main=True))
+        self._node = RecorderNode(space, self._context, recorder_name(arguments))
         self._topics = LiveTopics(space)
         self._table = b""
         self._order: ArrivalOrder[tuple[str, bytes]] = ArrivalOrder(HOLD_NS)
@@ -139,6 +145,7 @@ class LiveRecorder:
         self._files_begun = 1
         self.binding = Binding(self._node, space)
         self._presences: RawSubscription | None = None
+        self._early: dict[str, RawSubscription] = {}
         self._run_id = 0
 
     def racks(self) -> list[str]:
@@ -150,6 +157,17 @@ class LiveRecorder:
         """Whether the rack that is recorded is in the graph."""
         return self.binding.is_there
 
+    def expect(self, config: RackConfig) -> None:
+        """Hear a rack that need not be there yet, so that nothing of its beginning is lost.
+
+        What it sends waits until ``open``, ``READER_DEPTH`` messages of each topic.
+        """
+        topics = LiveTopics.expected(self._space, config)
+        kinds = topics.all
+        self._hear_processes()
+        self._files = RawSubscription(self._node, topics.config, _FILES)
+        self._early = {name: RawSubscription(self._node, name, kinds[name]) for name in topics.in_order}
+
     def find(self, wait_ns: int, stopping: Callable[[], bool]) -> VariableTable | None:
         """Wait for the rack's table; None if it does not come. From then on only that rack's messages count.
 
@@ -157,7 +175,8 @@ class LiveRecorder:
             CdrError: what comes is not a table.
             SeveralRacks: several racks have this name.
         """
-        source = RawSubscription(self._node, self._topics.variables, self._topics.all[self._topics.variables])
+        topic = self._topics.variables
+        source = self._early.pop(topic, None) or RawSubscription(self._node, topic, self._topics.all[topic])
         tables: dict[bytes, Taken] = {}
         deadline = time.monotonic_ns() + wait_ns
         try:
@@ -181,9 +200,12 @@ class LiveRecorder:
         self._table = found.payload or b""
         table = table_of(self._table)
         self._run_id = table.run_id
+        self._hear_processes()
+        return table
+
+    def _hear_processes(self) -> None:
         if self._presences is None:
             self._presences = RawSubscription(self._node, f"{self._space}/bus/presence", _PRESENCE)
-        return table
 
     def files(self, stopping: Callable[[], bool]) -> list[RackFile]:
         """Return the files that the rack runs from; none if it does not offer them.
@@ -191,16 +213,14 @@ class LiveRecorder:
         Raises:
             RackFilesError: what it sends are none.
         """
-        source = RawSubscription(self._node, self._topics.config, _FILES)
+        if self._files is None:
+            self._files = RawSubscription(self._node, self._topics.config, _FILES)
         deadline = time.monotonic_ns() + FILES_WAIT_NS
-        try:
-            while time.monotonic_ns() < deadline and not stopping():
-                found = [item.payload for item in self._ours(source) if item.payload]
-                if found:
-                    return _files(found[-1])
-                time.sleep(LOOK_S)
-        finally:
-            source.close()
+        while time.monotonic_ns() < deadline and not stopping():
+            found = [item.payload for item in self._ours(self._files) if item.payload]
+            if found:
+                return _files(found[-1])
+            time.sleep(LOOK_S)
         return []
 
     def open(
@@ -220,11 +240,14 @@ class LiveRecorder:
         self._topics = topics = LiveTopics(self._space, table_of(self._table), offered)
         self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
         kinds = topics.all
-        # The rack answers each new reader of these: an image first, then states and full scans that follow it.
-        first = [topics.variables, topics.backplane, *topics.values, *topics.plants, topics.operations]
-        first += [topics.snapshot, topics.scans, topics.states]
-        self._subscriptions = [RawSubscription(self._node, name, kinds[name]) for name in first]
-        self._files = RawSubscription(self._node, topics.config, _FILES)
+        early, self._early = self._early, {}
+        for name, subscription in list(early.items()):
+            if subscription.kind != kinds.get(name):
+                early.pop(name).close()  # the rack is not what its file says
+        self._subscriptions = [
+            early.get(name) or RawSubscription(self._node, name, kinds[name]) for name in topics.in_order
+        ]
+        self._files = self._files or RawSubscription(self._node, topics.config, _FILES)
         return self.recording
 
     def step(self) -> None:

@@ -240,3 +240,10 @@ def test_json_of_a_report_is_one_line(capsys):
     tell_report({"text": "a\nb"})
     (line,) = capsys.readouterr().out.splitlines()
     assert json.loads(line) == {"report": {"text": "a\nb"}}
+
+
+def test_a_run_that_cannot_begin_without_a_process_ends_with_it():
+    posts = [Post("home", program(WAITS + REPORT), ends_run=True)]
+    with Supervised(*posts, Post("recorder", program("sys.exit(2)"), reports=False, begins_run=True)) as run:
+        run.ended()
+    assert run.supervisor.codes["recorder"] == 2

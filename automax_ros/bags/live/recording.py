@@ -22,13 +22,16 @@ from automax_ros.bags.storage import StorageOptions
 from automax_ros.bags.write_log import WriteLog
 from automax_ros.bags.writer import BagWriter, Channel
 from automax_ros.core.kinds import WriterKind
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import WriteHead, image_head, operation_head, plant_stamp, scan_head, table_of, write_head
 from automax_ros.wire.messages import VariableTable
 from automax_ros.wire.rack_files import RackFile
 
-SETTLE_NS = _SECOND = 1_000_000_000
+SETTLE_NS = NS_PER_S
 """When for so long no write has come, none is missing."""
+LATE_NS = 10 * NS_PER_S
+"""How long a scan's write is waited for (decision): on a busy host the process of common memory may be late."""
 MAX_PENDING = 100_000
 """Most messages that wait for the next write."""
 _RESTARTED = "the rack was started again"
@@ -75,16 +78,13 @@ class LiveRecording(Recording):
         names = [writer.name for writer in self._facts.writers if writer.kind == WriterKind.TASK]
         self._tasks = {name: TaskTrack() for name in names if tasks is None or name in tasks}
         self._wrong_sources: list[str] = []
-        self._proves = False
-        self._recording = False
+        self._proves = self._recording = False
         self._image: tuple[int, WriteHead, bytes] | None = None
         self._pending: list[tuple[str, int, bytes]] = []
-        self._proven_ns = 0
+        self._proven_ns = self._last_write = self._last_sent = 0
         self._open_gap: int | None = None
-        self._last_write = 0
         self._last_values: dict[str, bytes] = {}
         self._values_now: dict[str, bytes] = {}
-        self._last_sent = 0
         self.files_begun = 1
         self._split_ns, self._next_split = split_ns, 0
         self._takers: dict[str, Callable[[str, int, bytes], None]] = {
@@ -139,7 +139,7 @@ class LiveRecording(Recording):
 
     def seconds(self, stamp: int) -> float:
         """Return a stamp as seconds from the start of the rack's run."""
-        return (stamp - self._facts.stamp) / _SECOND
+        return (stamp - self._facts.stamp) / NS_PER_S
 
     def flush(self, passed_ns: int) -> None:
         """Hand what is recorded to the operating system if its time is over: so long ago came the last message."""
@@ -250,7 +250,7 @@ class LiveRecording(Recording):
         self._values_now[topic] = payload
         # A value carries no stamp: it belongs to the instant of the message before, or came so much later.
         later = max(0, sent_ns - self._last_sent) if self._last_sent else 0
-        self._write(topic, 0, self.last_stamp + (later if later > _SECOND // 1000 else 0), payload)
+        self._write(topic, 0, self.last_stamp + (later if later > NS_PER_S // 1000 else 0), payload)
 
     def _keep(self, topic: str, sent_ns: int, payload: bytes) -> None:
         """Let a message wait for the next write, which says whether one is missing before it."""
@@ -283,7 +283,9 @@ class LiveRecording(Recording):
                 return
             if not again and topic == self._topics.scans and has_written(payload, self._last_write):
                 if not at_end:
-                    self._rest(scan_head(payload).stamp, 0)
+                    self._pending = pending[number:]
+                    if pending[-1][1] - self._proven_ns > LATE_NS or len(pending) >= MAX_PENDING:
+                        self._rest(scan_head(payload).stamp, 0)
                 return
             if self._recording:
                 self._record(topic, sent, payload)

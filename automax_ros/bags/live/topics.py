@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.rack.ros_names import JOINTS, plant_topic
+from automax_ros.rack.config import RackConfig
+from automax_ros.rack.plants.driven import driven_plants
+from automax_ros.rack.ros_names import JOINTS, plant_topic, topic_names
 from automax_ros.wire.messages import NAMES, JointState, PlantState, Variable, VariableTable
 from automax_ros.wire.qos import LATCHED, OPERATION, PLANT, SCAN, VALUE, QosProfile
-from automax_ros.wire.rack_messages import SCALED_TYPE, value_type_name
+from automax_ros.wire.rack_messages import SCALED_TYPE, topic_type_name, value_type_name
 
 MAX_VALUE_TOPICS = 2000
 """Most topics of common variables that a recorder listens to (decision: ROS serves no more at the pace of scans)."""
@@ -50,6 +52,29 @@ class LiveTopics:
         self.values = dict(list(found.items())[:MAX_VALUE_TOPICS])
         self.left_out = len(found) - len(self.values)
         self.plants = _plants(space, offered or {})
+
+    @classmethod
+    def expected(cls, space: str, config: RackConfig) -> LiveTopics:
+        """Name the topics of a rack that need not be there yet, from its file."""
+        topics = cls(space)
+        names = topic_names(variable.name for variable in config.variables)
+        for variable in config.variables:
+            type_name = topic_type_name(variable)
+            if variable.direction is not Direction.CLOSED and type_name and len(topics.values) < MAX_VALUE_TOPICS:
+                topics.values[f"{space}/{names[variable.name]}"] = TopicKind(type_name, VALUE)
+        state = NAMES[PlantState]
+        plants = {f"{space}/{plant_topic(item.name)}": [state] for item in driven_plants(config)}
+        topics.plants = _plants(space, {**plants, f"{space}/{JOINTS}": [NAMES[JointState]]})
+        return topics
+
+    @property
+    def in_order(self) -> list[str]:
+        """Every topic, in the order of subscriptions.
+
+        The rack answers each new reader of the last three: an image first, then states and full scans that follow it.
+        """
+        first = [self.variables, self.backplane, *self.values, *self.plants, self.operations]
+        return [*first, self.snapshot, self.scans, self.states]
 
     @property
     def all(self) -> dict[str, TopicKind]:
