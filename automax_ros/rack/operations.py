@@ -9,13 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NoReturn
 
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.names import AUTO_RUN
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import Value
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.forcing import Forcing
 from automax_ros.rack.installation import Installation, Prepared, RackError
 from automax_ros.rack.modules.kind import Module
-from automax_ros.rack.names import AUTO_RUN
 from automax_ros.rack.observers import Observers, Operation
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.standing import OperationsState, PowerReturn, StopCause

@@ -86,12 +86,18 @@ class PointReader:
         return None if drop is None else drop * registers.area
 
     def check_input(self, point: Point, declared: VariableName, span: Span) -> None:
-        """Report a point that the process shall write and its module alone does."""
+        """Report a point that the process shall write, where its module or tasks alone do."""
         module = self._modules[point.slot]
+        place = module.registers.place(point.register)
+        hint = "leave out ros, or write ros: out"
         if point.register in module.registers.shown:
-            place = module.registers.place(point.register)
             message = f"{declared.name} cannot be ros: in: the {module.model} writes {place} itself"
-            self._findings.add("AMX6550", message, span, "leave out ros, or write ros: out")
+            self._findings.add("AMX6550", message, span, hint)
+        elif point.register in module.registers.commands:
+            message = (
+                f"{declared.name} cannot be ros: in: {place} of the {module.model} is an output: tasks write it"
+            )
+            self._findings.add("AMX6494", message, span, hint)
 
     def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
         """Report two registers of which a task may write only one, and a REAL where none can stand."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from automax_ros.core.kinds import Direction
-from automax_ros.core.names import Element, NameFault, element
+from automax_ros.core.names import PREDEFINED, Element, NameFault, element
 from automax_ros.core.settings import setting as core_setting
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import CommonVariable, RackConfig
-from automax_ros.rack.names import PREDEFINED
 
 CommonElement = Element[CommonVariable]
 """A simple common variable, or one element of an array."""

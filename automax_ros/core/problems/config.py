@@ -30,6 +30,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6208", "common memory in an odd slot"),
     Problem("AMX6209", "no Processor"),
     Problem("AMX6210", "tick rate"),
+    Problem("AMX6211", "Serial module of a PC3000"),
     # rack files: tasks
     Problem("AMX6300", "task name"),
     Problem("AMX6301", "task name used twice in the rack"),
@@ -86,6 +87,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6521", "armature voltage of a drive wired twice"),
     Problem("AMX6522", "plant of a 57C406 without a motor"),
     Problem("AMX6550", "point that its module alone writes"),
+    Problem("AMX6494", "command register of a UDC that ROS 2 shall write"),
     Problem("AMX6480", "UDC task with a common outside of its dual port"),
     Problem("AMX6481", "UDC task too large"),
     Problem("AMX6482", "UDC tasks with unequal TICKS", hardware="95"),
