@@ -94,9 +94,7 @@ class PointReader:
             message = f"{declared.name} cannot be ros: in: the {module.model} writes {place} itself"
             self._findings.add("AMX6550", message, span, hint)
         elif point.register in module.registers.commands:
-            message = (
-                f"{declared.name} cannot be ros: in: {place} of the {module.model} is an output: tasks write it"
-            )
+            message = f"{declared.name} cannot be ros: in: {place} of the {module.model} is an output: tasks write it"
             self._findings.add("AMX6494", message, span, hint)
 
     def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
