@@ -112,7 +112,9 @@ def check_constant_fits(context: Context, expression: Expression, kind: DataType
         return
     if value is not None and not fits(value, kind):
         message = f"{value} does not fit {what}: {kind.word} is {range_text(kind)}"
-        context.report("AMX2007", message, expression.span, hex_hint(expression, kind))
+        wider = f"a DOUBLE INTEGER, which ends with !, is {range_text(DataType.DOUBLE)}"
+        hint = wider if kind is DataType.INTEGER and fits(value, DataType.DOUBLE) else None
+        context.report("AMX2007", message, expression.span, hex_hint(expression, kind) or hint)
 
 
 def _check_assignment(context: Context, statement: Assignment) -> None:

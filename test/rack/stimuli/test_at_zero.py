@@ -1,4 +1,4 @@
-"""What stimuli do at time 0 comes before what stands in front of SCAN_LOOP (rack_files: before all else of an instant)."""
+"""Stimuli of time 0 come before what stands in front of SCAN_LOOP: before anything else of that instant."""
 
 from __future__ import annotations
 
