@@ -71,9 +71,11 @@ _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 class CommonReader:
     """Reads the ``common`` section."""
 
-    def __init__(self, modules: Iterable[ModuleConfig], findings: Findings) -> None:
-        """Begin with no variables; I/O points stand on ``modules``."""
-        self._points = PointReader(modules, findings)
+    def __init__(
+        self, modules: Iterable[ModuleConfig], findings: Findings, unread: frozenset[int] = frozenset()
+    ) -> None:
+        """Begin with no variables; I/O points stand on ``modules``, or in slots whose module could not be read."""
+        self._points = PointReader(modules, findings, unread)
         self._findings = findings
         self._names: dict[str, Span] = {}
         self._bare: dict[str, tuple[str, Span]] = {}

@@ -28,8 +28,11 @@ _SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32, DataTy
 class PointReader:
     """Reads the places of I/O points. A word may have a name and its bits too, otherwise a bit has one name."""
 
-    def __init__(self, modules: Iterable[ModuleConfig], findings: Findings) -> None:
-        """Take the modules of the rack that are right."""
+    def __init__(
+        self, modules: Iterable[ModuleConfig], findings: Findings, unread: frozenset[int] = frozenset()
+    ) -> None:
+        """Take the modules of the rack that are right, and the slots of the others: nothing is said of points there."""
+        self._unread = unread
         self._modules = {module.slot: module for module in modules}
         self._findings = findings
         self._named: dict[tuple[int, int, int], tuple[str, Span]] = {}
@@ -145,6 +148,8 @@ class PointReader:
         module = self._modules.get(slot)
         if module is not None and module.registers.count:
             return module
+        if slot in self._unread:
+            return None
         held = (
             f"the {module.model} there has no registers for I/O points" if module else "no module is configured there"
         )

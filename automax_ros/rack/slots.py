@@ -43,9 +43,13 @@ class SlotReader:
         self._standing: dict[int, Standing] = {}
         self._places: dict[int, Span] = {}
         self._complete = True
+        self.unread: frozenset[int] = frozenset()
 
     def read(self, node: Node, span: Span) -> tuple[ModuleConfig, ...]:
-        """Return the modules that are right, in the order of slots; ``span`` is the place of the key ``slots``."""
+        """Return the modules that are right, in the order of slots; ``span`` is the place of the key ``slots``.
+
+        ``unread`` are then the slots of the others: what is wrong there was told, and what follows from it need not be.
+        """
         entries = entries_of(node, "slots", self._findings)
         if entries is None:
             return ()
@@ -60,6 +64,7 @@ class SlotReader:
             if module is not None:
                 modules.append(module)
         in_order = tuple(sorted(modules, key=lambda item: item.slot))
+        self.unread = frozenset(self._places) - {item.slot for item in modules}
         rack = Arrangement(list(self._standing.values()), self._complete, span, self._findings, in_order)
         for kind in KINDS:
             kind.check_places(rack)
