@@ -137,6 +137,7 @@ def multiply_divide_step(input1: int, input2: int, input3: int) -> tuple[int, in
 
 MULTIPLY_DIVIDE = Block(
     name="MULTIPLY_DIVIDE",
+    also_called=("MULDIV",),
     section="18",
     title="Multiply and divide",
     function="OUTPUT = INPUT1 * INPUT2 / INPUT3",

@@ -347,7 +347,8 @@ class Block:
     structure: the states of the block that makes it are the structure's, and the step functions of those that use it
     take them too, to read, or to write a buffer in place. ``expected_on`` are Processors whose every task should call
     the block, for the reason ``expected_since``. ``searched_to`` is the output that tells the last element searched, or
-    a negative number where all were: ``Time.m`` counts them.
+    a negative number where all were: ``Time.m`` counts them. ``also_called`` are names that the manuals or other
+    controllers have for it, ``for_booleans`` says what does its work with BOOLEANs; both are for hints.
     """
 
     name: str
@@ -370,6 +371,8 @@ class Block:
     expected_on: frozenset[Platform] = frozenset()
     expected_since: str = ""
     searched_to: str = ""
+    also_called: tuple[str, ...] = ()
+    for_booleans: str = ""
 
     @property
     def parameters(self) -> tuple[Input | Output, ...]:

@@ -168,6 +168,7 @@ _STATES = (
 
 HIGH_PASS_FILTER = Block(
     name="HIGH_PASS_FILTER",
+    also_called=("LEADN",),
     section="46",
     title="Butterworth high-pass filter",
     function=(
@@ -193,6 +194,7 @@ HIGH_PASS_FILTER = Block(
 
 LOW_PASS_FILTER = Block(
     name="LOW_PASS_FILTER",
+    also_called=("LAGN",),
     section="47",
     title="Butterworth low-pass filter",
     function=(

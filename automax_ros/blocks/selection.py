@@ -168,4 +168,5 @@ MOVE = Block(
         "The order in which the pairs are written does not matter.",
     ),
     step=move_step,
+    for_booleans="OR with INPUT1 alone passes a BOOLEAN on; or assign it: B@ = A@",
 )

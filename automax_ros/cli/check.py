@@ -27,8 +27,10 @@ from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, as_json, has_errors, in_order
 from automax_ros.core.problems import Severity
-from automax_ros.core.text import count_of
+from automax_ros.core.text import count_of, printable
 
+_OF_OLD_PLANTS = ("AMX0003", "AMX0006", "AMX0021", "AMX2016", "AMX4008")
+"""What `automax convert` mends."""
 _LINE_NUMBER = re.compile(r"\s*([0-9]{1,6})")
 
 
@@ -95,7 +97,19 @@ def _refuse_idle_options(arguments: argparse.Namespace) -> None:
 def _task_file(path: Path, target: Target) -> list[_Findings]:
     source, result = check_task_file(path, target)
     warning = name_warning(path)
-    return [_Findings(source, [*([warning] if warning else []), *result.diagnostics], result.unconfirmed)]
+    found = _naming_convert(source, result.diagnostics)
+    return [_Findings(source, [*([warning] if warning else []), *found], result.unconfirmed)]
+
+
+def _naming_convert(source: SourceText, diagnostics: list[Diagnostic]) -> list[Diagnostic]:
+    """Return the findings; the hint of the first that only a source of an old plant has names the command for it."""
+    first = next((number for number, item in enumerate(diagnostics) if item.code in _OF_OLD_PLANTS), None)
+    if first is None:
+        return diagnostics
+    item = diagnostics[first]
+    command = f"of an old plant? `automax convert {printable(source.name)}` mends the whole file"
+    hint = f"{item.hint}; {command}" if item.hint else command
+    return [*diagnostics[:first], dataclasses.replace(item, hint=hint), *diagnostics[first + 1 :]]
 
 
 def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
@@ -106,19 +120,22 @@ def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
     """
     # Whoever checks a task alone need not wait until the reader of racks is loaded.
     from automax_ros.cli.rack_file import is_text, load_rack_file, size_of
-    from automax_ros.rack.tasks_check import check_tasks
+    from automax_ros.rack.tasks_check import check_tasks, forgotten
 
     rack = load_rack_file(path, allow_outside=allow_outside)
     tasks = check_tasks(rack.config) if rack.config is not None else []
     return [
         _Findings(
             rack.source,
-            rack.diagnostics,
+            [*rack.diagnostics, *(forgotten(rack.config, tasks) if rack.config is not None else ())],
             [],
             size=size_of(rack.config) if rack.config is not None else "",
             usable=is_text(rack),
         ),
-        *(_Findings(item.source, item.result.diagnostics, item.result.unconfirmed) for item in tasks),
+        *(
+            _Findings(item.source, _naming_convert(item.source, item.result.diagnostics), item.result.unconfirmed)
+            for item in tasks
+        ),
     ]
 
 

@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--write", action="store_true", help=f"write over the files; the old ones stay as FILE{KEPT_SUFFIX}"
     )
-    where.add_argument("--output", "-o", type=Path, metavar="DIR", help="write the converted files into this folder")
+    where.add_argument(
+        "--output", "-o", type=Path, metavar="DIR", help="write the converted files into this folder, made if need be"
+    )
     add_target_arguments(parser)
 
 
@@ -53,6 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
             _write(path.with_name(path.name + KEPT_SUFFIX), read_bytes(path), over=False)
             _write(path, result.data, over=True)
         elif arguments.output is not None:
+            _make(arguments.output)
             _write(places[path], result.data, over=False)
     changed = sum(result.changed for _, result in converted)
     if changed and not arguments.write and arguments.output is None:
@@ -62,11 +65,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
-    """Return where the converted files go; two of one name, or a missing folder, are refused before."""
+    """Return where the converted files go; two of one name, or a file in the folder's place, are refused before."""
     if folder is None:
         return {}
-    if not folder.is_dir():
-        raise UsageError(f"{folder} is not a folder", "make it first")
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is not a folder", "name another one")
     places: dict[Path, Path] = {}
     for path in files:
         place = folder / path.name
@@ -93,6 +96,13 @@ def _difference(path: Path, result: Converted) -> Iterator[str]:
     before, after = (text.split("\n") for text in (result.before, result.after))
     for line in difflib.unified_diff(before, after, *names, lineterm=""):
         yield printable(line)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be made: {error.strerror or error}") from error
 
 
 def _write(path: Path, data: bytes, *, over: bool) -> None:

@@ -106,8 +106,9 @@ class LiveSession:
         if not self._all_are_there(stop):
             return False
         self.has_begun = True
-        self.live.start([*self._state.settings, *self.plan.settings])
-        self._stimulation.begin(joining=self.live.is_joining)
+        self.live.start([*self._state.settings, *self.plan.settings], self._stimulation.begin)
+        if self.live.is_joining:
+            self._stimulation.begin(joining=True)
         return True
 
     def run(self, should_stop: Callable[[], bool]) -> None:

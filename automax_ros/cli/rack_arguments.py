@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from automax_ros.cli.rack_file import is_text, load_rack_file
-from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.terminal import print_diagnostics, tell_warnings
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.faults import Fault
@@ -20,21 +20,23 @@ from automax_ros.rack.tasks_check import check_tasks
 def config_of(path: Path, *, allow_outside: bool, quiet: bool = False) -> RackConfig | None:
     """Return a rack's configuration; what is wrong with its file is printed, and None returned where it has errors.
 
-    ``quiet``: of a file that can be used nothing is printed, since another process has told its warnings.
+    Of a file that can be used its warnings are counted, ``quiet``: not even that, since another process has done it.
 
     Raises:
         UsageError: the file cannot be read.
     """
     result = load_rack_file(path, allow_outside=allow_outside)
-    if not quiet or has_errors(result.diagnostics):
+    if has_errors(result.diagnostics):
         print_diagnostics(result.diagnostics, result.source, sys.stderr)
+    elif not quiet:
+        tell_warnings([(result.source, result.diagnostics)], path.name, path)
     if not is_text(result):
         raise UsageError(f"{path} cannot be used")
     return result.config if not has_errors(result.diagnostics) else None
 
 
 def usable_config(path: Path, *, allow_outside: bool) -> RackConfig:
-    """Return a rack's configuration; its warnings are printed.
+    """Return a rack's configuration; its warnings are counted.
 
     Raises:
         RackError: the file has errors, which it holds.
@@ -43,7 +45,7 @@ def usable_config(path: Path, *, allow_outside: bool) -> RackConfig:
     result = load_rack_file(path, allow_outside=allow_outside)
     if result.config is None:
         raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
-    print_diagnostics(result.diagnostics, result.source, sys.stderr)
+    tell_warnings([(result.source, result.diagnostics)], path.name, path)
     return result.config
 
 

@@ -19,7 +19,7 @@ from automax_ros.cli.output_files import require_different_files, require_pictur
 from automax_ros.cli.places import add_where_arguments, where_of
 from automax_ros.cli.progress import share_shown
 from automax_ros.cli.signals import ended_by_signals
-from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.terminal import print_diagnostics, tell_warnings
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import add_window_arguments, window_of
 from automax_ros.core.diagnostics import SourceText
@@ -105,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _replayed(replay: Replay, where: Where, arguments: argparse.Namespace) -> ReplayReport:
     """Replay, print the report, draw the picture."""
     for source, diagnostics in replay.warnings:
-        print_diagnostics(diagnostics, source, sys.stderr)
+        tell_warnings([(source, diagnostics)], Path(source.name).name, Path(source.name))
     with share_shown("replay") as show:
         notes: list[str] = []
         report = replay_side_by_side(replay, where, show, notes.append)

@@ -13,7 +13,7 @@ from automax_ros.cli.native import tell_native
 from automax_ros.cli.output_files import write_report
 from automax_ros.cli.seat_talk import ToldScreen, tell_report
 from automax_ros.cli.status import Person, Screen
-from automax_ros.cli.terminal import print_diagnostics
+from automax_ros.cli.terminal import tell_warnings
 from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.types import Value
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
@@ -113,9 +113,8 @@ class RunPlan:
 
 
 def warn(rack: Rack) -> None:
-    """Print the warnings that the tasks' checks gave."""
-    for source, diagnostics in rack.warnings:
-        print_diagnostics(diagnostics, source, sys.stderr)
+    """Say how many warnings the tasks' checks gave."""
+    tell_warnings(rack.warnings, "its tasks", rack.config.path)
 
 
 def tell_forms(rack: Rack, plan: RunPlan) -> None:

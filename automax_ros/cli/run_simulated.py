@@ -44,8 +44,7 @@ def run_simulated(plan: RunPlan, stop: StopRequest) -> int:
             stream.begin()
         if plan.duration_ns is None:
             display.message(_NO_END)
-        rack.start([*state.settings, *plan.settings])
-        stimulation.begin()
+        rack.start([*state.settings, *plan.settings], stimulation.begin)
         while not stop.requested and rack.now_ns < end_ns and _goes_on(rack, plan, stimulation):
             rack.scheduler.run_until(min(rack.now_ns + SLICE_NS, end_ns))
             for text in [*state.news(), *stimulation.news()]:

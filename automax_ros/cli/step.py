@@ -60,8 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         return print_refused("step", error)
     except StimuliRefused:
         return 1
-    stepper.start(settings)
-    happening.begin()
+    stepper.start(settings, happening.begin)
     session = Session(stepper, _tell)
     with interrupt.watching():
         failed = _obey_all(session, interrupt)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,8 @@ MOST_LANES = 8
 _WIDTH_IN, _LANE_IN, _MAP_IN, _CELL_IN = 9.0, 2.2, 4.5, 2.4
 _MOST_TICKS = 20
 _COLOUR, _BEST, _FONT = "#1f4e9c", "#c1272d", 8
+_LETTERS_AN_INCH, _LEAST_LETTERS = 14.0, 12
+"""How many letters of that size an inch holds, and the shortest line of a label."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,7 @@ def _maps(across: _Axis, up: _Axis, measures: Sequence[_Axis], marked: Sequence[
         drawn = axis.pcolormesh(columns, lines, cells, shading="nearest")
         figure.colorbar(drawn, ax=axis).ax.tick_params(labelsize=_FONT)
         axis.plot([across.numbers[at] for at in marked], [up.numbers[at] for at in marked], "o", color=_BEST)
-        axis.set_title(_plain(measure.label), fontsize=_FONT + 1)
+        axis.set_title(_folded(measure.label, _WIDTH_IN), fontsize=_FONT + 1)
         _name(axis, across, up)
     return figure
 
@@ -126,14 +129,22 @@ def _mark(axis: Any, across: _Axis, up: _Axis, marked: Sequence[int]) -> None:
 
 
 def _name(axis: Any, across: _Axis, up: _Axis) -> None:
-    axis.set_xlabel(_plain(across.label), fontsize=_FONT)
-    axis.set_ylabel(_plain(up.label), fontsize=_FONT)
+    _, _, width, height = axis.get_position().bounds
+    inches = axis.figure.get_size_inches()
+    axis.set_xlabel(_folded(across.label, width * inches[0]), fontsize=_FONT)
+    axis.set_ylabel(_folded(up.label, height * inches[1]), fontsize=_FONT)
     for texts, set_ticks in ((across.texts, axis.set_xticks), (up.texts, axis.set_yticks)):
         if texts:
             every = -(-len(texts) // _MOST_TICKS)
             set_ticks(range(0, len(texts), every), [_plain(printable(text)) for text in texts[::every]])
     axis.tick_params(labelsize=_FONT)
     axis.grid(alpha=0.3)
+
+
+def _folded(text: str, inches: float) -> str:
+    """A label in as many lines as it needs to be no longer than its axis."""
+    lines = textwrap.wrap(text, max(_LEAST_LETTERS, int(inches * _LETTERS_AN_INCH)), break_on_hyphens=False)
+    return "\n".join(map(_plain, lines))
 
 
 def _plain(text: str) -> str:

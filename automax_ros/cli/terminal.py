@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TextIO
 
 from automax_ros.cli.visible import write_control
 from automax_ros.core.diagnostics import Diagnostic, SourceText, in_order, render
 from automax_ros.core.problems import Severity
-from automax_ros.core.text import visible
+from automax_ros.core.text import count_of, printable, visible
 
 _COLOURS = {Severity.ERROR: "1;31", Severity.WARNING: "1;33"}
 _HINT = "  hint:"
@@ -31,6 +33,20 @@ def print_diagnostics(diagnostics: Iterable[Diagnostic], source: SourceText, str
     for item in in_order(diagnostics):
         text = visible(render(item, source))
         write_control(stream, (_painted(item, text) if colour else text) + "\n")
+
+
+def tell_warnings(findings: Iterable[tuple[SourceText, Sequence[Diagnostic]]], of: str, path: Path) -> None:
+    """Say on standard error how many warnings there are, and that `automax check` of ``path`` shows them.
+
+    A command that is used again and again does not print them each time; ``of`` says whose they are.
+    """
+    number = sum(item.severity is Severity.WARNING for _, diagnostics in findings for item in diagnostics)
+    if number:
+        shown = "it" if number == 1 else "them"
+        print(
+            f"{count_of(number, 'warning')} of {of}: automax check {printable(str(path))} shows {shown}",
+            file=sys.stderr,
+        )
 
 
 def painted(text: str, colour: str) -> str:

@@ -133,6 +133,7 @@ class _Trace:
     def run(self, scans: StimulatedScans, bar: ProgressBar) -> None:
         """Scan until the table, the duration or the task ends."""
         task, period = self._lone.task, self._lone.task.period_ns
+        scans.begin()
         self._write_errors(task.run())
         self._show_printed()
         if not self._runs():

@@ -63,7 +63,8 @@ class InputTable(CsvTable):
                     columns[name] = None
                     continue
                 code = "AMX6911" if isinstance(fault, UnknownName) else "AMX6913"
-                raise self.fault(code, fault.message, _header_hint(name) or fault.hint) from fault
+                hint = f"{fault.hint}; take the column out where the task has no such variable"
+                raise self.fault(code, fault.message, _header_hint(name) or hint) from fault
             if variable.label in columns:
                 raise self.fault("AMX6912", f"there are two columns for {variable.label}")
             columns[variable.label] = variable

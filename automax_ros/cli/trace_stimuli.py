@@ -40,9 +40,12 @@ class StimulatedScans:
         """How much is done."""
         return self._table.position if self._table is not None else self._done
 
+    def begin(self) -> None:
+        """Let the entries of time 0 happen: before what stands before SCAN_LOOP."""
+        self._stimulation.begin()
+
     def rows(self) -> Iterator[int]:
         """Yield a number before each scan, once everything is set for it."""
-        self._stimulation.begin()
         rows = iter(self._table.rows() if self._table is not None else count())
         for number in self._numbers():
             self._scheduler.run_until(number * self._period_ns + 1)

@@ -15,6 +15,11 @@ from typing import Generic, Protocol, TypeVar
 from automax_ros.core.faults import Fault
 from automax_ros.core.text import near_or_listed, quoted
 
+AUTO_RUN = "AUTORUNSTATUS@"
+"""TRUE where AUTO RUN is enabled for the rack (2.4.6)."""
+PREDEFINED = (AUTO_RUN, "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in range(5)))
+"""Commons that the rack itself writes (2.4.6)."""
+
 _NAME = re.compile(
     r"(?P<name>[A-Z_][A-Z0-9_]{0,63}[%!@$]?|SLOT:[0-9]{1,2}%)(?:[(\[](?P<subscripts>[0-9]{1,9}(?:,[0-9]{1,9}){0,3})[)\]])?"
 )

@@ -99,9 +99,9 @@ class LiveRack:
         """
         return self.nodes.await_others(should_stop)
 
-    def start(self, settings: list[tuple[str, Value]]) -> None:
-        """Begin the stream and put the rack into RUN; rack time starts in a moment."""
-        self.nodes.start(settings, paced=False)
+    def start(self, settings: list[tuple[str, Value]], first: Callable[[], None] | None = None) -> None:
+        """Begin the stream and put the rack into RUN (``Rack.start``); rack time starts in a moment."""
+        self.nodes.start(settings, first, paced=False)
 
     def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:
         """Let the rack live until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""

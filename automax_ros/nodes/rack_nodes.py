@@ -57,6 +57,8 @@ from automax_ros.wire.stream import RackStream
 LOOK_S = 0.02
 """How often it is looked whether the other processes are there."""
 
+_Beginning = tuple[Sequence[tuple[str, Value]], "Callable[[], None] | None"]
+"""The arguments of ``Rack.start``."""
 _TOGETHER = "a distributed rack keeps the wall clock, by which its processes agree"
 
 
@@ -136,7 +138,7 @@ class RackNodes:
             self._own = (manager,)
         self.manager = manager
         self._clock.join(self._site, self.nodes[0])
-        self._to_begin: Sequence[tuple[str, Value]] | None = None
+        self._to_begin: _Beginning | None = None
         if manager is not None:
             self.rack.observers.add(Follower(manager))
         self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
@@ -172,17 +174,24 @@ class RackNodes:
             executor.add_node(node)
         self._door.open()
 
-    def start(self, settings: Sequence[tuple[str, Value]] = (), *, paced: bool = True) -> None:
+    def start(
+        self,
+        settings: Sequence[tuple[str, Value]] = (),
+        first: Callable[[], None] | None = None,
+        *,
+        paced: bool = True,
+    ) -> None:
         """Send what stands at the start and put the rack into RUN; rack time 0 comes in a moment.
 
         A rack that follows ``/clock`` begins with its first message: ``run``, or the thread, waits for it.
 
         Args:
             settings: those of ``Rack.start``, which raises what it says.
+            first: what it calls before tasks run; nobody does in a rack that others run already.
             paced: whether a thread scans from then on; without one, ``run`` does.
         """
         self._door.open()
-        self._to_begin = settings
+        self._to_begin = (settings, first)
         if self._clock.is_there:
             self._begin()
         if paced:
@@ -190,16 +199,16 @@ class RackNodes:
             self._thread.start()
 
     def _begin(self) -> None:
-        settings, self._to_begin = self._to_begin, None
-        if settings is None:
+        beginning, self._to_begin = self._to_begin, None
+        if beginning is None:
             return
         with self._site.lock:
             if self.bus is None:
                 self.stream.begin(self._pacer.begin(START_LEAD_NS))
                 self._begun = True
-                self.rack.start(settings)
+                self.rack.start(*beginning)
             else:
-                self._start_together(self.bus, settings)
+                self._start_together(self.bus, beginning)
             if self.rack.part.is_home:
                 self.nodes[0].declare_facts(run_facts(self.stream.run_id))
             for node in (*self._own, *self._managed()):
@@ -248,7 +257,7 @@ class RackNodes:
             time.sleep(LOOK_S)
         return True
 
-    def _start_together(self, bus: RackBus, settings: Sequence[tuple[str, Value]]) -> None:
+    def _start_together(self, bus: RackBus, beginning: _Beginning) -> None:
         """Start at the instant that all processes know, or join those that run already."""
         self._pacer.begin(bus.epoch_ns - time.time_ns())
         self.stream.in_run(bus.run_id)
@@ -258,7 +267,7 @@ class RackNodes:
         if bus.joining:
             self.rack.join(max(0, self._pacer.now_ns), bus.catch_up)
         else:
-            self.rack.start(settings)
+            self.rack.start(*beginning)
         bus.begin()
 
     def run(

@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-from automax_ros.core.names import NameFault
+from automax_ros.core.names import PREDEFINED, NameFault
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 from automax_ros.rack.config import CommonElement, RackConfig
 from automax_ros.rack.forcing import Forcing
-from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.observers import Observers, Operation
 from automax_ros.rack.operations import OperationRefused, Operations
 from automax_ros.rack.settings import common_named

@@ -20,13 +20,14 @@ from automax_ros.core.json_schema import (
     words,
 )
 from automax_ros.core.kinds import Direction
+from automax_ros.core.names import PREDEFINED
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import DataType, bare_name
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
-from automax_ros.rack.names import COMMON_NAME, PREDEFINED, DeclarationFault, VariableName, variable_name
+from automax_ros.rack.names import COMMON_NAME, DeclarationFault, VariableName, variable_name
 from automax_ros.rack.points import KEYS, PointReader
 from automax_ros.rack.presets import preset_value
 from automax_ros.rack.reserved import is_reserved
@@ -70,9 +71,11 @@ _PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
 class CommonReader:
     """Reads the ``common`` section."""
 
-    def __init__(self, modules: Iterable[ModuleConfig], findings: Findings) -> None:
-        """Begin with no variables; I/O points stand on ``modules``."""
-        self._points = PointReader(modules, findings)
+    def __init__(
+        self, modules: Iterable[ModuleConfig], findings: Findings, unread: frozenset[int] = frozenset()
+    ) -> None:
+        """Begin with no variables; I/O points stand on ``modules``, or in slots whose module could not be read."""
+        self._points = PointReader(modules, findings, unread)
         self._findings = findings
         self._names: dict[str, Span] = {}
         self._bare: dict[str, tuple[str, Span]] = {}

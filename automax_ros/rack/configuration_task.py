@@ -2,13 +2,14 @@
 
 The manual of its language (J-3649) is not at hand. IODEF is as the ControlNet manual prints it (DSMBCN-UM001B p. 43):
 ``nnnnn IODEF name [SLOT=s, REGISTER=r, BIT=b]``, where ``&`` goes on in the next line. The others are taken to have the
-same form (decision): MEMDEF and NVMEMDEF a list of variables as in COMMON; RIODEF, NETDEF, GBLDEF, RNETDEF, ABDEF and
-MODDEF a name and any keys; TASK the keys TYPE, SLOT, PRIORITY and CRITICAL. Everything else is reported.
+same form (decision): MEMDEF and NVMEMDEF a list of variables as in COMMON; NETDEF the keys of IODEF and DROP; RIODEF,
+GBLDEF, RNETDEF, ABDEF and MODDEF a name and any keys; TASK the keys TYPE, SLOT, PRIORITY and CRITICAL. Everything else
+is reported.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
 from automax_ros.core.diagnostics import Diagnostic, Note, SourceText, Span, in_order
@@ -19,9 +20,13 @@ from automax_ros.language.syntax.reporter import Reporter, TooManyProblemsError
 from automax_ros.language.syntax.tokens import Kind, Token
 from automax_ros.rack.config import MAX_SLOT, Point
 from automax_ros.rack.names import DeclarationFault, VariableName, check_task_name, variable_name
+from automax_ros.rack.reserved import is_reserved
 from automax_ros.rack.task_config import MAX_PRIORITY, MIN_PRIORITY
 
-TASK_TYPES = ("BAS", "BLK", "PC")
+TASK_TYPES = {"BAS": "BAS", "BLK": "BLK", "PC": "PC", "BASIC": "BAS", "CONTROL": "BLK"}
+"""Words of TYPE, each with the suffix of the task's file."""
+MAX_DROP, MAX_DROP_REGISTER = 55, 63
+"""Highest drop of a network, and highest register of a drop (57C570 manual p. 18-4)."""
 MAX_REGISTER = 65535
 """Highest register of a module on the bus (decision: a bound; 64K registers is the largest module)."""
 _MAX_BIT = 15
@@ -33,13 +38,17 @@ _PROCESSOR_SLOTS = range(5)
 
 @dataclass(frozen=True)
 class DefinedCommon:
-    """A variable that the configuration defines; ``keyword`` is the statement's word, ``point`` where IODEF puts it."""
+    """A variable that the configuration defines; ``keyword`` is the statement's word.
+
+    ``point`` is where IODEF puts it, or NETDEF, with the ``drop`` whose register it is.
+    """
 
     declared: VariableName
     keyword: str
     line: int
     point: Point | None = None
     non_volatile: bool = False
+    drop: int | None = None
 
 
 @dataclass(frozen=True)
@@ -171,6 +180,9 @@ class _Reader:
     def _io(self, word: Token, tokens: _Tokens) -> None:
         declared, span = self._variable(tokens)
         keys = self._keys(tokens, ("SLOT", "REGISTER", "BIT"))
+        self._add(declared, span, word, point=self._point(declared, span, word, keys, MAX_REGISTER))
+
+    def _point(self, declared: VariableName, span: Span, word: Token, keys: dict[str, _Given], highest: int) -> Point:
         if declared.dimensions or declared.type in (DataType.REAL, DataType.STRING):
             kind = "an array" if declared.dimensions else declared.type.word
             message = f"{declared.name} cannot be an I/O point: it is {kind}"
@@ -181,12 +193,21 @@ class _Reader:
         for key in ("SLOT", "REGISTER", "BIT") if is_bit else ("SLOT", "REGISTER"):
             if key not in keys:
                 raise _Fault("AMX6782", f"{word.text} {declared.name} lacks {key}", span)
-        point = Point(
+        return Point(
             _number(keys["SLOT"], 0, MAX_SLOT),
-            _number(keys["REGISTER"], 0, MAX_REGISTER),
+            _number(keys["REGISTER"], 0, highest),
             _number(keys["BIT"], 0, _MAX_BIT) if is_bit else None,
         )
-        self._add(declared, span, word, point=point)
+
+    def _network(self, word: Token, tokens: _Tokens) -> None:
+        """Read a definition on a 57C404; without its slot and drop it is one that stands elsewhere."""
+        declared, span = self._variable(tokens)
+        keys = {} if tokens.at_end else self._keys(tokens, None)
+        if not {"SLOT", "DROP"} <= keys.keys():
+            self._tell_elsewhere(declared, span, word, "the statement lacks SLOT or DROP of its 57C404")
+            return
+        point = self._point(declared, span, word, keys, MAX_DROP_REGISTER)
+        self._add(declared, span, word, point=point, drop=_number(keys["DROP"], 0, MAX_DROP))
 
     def _memory(self, word: Token, tokens: _Tokens) -> None:
         while True:
@@ -200,8 +221,11 @@ class _Reader:
         declared, span = self._variable(tokens)
         if not tokens.at_end:
             self._keys(tokens, None)
+        self._tell_elsewhere(declared, span, word, _WHY_ELSEWHERE.get(word.text, "no module of the emulator has it"))
+
+    def _tell_elsewhere(self, declared: VariableName, span: Span, word: Token, why: str) -> None:
         self._add(declared, span, word)
-        message = f"{declared.name} is defined by {word.text}: no module of the emulator has it"
+        message = f"{declared.name} is defined by {word.text}: {why}"
         hint = "it becomes a plain common; write `ros: in` if something outside of the rack supplies it"
         self._report(Diagnostic("AMX6786", message, span, hint=hint))
 
@@ -218,7 +242,7 @@ class _Reader:
         self._take_name(f"task {name.text}", name.span)
         task = DefinedTask(
             name=name.text,
-            type=_one_of(keys["TYPE"], TASK_TYPES) if "TYPE" in keys else "BLK",
+            type=TASK_TYPES[_one_of(keys["TYPE"], TASK_TYPES)] if "TYPE" in keys else "BLK",
             slot=_number(keys["SLOT"], _PROCESSOR_SLOTS[0], _PROCESSOR_SLOTS[-1]),
             priority=_number(keys["PRIORITY"], MIN_PRIORITY, MAX_PRIORITY),
             critical="CRITICAL" in keys and _flag(keys["CRITICAL"]),
@@ -266,10 +290,21 @@ class _Reader:
         return keys
 
     def _add(
-        self, declared: VariableName, span: Span, word: Token, point: Point | None = None, non_volatile: bool = False
+        self,
+        declared: VariableName,
+        span: Span,
+        word: Token,
+        point: Point | None = None,
+        non_volatile: bool = False,
+        drop: int | None = None,
     ) -> None:
         self._take_name(declared.name, span)
-        self.found.commons.append(DefinedCommon(declared, word.text, span.line, point, non_volatile))
+        if is_reserved(declared.name):
+            message = f"{declared.name} is a word of the language and cannot name a variable: it is left out"
+            hint = "give it another name, here and in the tasks, and import again"
+            self._report(Diagnostic("AMX6401", message, span, hint=hint))
+            return
+        self.found.commons.append(DefinedCommon(declared, word.text, span.line, point, non_volatile, drop))
 
     def _take_name(self, name: str, span: Span) -> None:
         if name in self._names:
@@ -280,15 +315,19 @@ class _Reader:
 def _number(given: _Given, low: int, high: int) -> int:
     value = given.value
     if value is None or value.kind is not Kind.INTEGER or not isinstance(value.value, int):
-        raise _Fault("AMX6783", f"{given.key.text} must be a whole number", (value or given.key).span)
+        hint = f"write {given.key.text}= and a number from {low} to {high}"
+        raise _Fault("AMX6783", f"{given.key.text} must be a whole number", (value or given.key).span, hint)
     if not low <= value.value <= high:
-        raise _Fault("AMX6783", f"{given.key.text} is {value.text}; it must be {low} to {high}", value.span)
+        hint = f"correct the number; or is it another key than {given.key.text}?"
+        raise _Fault("AMX6783", f"{given.key.text} is {value.text}; it must be {low} to {high}", value.span, hint)
     return value.value
 
 
-def _one_of(given: _Given, words: tuple[str, ...]) -> str:
+def _one_of(given: _Given, words: Collection[str]) -> str:
     if given.value is None or given.value.text not in words:
-        raise _Fault("AMX6783", f"{given.key.text} must be {', '.join(words)}", (given.value or given.key).span)
+        near = did_you_mean(given.value.text, words) if given.value is not None else None
+        hint = near or f"for example {given.key.text}={next(iter(words))}"
+        raise _Fault("AMX6783", f"{given.key.text} must be {', '.join(words)}", (given.value or given.key).span, hint)
     return given.value.text
 
 
@@ -296,12 +335,14 @@ def _flag(given: _Given) -> bool:
     return given.value is None or _one_of(given, ("TRUE", "FALSE")) == "TRUE"
 
 
+_WHY_ELSEWHERE = {"GBLDEF": "where it stands is in the network's .NET file, which is not read"}
 _Read = Callable[[_Reader, Token, _Tokens], None]
 _STATEMENTS: dict[str, _Read] = {
     "IODEF": _Reader._io,
     "MEMDEF": _Reader._memory,
     "NVMEMDEF": _Reader._memory,
-    **dict.fromkeys(("RIODEF", "NETDEF", "GBLDEF", "RNETDEF", "ABDEF", "MODDEF"), _Reader._elsewhere),
+    "NETDEF": _Reader._network,
+    **dict.fromkeys(("RIODEF", "GBLDEF", "RNETDEF", "ABDEF", "MODDEF"), _Reader._elsewhere),
     "TASK": _Reader._task,
     "END": _Reader._end,
 }

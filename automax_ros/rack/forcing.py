@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from automax_ros.core.names import NameFault
+from automax_ros.core.names import PREDEFINED, NameFault
 from automax_ros.core.types import DataType, Value
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.executive import most_forces, version_text
 from automax_ros.rack.local_names import LocalElement, local_named
-from automax_ros.rack.names import PREDEFINED
 from automax_ros.running.memory import FORCING, CommonMemory
 from automax_ros.running.task import Task
 from automax_ros.running.views import MemoryValueError, ViewSpec, fitting

@@ -19,6 +19,8 @@ _PROCESSOR = "57C430A"
 _EXECUTIVE = "2.1"
 """The last Executive that had configuration tasks (2.1)."""
 _MEMORY = "57C413"
+_NETWORK = "57C404"
+"""The module of NETDEF."""
 
 
 @dataclass
@@ -103,15 +105,25 @@ class _Importing:
 
     def _points(self, processors: Sequence[int]) -> Iterator[str]:
         used: dict[int, int] = {}
+        networks = sorted(self._networks)
+        for number, slot in enumerate(networks):
+            module = f"  {slot}: {{module: {_NETWORK}, network: NET{number or ''}, drop: 0}}"
+            yield commented(module, "its drop and network stand nowhere: 0 is the master")
         for common in self.configuration.commons:
-            if common.point is not None:
+            if common.point is not None and common.point.slot not in self._networks:
                 used[common.point.slot] = max(used.get(common.point.slot, 0), common.point.register)
-        for slot in sorted({*used, *self.modules} - {*processors}):
+        for slot in sorted({*used, *self.modules} - {*processors, *networks}):
             if slot in self.modules:
                 yield f"  {slot}: {{module: {self.modules[slot]}}}"
             else:
                 fitting = ", ".join(_with_registers(used[slot])) or "none that the emulator has"
                 yield commented(f"  # {slot}: {{module: }}", f"generic, registers up to {used[slot]}: {fitting}")
+
+    @property
+    def _networks(self) -> set[int]:
+        """The slots of 57C404 modules: those of NETDEF, and those that the caller names."""
+        named = {slot for slot, model in self.modules.items() if model == _NETWORK}
+        return named | {item.point.slot for item in self.configuration.commons if item.point and item.drop is not None}
 
     def _common(self, common: DefinedCommon) -> str:
         declared, point = common.declared, common.point
@@ -119,9 +131,10 @@ class _Importing:
         if point is None:
             options = "{non_volatile: true}" if common.non_volatile else "{}"
             return commented(f"  {text}: {options}", f"{common.keyword}, line {common.line}")
-        place = f"slot: {point.slot}, register: {point.register}"
+        place = f"slot: {point.slot}, " + ("" if common.drop is None else f"drop: {common.drop}, ")
+        place += f"register: {point.register}"
         place += "" if point.bit is None else f", bit: {point.bit}"
-        if point.slot in self.modules:
+        if point.slot in self.modules or point.slot in self._networks:
             return f"  {text}: {{{place}}}"
         return commented(f"  {text}: {{}}", place)
 

@@ -147,9 +147,9 @@ class _RackReader:
         execution = self._execution(section.get("execution"))
         executive = self._executive(section.get("executive"))
         plants = read_plants(section.get("plants"), self._findings)
-        modules = self._modules(section, executive, plants)
+        modules, unread = self._modules(section, executive, plants)
         common = section.get("common")
-        variables = CommonReader(modules, self._findings).read(common) if common is not None else ()
+        variables = CommonReader(modules, self._findings, unread).read(common) if common is not None else ()
         if common is not None:
             self._check_size(variables, modules, section.key_span("common"))
         feeds = read_feeds(plants.feeds, variables, modules, self._findings)
@@ -220,11 +220,15 @@ class _RackReader:
             return ModuleLoss.STOP_ALL
         return ModuleLoss(text)
 
-    def _modules(self, section: Section, executive: int, plants: Plants) -> tuple[ModuleConfig, ...]:
+    def _modules(
+        self, section: Section, executive: int, plants: Plants
+    ) -> tuple[tuple[ModuleConfig, ...], frozenset[int]]:
+        """Return the modules, and the slots of those that could not be read."""
         node = section.get("slots")
         if node is None:
-            return ()
-        return SlotReader(self._tasks, self._findings, executive, plants).read(node, section.key_span("slots"))
+            return (), frozenset()
+        reader = SlotReader(self._tasks, self._findings, executive, plants)
+        return reader.read(node, section.key_span("slots")), reader.unread
 
     def _check_size(self, variables: tuple[CommonVariable, ...], modules: tuple[ModuleConfig, ...], span: Span) -> None:
         """Compare the commons with the module that holds them, the first that can (J-3636 p. 1-1)."""

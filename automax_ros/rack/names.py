@@ -18,11 +18,6 @@ from automax_ros.core.types import (
     type_of_name,
 )
 
-AUTO_RUN = "AUTORUNSTATUS@"
-"""TRUE where AUTO RUN is enabled for the rack (2.4.6)."""
-PREDEFINED = (AUTO_RUN, "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in range(5)))
-"""Commons that the rack itself writes (2.4.6)."""
-
 _RACK = re.compile(r"[A-Z0-9]{1,8}\Z")
 RACK_NAME = "^[A-Za-z0-9]{1,8}$"
 TASK_NAME = f"^[A-Za-z][A-Za-z0-9_]{{0,{TASK_NAME_LIMIT - 1}}}$"

@@ -11,14 +11,14 @@ from typing import NoReturn
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.types import Value
+from automax_ros.rack.beginning import write_status
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.forcing import Forcing
 from automax_ros.rack.installation import Installation, Prepared, RackError
 from automax_ros.rack.modules.kind import Module
-from automax_ros.rack.names import AUTO_RUN
 from automax_ros.rack.observers import Observers, Operation
 from automax_ros.rack.scheduled_task import ScheduledTask
-from automax_ros.rack.standing import OperationsState, PowerReturn, StopCause
+from automax_ros.rack.standing import KEEP_STATE, OperationRefused, OperationsState, PowerReturn, StopCause
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.carry_over import carry_over
 from automax_ros.running.channels import Channels
@@ -27,13 +27,8 @@ from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 from automax_ros.running.task import Status
 
-KEEP_STATE = "keep_state"
-"""The ``detail`` of a reload that carries values over."""
+__all__ = ["KEEP_STATE", "OperationRefused", "Operations"]
 _POWER = EventKey(EventClass.OUTSIDE, 0, "power")
-
-
-class OperationRefused(Exception):
-    """An operation cannot be carried out now; the text says why and what to do."""
 
 
 class Operations:
@@ -68,6 +63,7 @@ class Operations:
         self.ran_at_power_off: frozenset[str] = frozenset()
         self.deleted: frozenset[str] = frozenset()
         self.starting: frozenset[str] | None = None
+        self._beginning, self._begins = set[str](), False
         self._power_return: PowerReturn | None = None
         self._power_event: ScheduledEvent | None = None
         self.powered = self.battery_good = True
@@ -78,16 +74,21 @@ class Operations:
         """Why all tasks were stopped, None while the rack runs."""
         return None if self.stopped is None else self.stopped.reason
 
-    def start(self, *, joining: bool = False) -> None:
+    def start(self, first: Callable[[], None] | None = None, *, joining: bool = False) -> None:
         """Begin what modules do by themselves, and put tasks into RUN with their first scan at this instant.
 
         These are all tasks, or those of ``starting`` where that is known: the ones that ran before a power-up. With
-        ``joining`` others run this rack: first scans come at the next ticks, and none where it is stopped.
+        ``joining`` others run this rack: first scans come at the next ticks, and none where it is stopped. ``first`` is
+        called before any start-up part: what it operates takes the tasks for running, and settles which of them begin.
         """
         for module in self._modules:
             module.power_on()
-        now = self._scheduler.now_ns
-        begins = [item for item in self._in_starting_order() if self.starting is None or item.name in self.starting]
+        now, self._begins = self._scheduler.now_ns, True
+        self._beginning = set(self._tasks if self.starting is None else self.starting)
+        if first is not None:
+            first()
+        begins = [item for item in self._in_starting_order() if item.name in self._beginning]
+        self._beginning, self._begins = set(), False
         if not (joining and self.stopped):
             self._run_together(begins, self._next_tick if joining else lambda _: now)
 
@@ -99,7 +100,7 @@ class Operations:
                 since (J2-3106-1 p. 12-4), it was deleted, or the power is off.
         """
         task = self.find("run", name)
-        if task.task.status is Status.RUNNING:
+        if self._runs(task):
             self._refuse("run", name, f"task {name} runs already")
         if name in self.deleted:
             self._refuse("run", name, f"task {name} was deleted: reload it first")
@@ -114,8 +115,7 @@ class Operations:
             OperationRefused: the error log of a task that has faulted was not cleared since, or the power is off.
         """
         self._need_power("run_all")
-        resting = [item for item in self._in_starting_order() if item.task.status is not Status.RUNNING]
-        resting = [item for item in resting if item.name not in self.deleted]
+        resting = [item for item in self._in_starting_order() if item.name not in self.deleted and not self._runs(item)]
         self._refuse_faulted("run_all", resting)
         self._run_together(resting, self._next_tick)
         self._tell("run_all")
@@ -129,12 +129,14 @@ class Operations:
         item = self.find("stop", name)
         self._refuse_critical("stop", item)
         item.stop()
+        self._beginning.discard(name)
         self._tell("stop", name)
 
     def stop_tasks(self) -> None:
         """Stop all tasks; memory keeps what it holds."""
         for item in self._tasks.values():
             item.stop()
+        self._beginning.clear()
 
     def stop_all(self, reason: str, code: str | None = None, task: str = "") -> None:
         """Stop all tasks of the rack, by command or because of a fault (2.4.5).
@@ -227,7 +229,7 @@ class Operations:
             OperationRefused: there is no such task, it runs, it was deleted already, or the power is off.
         """
         item = self.find("delete", name)
-        if item.task.status is Status.RUNNING:
+        if self._runs(item):
             self._refuse("delete", name, f"task {name} runs: stop it first")
         if name in self.deleted:
             self._refuse("delete", name, f"task {name} was deleted already")
@@ -258,8 +260,8 @@ class Operations:
         """
         if not self.powered:
             self._refuse("power_off", "", "the power is off already")
-        running = [name for name, item in self._tasks.items() if item.task.status is Status.RUNNING]
-        self.ran_at_power_off = frozenset(running)
+        self.ran_at_power_off = frozenset(name for name, item in self._tasks.items() if self._runs(item))
+        self._beginning.clear()
         self.powered = False
         for module in self._modules:
             module.power_off()
@@ -311,23 +313,24 @@ class Operations:
 
     def write_status(self) -> None:
         """Set AUTORUNSTATUS@, and BATTERYSTATUSn@ of the slots that hold a module with a battery (2.4.6)."""
-        shown = {
-            f"BATTERYSTATUS{item.config.slot}@": self.battery_good for item in self._modules if item.config.has_battery
-        }
-        shown[AUTO_RUN] = self._config.auto_run
-        for view, spec in enumerate(self._memory.specs):
-            if spec.name in shown:
-                self._memory.write_from_outside(view, shown[spec.name], PRESET_WRITER)
+        write_status(self._config, self._modules, self._memory, battery_good=self.battery_good)
 
     def _run_together(self, tasks: Sequence[ScheduledTask], first_ns: Callable[[ScheduledTask], int]) -> None:
         """Put tasks into RUN: first all start-up parts, then scans; a fault among them stops all."""
         if tasks:
             self.stopped = None
+        if self._begins:
+            self._beginning.update(item.name for item in tasks)
+            return
         for item in tasks:
             if self.stopped is None:
                 item.start_up()
         for item in tasks:
             item.scan_from(first_ns(item))
+
+    def _runs(self, item: ScheduledTask) -> bool:
+        """Return whether a task runs, or is among those that ``start`` puts into RUN at this instant."""
+        return item.task.status is Status.RUNNING or item.name in self._beginning
 
     def _next_tick(self, item: ScheduledTask) -> int:
         tick = self._ticks[item.task.name]
@@ -367,15 +370,14 @@ class Operations:
             self._refuse(what, task, "the power is off: switch it on first")
 
     def _refuse_critical(self, what: str, item: ScheduledTask) -> None:
-        if item.name in self._critical and item.task.status is Status.RUNNING:
-            reason = f"task {item.name} is critical, it does not stop alone: STOP ALL stops it with all others"
-            self._refuse(what, item.name, reason)
+        if item.name in self._critical and self._runs(item):
+            why = "is critical, it does not stop alone: STOP ALL stops it with all others"
+            self._refuse(what, item.name, f"task {item.name} {why}")
 
     def _refuse_faulted(self, what: str, tasks: Sequence[ScheduledTask]) -> None:
         faulted = [item.name for item in tasks if item.task.status is Status.FAULTED]
         if faulted:
-            reason = f"a fault has stopped {' '.join(faulted)}: clear the error log first"
-            self._refuse(what, faulted[0], reason)
+            self._refuse(what, faulted[0], f"a fault has stopped {' '.join(faulted)}: clear the error log first")
 
     def find(self, what: str, name: str) -> ScheduledTask:
         """Return a task that an operation concerns.

@@ -28,8 +28,11 @@ _SIZES = {DataType.BOOLEAN: 1, DataType.INTEGER: 16, DataType.DOUBLE: 32, DataTy
 class PointReader:
     """Reads the places of I/O points. A word may have a name and its bits too, otherwise a bit has one name."""
 
-    def __init__(self, modules: Iterable[ModuleConfig], findings: Findings) -> None:
-        """Take the modules of the rack that are right."""
+    def __init__(
+        self, modules: Iterable[ModuleConfig], findings: Findings, unread: frozenset[int] = frozenset()
+    ) -> None:
+        """Take the modules of the rack that are right, and the slots of the others: nothing is said of points there."""
+        self._unread = unread
         self._modules = {module.slot: module for module in modules}
         self._findings = findings
         self._named: dict[tuple[int, int, int], tuple[str, Span]] = {}
@@ -86,12 +89,16 @@ class PointReader:
         return None if drop is None else drop * registers.area
 
     def check_input(self, point: Point, declared: VariableName, span: Span) -> None:
-        """Report a point that the process shall write and its module alone does."""
+        """Report a point that the process shall write, where its module or tasks alone do."""
         module = self._modules[point.slot]
+        place = module.registers.place(point.register)
+        hint = "leave out ros, or write ros: out"
         if point.register in module.registers.shown:
-            place = module.registers.place(point.register)
             message = f"{declared.name} cannot be ros: in: the {module.model} writes {place} itself"
-            self._findings.add("AMX6550", message, span, "leave out ros, or write ros: out")
+            self._findings.add("AMX6550", message, span, hint)
+        elif point.register in module.registers.commands:
+            message = f"{declared.name} cannot be ros: in: {place} of the {module.model} is an output: tasks write it"
+            self._findings.add("AMX6494", message, span, hint)
 
     def _suits(self, declared: VariableName, module: ModuleConfig, taken: range, section: Section) -> bool:
         """Report two registers of which a task may write only one, and a REAL where none can stand."""
@@ -141,6 +148,8 @@ class PointReader:
         module = self._modules.get(slot)
         if module is not None and module.registers.count:
             return module
+        if slot in self._unread:
+            return None
         held = (
             f"the {module.model} there has no registers for I/O points" if module else "no module is configured there"
         )

@@ -200,10 +200,11 @@ class Rack:
         for task in self.tasks:
             task.record_scans()
 
-    def start(self, settings: Sequence[tuple[str, Value]] = ()) -> None:
+    def start(self, settings: Sequence[tuple[str, Value]] = (), first: Callable[[], None] | None = None) -> None:
         """Write presets, then ``settings`` (name and value, as an operator would), and put all tasks into RUN.
 
-        A name may be that of an array's element: ``TABLE%(3)``.
+        A name may be that of an array's element: ``TABLE%(3)``. ``first`` is called before what stands before SCAN_LOOP
+        runs: it may write and operate the rack, as the stimuli of time 0 do.
 
         Scans begin at once: the first of each task at this instant, then each period.
 
@@ -215,7 +216,7 @@ class Rack:
         begin_memory(self.config, self.inputs, self.memory)
         self.operations.write_status()
         self.set_from_start(settings)
-        self.operations.start()
+        self.operations.start(first)
         self._begin_plants()
 
     def join(self, now_ns: int, catch_up: Callable[[], None]) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import did_you_mean, quoted
-from automax_ros.core.yaml_text import Mapping, Node, Scalar
+from automax_ros.core.yaml_text import Mapping as Keyed
+from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.scalars import wrong_kind
 
@@ -15,7 +16,7 @@ Entry = tuple[Scalar, Node]
 
 def entries_of(node: Node, what: str, findings: Findings) -> tuple[Entry, ...] | None:
     """Return keys and values, () for a key without a value; None (reported) where something else stands."""
-    if isinstance(node, Mapping):
+    if isinstance(node, Keyed):
         return node.entries
     if isinstance(node, Scalar) and node.is_null:
         return ()
@@ -29,12 +30,24 @@ class Section:
     Reports AMX6006 a key twice and AMX6007 a key that is not known.
     """
 
-    def __init__(self, entries: Iterable[Entry], what: str, known: Collection[str], findings: Findings) -> None:
-        """Sort the entries; ``what`` names the section in messages, ``known`` are its keys."""
+    def __init__(
+        self,
+        entries: Iterable[Entry],
+        what: str,
+        known: Collection[str],
+        findings: Findings,
+        hints: Mapping[str, str] | None = None,
+    ) -> None:
+        """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.
+
+        ``hints`` say of keys that people look for what does their work.
+        """
         self._values: dict[str, Entry] = {}
         for key, value in entries:
             if key.text not in known:
-                _report_unknown(key, what, known, findings)
+                hint = (hints or {}).get(key.text) or did_you_mean(key.text, known)
+                hint = hint or f"{what} has the keys {', '.join(known)}"
+                findings.add("AMX6007", f"{what} has no key {quoted(key.text)}", key.span, hint)
             elif key.text in self._values:
                 report_twice(key, f"key {quoted(key.text)} of {what}", self._values[key.text][0].span, findings)
             else:
@@ -60,11 +73,6 @@ class Section:
             names = ", ".join(quoted(key) for key in missing)
             findings.add("AMX6009", f"{what} lacks the {word} {names}", span)
         return not missing
-
-
-def _report_unknown(key: Scalar, what: str, known: Collection[str], findings: Findings) -> None:
-    hint = did_you_mean(key.text, known) or f"{what} has the keys {', '.join(known)}"
-    findings.add("AMX6007", f"{what} has no key {quoted(key.text)}", key.span, hint)
 
 
 def report_twice(key: Scalar, what: str, first: Span, findings: Findings, code: str = "AMX6006") -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from automax_ros.core.kinds import Direction
-from automax_ros.core.names import Element, NameFault, element
+from automax_ros.core.names import PREDEFINED, Element, NameFault, element
 from automax_ros.core.settings import setting as core_setting
 from automax_ros.core.types import DataType, Value
 from automax_ros.language.program import Program
 from automax_ros.language.written import lines_that_write
 from automax_ros.rack.config import CommonElement, RackConfig
-from automax_ros.rack.names import PREDEFINED
 
 DEFAULT_WATCHED = 5
 """How many variables a status line shows when nobody chose any."""

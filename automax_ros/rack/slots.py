@@ -11,7 +11,7 @@ from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
-from automax_ros.rack.modules.registry import KINDS, NOT_YET, SUPPORTED, module_number, spellings
+from automax_ros.rack.modules.registry import KINDS, NOT_YET, REFUSED, SUPPORTED, module_number, spellings
 from automax_ros.rack.plants.reading import Plants
 from automax_ros.rack.scalars import text_value, wrong_kind
 from automax_ros.rack.sections import Entry, Section, entries_of
@@ -43,9 +43,13 @@ class SlotReader:
         self._standing: dict[int, Standing] = {}
         self._places: dict[int, Span] = {}
         self._complete = True
+        self.unread: frozenset[int] = frozenset()
 
     def read(self, node: Node, span: Span) -> tuple[ModuleConfig, ...]:
-        """Return the modules that are right, in the order of slots; ``span`` is the place of the key ``slots``."""
+        """Return the modules that are right, in the order of slots; ``span`` is the place of the key ``slots``.
+
+        ``unread`` are then the slots of the others: what is wrong there was told, and what follows from it need not be.
+        """
         entries = entries_of(node, "slots", self._findings)
         if entries is None:
             return ()
@@ -60,6 +64,7 @@ class SlotReader:
             if module is not None:
                 modules.append(module)
         in_order = tuple(sorted(modules, key=lambda item: item.slot))
+        self.unread = frozenset(self._places) - {item.slot for item in modules}
         rack = Arrangement(list(self._standing.values()), self._complete, span, self._findings, in_order)
         for kind in KINDS:
             kind.check_places(rack)
@@ -100,7 +105,7 @@ class SlotReader:
         )
 
     def _model(self, entries: tuple[Entry, ...], what: str, key: Scalar) -> str | None:
-        """Return the number of a module that the emulator has; report AMX6202 to AMX6204 for others."""
+        """Return the number of a module that the emulator has; report AMX6202 to AMX6204 and AMX6211 for others."""
         node = next((value for name, value in entries if name.text == "module"), None)
         if node is None:
             self._findings.add("AMX6009", f"{what} lacks the key 'module'", key.span)
@@ -111,9 +116,9 @@ class SlotReader:
         model = module_number(text)
         if model in SUPPORTED:
             return model
-        if model == "57C430":
-            message = "the 57C430 Processor may not share a rack with the others and does not run this software"
-            self._findings.add("AMX6204", message, node.span, "the module that does is the 57C430A")
+        if model in REFUSED:
+            code, message, hint = REFUSED[model]
+            self._findings.add(code, message, node.span, hint)
         elif model in NOT_YET:
             self._findings.add("AMX6203", f"the {model} ({NOT_YET[model]}) is not supported yet", node.span)
         else:

@@ -8,6 +8,14 @@ STOP_ALL = "STOP ALL"
 """How the line of a stop begins."""
 
 
+KEEP_STATE = "keep_state"
+"""The ``detail`` of a reload that carries values over."""
+
+
+class OperationRefused(Exception):
+    """An operation cannot be carried out now; the text says why and what to do."""
+
+
 @dataclass(frozen=True)
 class StopCause:
     """What stopped all tasks: ``code`` is the hardware's, None where none is known, ``task`` who caused it, or ""."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.language.program import Program
+from automax_ros.rack.common_use import writer_findings
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.interrupt_check import interrupt_findings
 from automax_ros.rack.modules.drive_rules import drive_findings
@@ -15,7 +16,7 @@ from automax_ros.rack.plants.feeds import feed_findings
 Rule = Callable[[RackConfig, Mapping[str, Program]], Mapping[str, Sequence[Diagnostic]]]
 """Returns what is wrong by the task in whose source it stands; it is given the programs without errors."""
 
-RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings, feed_findings)
+RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings, feed_findings, writer_findings)
 """All such rules."""
 
 

@@ -12,6 +12,7 @@ from automax_ros.compile.cost import PLATFORMS, Model
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec
+from automax_ros.rack.common_use import rack_warnings
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import FileFault
 from automax_ros.rack.modules.kind import ModuleConfig
@@ -54,6 +55,12 @@ def check_tasks(config: RackConfig, sources: Mapping[str, SourceText] | None = N
     programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
     found = findings_by_task(config, programs)
     return [item._replace(result=with_findings(item.result, found.get(item.task.name, ()))) for item in checked]
+
+
+def forgotten(config: RackConfig, checked: Sequence[CheckedTask]) -> list[Diagnostic]:
+    """Return what looks forgotten in the rack file, none as long as a task has errors and so may hide a use."""
+    programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
+    return rack_warnings(config, programs) if len(programs) == len(checked) else []
 
 
 def _checked(

@@ -76,12 +76,14 @@ def report_drives(stored: StoredRack, task: str | None = None) -> list[ReportDri
     """
     programs = stored.programs()
     drives = rack_drives(stored.config, programs)
+    loops = [drive.program.name for drive in drives if drive.program is not None]
     if task is not None:
         stored.require_tasks([task])
         drives = [drive for drive in drives if drive.program is not None and drive.program.name == task]
     if not drives:
         what = f"task {task} of it has no DC_DRIVE_CML" if task is not None else "its rack has no drive"
         hint = "a drive is a 57C406 or a UDC with a plant, or a task with DC_DRIVE_CML; `automax plot` draws variables"
+        hint = f"give --task {' or '.join(loops)}, or leave it out" if loops else hint
         raise BagError("AMX6860", stored.bag, f"{what}, so there is nothing to report", hint)
     return [_report_drive(drive, stored.config, programs) for drive in drives]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from automax_ros.core.faults import Fault
+from automax_ros.core.names import NameFault
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.core.values import number, value_text, whole_number
@@ -129,13 +130,25 @@ def variable_named(rack: Rack, text: str) -> Variable:
 
 
 def _common(rack: Rack, text: str) -> Variable:
-    meant = common_named(rack.config, text)
+    try:
+        meant = common_named(rack.config, text)
+    except NameFault as fault:
+        raise Fault(fault.message, _tunable_hint(rack, text) or fault.hint) from fault
     kind = meant.variable.type
 
     def accepted(given: str) -> Value:
         return setting(rack.config, f"{meant.label}={given}")[1]
 
     return Variable(VariedCommon(meant.label), accepted, kind.is_integer, kind.is_numeric)
+
+
+def _tunable_hint(rack: Rack, text: str) -> str | None:
+    """Return the hint that a name without its task is a tunable's; None where no task has one of it."""
+    wanted = text.strip().upper()
+    owners = [task.name for task in rack.tasks if _is_tunable(rack, task.name, wanted)]
+    return (
+        f"a tunable belongs to its task: write {' or '.join(f'{name}.{wanted}' for name in owners)}" if owners else None
+    )
 
 
 def _is_tunable(rack: Rack, task: str, name: str) -> bool:

@@ -117,9 +117,8 @@ def _run(
         rack.tune(rack.task(item.task), item.name, item.value)
     end = attend(rack) if attend is not None else None
     try:
-        rack.start(beginning.settings)
+        rack.start(beginning.settings, stimulation.begin)
         watch = Watch(rack, plan.measures, plan.duration_ns)
-        stimulation.begin()
         _pass(rack, plan, stimulation, should_stop)
     finally:
         if end is not None:

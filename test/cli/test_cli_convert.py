@@ -57,6 +57,11 @@ def test_output_writes_into_a_folder(automax, old):
     assert (again.code, "new/SPEED.BLK exists already" in again.err) == (2, True)
 
 
+def test_the_folder_for_the_converted_files_is_made(automax, old):
+    assert automax("convert", old, "--output", "new/tasks").code == 0
+    assert (automax.folder / "new" / "tasks" / old).is_file()
+
+
 def test_errors_that_are_left_are_told(automax):
     result = automax("convert", automax.write("WRONG.BLK", b"10 CALL SCAN_LOOP(TICKS=4)\r\n20 X% = 1\r\n30 END\r\n"))
     assert result.code == 1
@@ -68,7 +73,7 @@ def test_errors_that_are_left_are_told(automax):
     [
         (["NONE.BLK"], "NONE.BLK cannot be read: No such file or directory"),
         (["rack.yaml"], "rack.yaml: a task's source is a .BLK or .BAS file"),
-        (["SPEED.BLK", "--output", "nowhere"], "nowhere is not a folder"),
+        (["SPEED.BLK", "--output", "rack.yaml"], "rack.yaml is not a folder"),
         (["SPEED.BLK", "a/SPEED.BLK", "--output", "a"], "exists already"),
         (["SPEED.BLK", "a/SPEED.BLK", "--output", "b"], "two files are named SPEED.BLK"),
         (["SPEED.BLK", "--write", "--output", "b"], "not allowed with argument"),

@@ -185,11 +185,12 @@ def test_source_with_errors_is_2_and_shows_them_as_check_does(automax, bag):
     assert result.err.endswith("automax replay: errors in WORK.BLK; nothing is replayed\n")
 
 
-def test_warnings_of_a_new_source_are_shown(automax, bag):
+def test_warnings_of_a_new_source_are_counted(automax, bag):
+    """`automax check` shows them: a replay is repeated often."""
     text = edited(SPEED, ("140 END", "135 OUT% = OUT%\n140 END"))
     result = automax("replay", bag, "--task", f"SPEED={automax.write('SPEED.BLK', text)}")
-    assert "SPEED.BLK:" in result.err
-    assert "warning[" in result.err
+    assert result.err.startswith("1 warning of SPEED.BLK: automax check SPEED.BLK shows it\n")
+    assert "warning[" in automax("check", "SPEED.BLK").out
 
 
 def test_truncated_recording_points_to_the_repair(automax, source):

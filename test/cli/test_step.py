@@ -225,3 +225,10 @@ def test_a_forced_local_keeps_its_value_inside_a_scan(step):
     found = lines(step("set RUN@=on", "force SPEED.N%=5", "break SPEED:130", "go", "line", "show SPEED.N%"))
     assert "SUM! 0 -> 5" in found
     assert found[-1] == "SPEED.N% 5"
+
+
+def test_entries_of_0_come_before_what_stands_before_scan_loop(automax, step):
+    automax.write("stimuli.yaml", "- {at: 0, set: {REF%: 5}}\n")
+    automax.write("SPEED.BLK", SPEED.replace("100 CALL", "90 N% = REF% * 100\n100 CALL"))
+    found = lines(step("show SPEED.N%", options=("--stimuli", "stimuli.yaml")))
+    assert "SPEED.N% 500" in found

@@ -94,3 +94,16 @@ def test_a_trace_needs_something_to_work_on(automax, trace, options):
     result = automax("trace", "TASK.BLK", *options)
     assert result.code == 2
     assert "--input" in result.err
+
+
+def test_what_stands_before_scan_loop_sees_the_entries_of_0(automax):
+    automax.write(
+        "TASK.BLK",
+        "10 COMMON REF%\n20 LOCAL KP [CURRENT=1.0, HIGH=9.0], OWN%, SEEN%, GAIN\n30 SEEN% = REF% + OWN%\n40 GAIN = KP\n"
+        "50 CALL SCAN_LOOP(TICKS=2)\n60 END\n",
+    )
+    automax.write("stimuli.yaml", "- {at: 0, set: {REF%: 7, KP: 2.5, OWN%: 30}}\n- {at: 0.000001, set: {REF%: 8}}\n")
+    result = automax("trace", "TASK.BLK", "--stimuli", "stimuli.yaml", "--duration", "0.02")
+    assert (result.code, result.err) == (0, "")
+    columns = columns_of(result.out)
+    assert (columns["SEEN%"], columns["GAIN"], columns["REF%"]) == (["37", "37"], ["2.5", "2.5"], ["7", "8"])

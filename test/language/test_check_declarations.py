@@ -220,3 +220,33 @@ def test_events_belong_to_automax_processors(target: Platform) -> None:
     assert {item.code for item in found} == {"AMX4027"}
     assert [item.span.line for item in found] == [2, 3]
     assert codes(event_task(event="EVENT NAME=GO", argument=""), target=Platform.PC3000) == []
+
+
+PREDEFINED_NAMES = ["AUTORUNSTATUS@", "FORCINGSTATUS@", *(f"BATTERYSTATUS{slot}@" for slot in range(5))]
+
+
+@pytest.mark.parametrize("name", PREDEFINED_NAMES)
+def test_a_task_may_read_a_predefined_variable(name: str) -> None:
+    assert codes(task(f"X@ = {name}", declare=f"COMMON {name} \\ LOCAL X@")) == []
+
+
+@pytest.mark.parametrize("name", PREDEFINED_NAMES)
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "{} = TRUE",
+        "IF X@ THEN {} = TRUE",
+        "READ {} \\ DATA TRUE",
+        "CALL AND(INPUT1=X@, INPUT2=X@, OUTPUT={})",
+        "CALL MOVE(INPUT1=X@, OUTPUT1={})",
+    ],
+)
+def test_no_task_writes_a_predefined_variable(name: str, statement: str) -> None:
+    """The rack alone keeps them true to what they show (2.4.6)."""
+    found = problems(task(statement.format(name), declare=f"COMMON {name} \\ LOCAL X@"))
+    assert "AMX4122" in {item.code for item in found}
+    assert {item.span.line for item in found if item.code == "AMX4122"} == {3}
+
+
+def test_a_local_of_such_a_name_is_the_tasks_own() -> None:
+    assert codes(task("FORCINGSTATUS@ = TRUE", declare="LOCAL FORCINGSTATUS@")) == []

@@ -119,10 +119,10 @@ def test_an_error_of_ours_is_the_fault_of_its_run_alone(rack: Rack, monkeypatch:
     expected = run_points(plan, points)
     start = Rack.start
 
-    def failing(self: Rack, settings: list) -> None:
+    def failing(self: Rack, settings: list, *others: object) -> None:
         if ("REF%", 800) in settings:
             raise ZeroDivisionError("in\x1bside")
-        start(self, settings)
+        start(self, settings, *others)
 
     monkeypatch.setattr(Rack, "start", failing)
     assert run_points(plan, points) == [

@@ -30,6 +30,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6208", "common memory in an odd slot"),
     Problem("AMX6209", "no Processor"),
     Problem("AMX6210", "tick rate"),
+    Problem("AMX6211", "Serial module of a PC3000"),
     # rack files: tasks
     Problem("AMX6300", "task name"),
     Problem("AMX6220", "common that watch names"),
@@ -89,6 +90,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6521", "armature voltage of a drive wired twice"),
     Problem("AMX6522", "plant of a 57C406 without a motor"),
     Problem("AMX6550", "point that its module alone writes"),
+    Problem("AMX6494", "command register of a UDC that ROS 2 shall write"),
     Problem("AMX6480", "UDC task with a common outside of its dual port"),
     Problem("AMX6481", "UDC task too large"),
     Problem("AMX6482", "UDC tasks with unequal TICKS", hardware="95"),
@@ -103,6 +105,11 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6491", "no interrupt line for a current minor loop"),
     Problem("AMX6492", "task that goes before a current minor loop", Severity.WARNING),
     Problem("AMX6493", "register of a 57C406 in a control-block task", Severity.WARNING),
+    # rack files and tasks: what looks forgotten
+    Problem("AMX6495", "common written by two tasks", Severity.WARNING),
+    Problem("AMX6496", "common that is read and never written", Severity.WARNING),
+    Problem("AMX6497", "common that no task uses", Severity.WARNING),
+    Problem("AMX6498", "drive without a plant", Severity.WARNING),
     # rack files: networks
     Problem("AMX6560", "name of a network"),
     Problem("AMX6561", "drop or depth of a network module"),

@@ -21,6 +21,7 @@ _DECLARATIONS = (
     Problem("AMX4015", "STEP of a tunable is not positive"),
     Problem("AMX4016", "tunable written by the task"),
     Problem("AMX4017", "input point written by the task"),
+    Problem("AMX4122", "pre-defined variable written by the task"),
 )
 _EXPRESSIONS = (
     Problem("AMX4020", "whole array where a value is needed"),

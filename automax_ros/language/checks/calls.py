@@ -27,13 +27,17 @@ def check_call(context: Context, call: Call) -> None:
     block = context.catalogue.get(call.block)
     if block is None:
         message = f"there is no block {call.block}"
-        hint = context.suggest.hint(call.block, context.catalogue)
+        meant = [item.name for item in context.catalogue.values() if call.block in item.also_called]
+        hint = f"{meant[0]} is meant" if meant else context.suggest.hint(call.block, context.catalogue)
+        hint = hint or "`automax blocks` lists all blocks by the names that the manual gives them"
         context.report("AMX4070", message, context.place_of(call.block, call.span), hint)
         return
     before = context.errors
     if context.target not in block.runs_on:
         message = f"{block.name} cannot be used in {context.task_words}"
-        context.report("AMX4071", message, context.place_of(call.block, call.span))
+        places = " and ".join(sorted(item.value.upper() for item in block.runs_on))
+        hint = f"it runs in {places} tasks: call it in one of these, and share its outputs as commons"
+        context.report("AMX4071", message, context.place_of(call.block, call.span), hint)
     given = _arguments_by_keyword(context, block, call)
     values: dict[str, Expression] = {}
     for keyword, (parameter, argument) in given.items():

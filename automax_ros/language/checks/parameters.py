@@ -34,8 +34,11 @@ def checked_value(context: Context, block: Block, parameter: Input | Output, arg
     """
     before = context.errors
     if isinstance(parameter, Output):
-        checked = checked_array if parameter.dimensions else _checked_output
-        value: Expression | None = checked(context, parameter, argument)
+        value: Expression | None
+        if parameter.dimensions:
+            value = checked_array(context, parameter, argument)
+        else:
+            value = _checked_output(context, block, parameter, argument)
     elif context.target not in parameter.runs_on:
         message = f"{parameter.name} of {block.name} cannot be used in {context.task_words}"
         context.report("AMX4027", message, argument.span)
@@ -47,11 +50,13 @@ def checked_value(context: Context, block: Block, parameter: Input | Output, arg
     elif isinstance(parameter.type, Special):
         value = checked_structure(context, block, parameter, argument)
     else:
-        value = _checked_input(context, parameter, parameter.type, argument)
+        value = _checked_input(context, block, parameter, parameter.type, argument)
     return value if context.errors == before else None
 
 
-def _checked_input(context: Context, parameter: Input, kind: DataType, argument: Argument) -> Expression | None:
+def _checked_input(
+    context: Context, block: Block, parameter: Input, kind: DataType, argument: Argument
+) -> Expression | None:
     value = argument.value
     literal = literal_of(value)
     if literal is not None:
@@ -66,11 +71,11 @@ def _checked_input(context: Context, parameter: Input, kind: DataType, argument:
     if parameter.form is Form.LITERAL:
         context.report("AMX4076", f"{parameter.name} takes a constant only, no variable", value.span)
     else:
-        _check_type(context, parameter, kind, check_variable(context, variable), variable)
+        _check_type(context, block, parameter, kind, check_variable(context, variable), variable)
     return value
 
 
-def _checked_output(context: Context, parameter: Output, argument: Argument) -> Expression | None:
+def _checked_output(context: Context, block: Block, parameter: Output, argument: Argument) -> Expression | None:
     value = argument.value
     if literal_of(value) is not None:
         context.report("AMX4078", f"the output {parameter.name} needs a variable, not a constant", value.span)
@@ -80,7 +85,7 @@ def _checked_output(context: Context, parameter: Output, argument: Argument) -> 
     elif not isinstance(value, (Reference, Element)):
         _report_expression(context, parameter, parameter.type, value)
     else:
-        _check_type(context, parameter, parameter.type, check_written(context, value), value)
+        _check_type(context, block, parameter, parameter.type, check_written(context, value), value)
     return value
 
 
@@ -101,18 +106,34 @@ def _checked_event(context: Context, argument: Argument) -> Expression | None:
 
 
 def _check_type(
-    context: Context, parameter: Input | Output, wanted: DataType, kind: DataType | None, variable: Reference | Element
+    context: Context,
+    block: Block,
+    parameter: Input | Output,
+    wanted: DataType,
+    kind: DataType | None,
+    variable: Reference | Element,
 ) -> None:
     also = parameter.also if isinstance(parameter, Input) else None
     if kind is not None and kind is not wanted and kind is not also:
         words = wanted.word if also is None else f"{wanted.word} or {also.word}"
         message = f"{parameter.name} is {words}, {variable.name} is {kind.word}"
-        context.report("AMX2015", message, variable.span, _type_hint(wanted))
+        instead = block.for_booleans if kind is DataType.BOOLEAN else ""
+        context.report("AMX2015", message, variable.span, instead or _type_hint(wanted))
         return
     symbol = context.symbols.get(variable.name)
     if parameter.wants_common and symbol is not None and symbol.scope is not Scope.COMMON:
         message = f"{parameter.name} should be a COMMON variable, {variable.name} is LOCAL"
         context.report("AMX4096", message, variable.span, "the rack's other tasks and the drive use it")
+
+
+_CONSTANTS = {
+    DataType.BOOLEAN: "write TRUE or FALSE",
+    DataType.INTEGER: "write a whole number",
+    DataType.DOUBLE: "write a whole number",
+    DataType.REAL: "write a number with a decimal point, such as 1.5",
+    DataType.STRING: "write a text in quotes",
+}
+"""What a constant of each type looks like, for hints."""
 
 
 def _check_literal(context: Context, parameter: Input, kind: DataType, literal: _Constant, written: Expression) -> None:
@@ -126,7 +147,7 @@ def _check_literal(context: Context, parameter: Input, kind: DataType, literal: 
         return
     if not _is_of(literal, kind):
         message = f"{parameter.name} is {kind.word}, {_describe(literal)} is given"
-        context.report("AMX2015", message, written.span)
+        context.report("AMX2015", message, written.span, _CONSTANTS[kind])
     elif not fits(literal.value, kind):
         message = f"{literal.value} does not fit {parameter.name}: {kind.word} is {range_text(kind)}"
         context.report("AMX2007", message, written.span, hex_hint(literal, kind))

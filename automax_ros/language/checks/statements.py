@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.blocks.declaration import Platform
+from automax_ros.core.names import PREDEFINED
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import range_text
@@ -21,6 +22,7 @@ from automax_ros.language.syntax.tree import (
     Print,
     Read,
     Reference,
+    Scope,
     Statement,
 )
 
@@ -49,12 +51,15 @@ def check_statement(context: Context, statement: Statement) -> None:
 
 
 def check_written(context: Context, target: Reference | Element) -> DataType | None:
-    """Report a target that cannot be written: a tunable, an input point; return its type."""
+    """Report a target that no task can write: tunable, input point, pre-defined variable; return its type."""
     kind = check_variable(context, target)
     symbol = context.symbols.get(target.name)
     if symbol is not None and symbol.tuning is not None:
         hint = "only the operator changes a tunable (2.4.5)"
         context.report("AMX4016", f"{target.name} is tunable: the task cannot write it", target.span, hint)
+    if symbol is not None and symbol.scope is Scope.COMMON and target.name in PREDEFINED:
+        hint = "the rack keeps it true to what it shows (2.4.6): write a variable of another name"
+        context.report("AMX4122", f"{target.name} is pre-defined: the task cannot write it", target.span, hint)
     if context.is_input_point(target.name) and context.commons is not None:
         place = context.commons[target.name].place
         context.report("AMX4017", f"{target.name} is an input point ({place}): the task cannot write it", target.span)
@@ -107,7 +112,9 @@ def check_constant_fits(context: Context, expression: Expression, kind: DataType
         return
     if value is not None and not fits(value, kind):
         message = f"{value} does not fit {what}: {kind.word} is {range_text(kind)}"
-        context.report("AMX2007", message, expression.span, hex_hint(expression, kind))
+        wider = f"a DOUBLE INTEGER, which ends with !, is {range_text(DataType.DOUBLE)}"
+        hint = wider if kind is DataType.INTEGER and fits(value, DataType.DOUBLE) else None
+        context.report("AMX2007", message, expression.span, hex_hint(expression, kind) or hint)
 
 
 def _check_assignment(context: Context, statement: Assignment) -> None:

@@ -29,7 +29,9 @@ def integer_value(text: str) -> tuple[int, SourceFault | None]:
     value = int(digits) if len(digits) <= 10 else LARGEST_INTEGER + 1
     if value > LARGEST_INTEGER:
         return LARGEST_INTEGER - 1, SourceFault(
-            "AMX0027", "the integer constant does not fit 32 bits", "a REAL constant has a decimal point"
+            "AMX0027",
+            "the integer constant does not fit 32 bits",
+            "it is at most 2147483647; a REAL constant has a decimal point",
         )
     return value, None
 

@@ -62,6 +62,7 @@ class Registers:
     ``clock_status`` pairs of an input and the bits that are set while there is a common
     clock; ``counters`` are the first of two registers that count 24 bits. ``by_itself``: the module writes registers
     without an interrupt too. ``shown`` are inputs that the module alone writes: neither ROS 2 nor a feed may.
+    ``commands`` are outputs that tasks alone write.
     A module with drops has ``area`` registers for each, 0 being none, and points may stand on those of ``areas``.
     """
 
@@ -76,6 +77,7 @@ class Registers:
     counters: tuple[int, ...] = ()
     by_itself: bool = False
     shown: Collection[int] = range(0)
+    commands: Collection[int] = range(0)
     area: int = 0
     areas: Collection[int] = range(0)
 

@@ -1,8 +1,9 @@
 """The AutoMax PC3000: a Processor on a card of its own in a personal computer, a rack without a backplane.
 
-It is written as the only module of a rack, in slot 0, though the hardware has none (decision). It holds its common
-variables itself; no I/O module can stand next to it, so there are neither points nor interrupts, hardware events and
-current minor loops (J-3675 p. 6-17). Its times are those of table 6.
+The card is the Processor/Scanner module 57C560; a 57C570 is an enclosure with one in it. The Serial module 57C565 is no
+Processor (1.3). It is written as the only module of a rack, in slot 0, though the hardware has none (decision). It
+holds its common variables itself; no I/O module can stand next to it, so there are neither points nor interrupts,
+hardware events and current minor loops (J-3675 p. 6-17). Its times are those of table 6.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Pc3000Kind(ProcessorKind):
     """What a rack file may say of a PC3000: what it may say of a Processor."""
 
     word = "PC3000"
-    models = dict.fromkeys(("57C560", "57C565", "57C570"), "PC3000")
+    models = dict.fromkeys(("57C560", "57C570"), "PC3000")
 
     def read(self, found: FoundModule) -> Pc3000Config:
         """Read tick and tasks."""

@@ -39,6 +39,19 @@ KINDS: tuple[ModuleKind, ...] = (
 SUPPORTED: dict[str, ModuleKind] = {model: kind for kind in KINDS for model in kind.models}
 """The kind of each number that a rack file may name."""
 
+REFUSED = {
+    "57C430": (
+        "AMX6204",
+        "the 57C430 Processor may not share a rack with the others and does not run this software",
+        "the module that does is the 57C430A",
+    ),
+    "57C565": (
+        "AMX6211",
+        "the 57C565 is the Serial module of a PC3000: it is no Processor and runs no tasks",
+        "the Processor of a PC3000 is the 57C560, which a 57C570 has in it; a rack file names no Serial module",
+    ),
+}
+"""Modules that no rack file names: the problem's code, what is wrong and what to do (1.1, 1.3)."""
 NOT_YET = {
     "57C414": "Modbus interface module",
     "57C416": "remote I/O module",

@@ -44,4 +44,5 @@ UDC_REGISTERS = Registers(
     reserved=frozenset(range(COUNT)) - _USED,
     reals=APPLICATION,
     interrupts=(Interrupt(ISCR),),
+    commands=frozenset(COMMAND),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from automax_ros.core.diagnostics import Diagnostic, Note, Span
-from automax_ros.core.names import Element, NameFault
+from automax_ros.core.names import PREDEFINED, Element, NameFault
 from automax_ros.core.names import element as element_named
 from automax_ros.core.text import near_or_listed, printable, quoted
 from automax_ros.core.types import DataType
@@ -16,7 +16,7 @@ from automax_ros.language.written import places_that_write
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.kind import ModuleConfig
-from automax_ros.rack.names import PREDEFINED, VariableName
+from automax_ros.rack.names import VariableName
 from automax_ros.rack.plants.config import FeedConfig
 from automax_ros.rack.plants.feed_keys import KEYS, LEAST_MS, MOST_MS, USUAL_MS
 from automax_ros.rack.scalars import number_value, text_value

@@ -41,6 +41,11 @@ _LOAD_KEYS: Keys = {
     ),
     "ros": words("`in`: ROS 2 sets torque_nm.", ("in",)),
 }
+_TORQUE = (
+    "write load: {torque_nm: 100}; ros: in there lets ROS 2 set it, stimuli set load_torque_nm, couple: joins shafts"
+)
+LOAD_HINTS = dict.fromkeys(("torque_from", "torque", "torque_common", "torque_ref"), _TORQUE)
+"""What does the work of keys that people look for."""
 SUPPLY_SCHEMA: Schema = may_be_empty(section("The AC line of the drive.", _SUPPLY_KEYS))
 LOAD_SCHEMA: Schema = may_be_empty(section("What the motor turns.", _LOAD_KEYS))
 INERTIA_SCHEMA: Schema = number("Inertia of motor and load over the motor's own.", LEAST_INERTIA, MOST_INERTIA, 1)
@@ -60,7 +65,7 @@ def read_supply(node: Node, what: str, findings: Findings) -> SupplyConfig:
 def read_load(node: Node, what: str, findings: Findings) -> LoadConfig:
     """Return a plant's load; what is wrong goes to the findings."""
     where = f"load of {what}"
-    section = Section(entries_of(node, where, findings) or (), where, _LOAD_KEYS, findings)
+    section = Section(entries_of(node, where, findings) or (), where, _LOAD_KEYS, findings, LOAD_HINTS)
     _check_alone(section, where, findings)
     numbers = _numbers(section, LOAD, where, findings)
     return LoadConfig(

@@ -24,6 +24,7 @@ from automax_ros.rack.plants.joint_keys import SCHEMA as JOINT_SCHEMA
 from automax_ros.rack.plants.joint_keys import GivenJoint, check_joint_names, read_joint
 from automax_ros.rack.plants.keys import (
     INERTIA_SCHEMA,
+    LOAD_HINTS,
     LOAD_SCHEMA,
     SUPPLY_SCHEMA,
     read_inertia,
@@ -141,7 +142,7 @@ def read_plants(node: Node | None, findings: Findings) -> Plants:
 def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
     findings = plants.findings
     what = f"plant {name}"
-    section = Section(entries_of(node, what, findings) or (), what, KEYS, findings)
+    section = Section(entries_of(node, what, findings) or (), what, KEYS, findings, LOAD_HINTS)
     ratio, motor = section.get("motor_overload_ratio"), section.get("motor")
     line, load, inertia, couple, feeds, joint = (section.get(option) for option in _SIMULATED)
     needless = next((option for option in _SIMULATED if option in section), "")

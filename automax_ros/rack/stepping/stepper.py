@@ -70,9 +70,9 @@ class Stepper:
         self._interrupted = interrupted
         self._at_once = ""
 
-    def start(self, settings: Sequence[tuple[str, Value]] = ()) -> None:
+    def start(self, settings: Sequence[tuple[str, Value]] = (), first: Callable[[], None] | None = None) -> None:
         """Put the rack into RUN, as ``Rack.start``."""
-        self.rack.start(settings)
+        self.rack.start(settings, first)
 
     @property
     def place(self) -> tuple[str, int]:

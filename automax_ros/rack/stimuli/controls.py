@@ -29,7 +29,8 @@ def _module(rack: Rack, node: Node, what: str, findings: Findings) -> list[Actio
     controls, by_slot = Controls(rack), {module.config.slot: module for module in rack.modules}
     found: list[Action] = []
     for key, item in named(node, what, findings):
-        slot = integer_value(key, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
+        plain = Scalar(key.text, True, key.span)  # JSON knows keys in quotes only
+        slot = integer_value(plain, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
         if slot is None:
             continue
         module = by_slot.get(slot)

@@ -31,14 +31,15 @@ class Stimulation:
         self._told = 0
 
     def begin(self, *, joining: bool = False) -> None:
-        """Begin; entries of times that have passed happen at the present, in their order.
+        """Begin; entries of the present and of times that have passed happen now, in their order.
 
-        With ``joining`` they have happened already in the rack's other processes, which know what came of them.
+        ``Rack.start`` calls it before it puts tasks into RUN. With ``joining`` they have happened already in the rack's
+        other processes, which know what came of them.
         """
         now_ns = self._stage.scheduler.now_ns
         while joining and self._waiting and self._waiting[0].at_ns <= now_ns:
             self._waiting.popleft()
-        self._post()
+        self._happen(now_ns)
 
     @property
     def is_common(self) -> bool:

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.names import NameFault, element
+from automax_ros.core.names import PREDEFINED, NameFault, element
 from automax_ros.core.text import did_you_mean, near_or_listed, quoted
 from automax_ros.core.types import DataType
 from automax_ros.core.values import value_of, wanted
@@ -18,7 +18,6 @@ from automax_ros.rack.config import CommonElement
 from automax_ros.rack.files import FileFault, stays_next_to
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.local_names import local_named
-from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.scalars import boolean_value, is_plain_word, kind_of, text_value, wrong_kind
 from automax_ros.rack.sections import Section, entries_of

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
-from automax_ros.core.names import NameFault
+from automax_ros.core.names import PREDEFINED, NameFault
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.config import CommonElement
 from automax_ros.rack.local_names import LocalElement
-from automax_ros.rack.names import PREDEFINED
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import common_named
 from automax_ros.rack.writers import OPERATOR_WRITER

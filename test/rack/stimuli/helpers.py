@@ -58,6 +58,5 @@ def playing(rack: Rack, folder: Path, text: str) -> Stimulation:
     file = read(rack, folder, text)
     assert file.stimuli is not None, file.diagnostics
     found = Stimulation(file.stimuli, rack.scheduler)
-    rack.start()
-    found.begin()
+    rack.start(first=found.begin)
     return found

@@ -133,3 +133,15 @@ def test_who_joins_leaves_out_what_has_happened(tmp_path):
     stimulation.begin(joining=True)
     rack.run(0.2)
     assert [value for _, value, _ in common.seen] == [7]
+
+
+def test_a_file_may_be_json(tmp_path):
+    """Keys of JSON stand in quotes, slots too."""
+    (tmp_path / "rack.yaml").write_text("rack: PM1\nslots:\n  0: {module: 57C435}\n  7: {module: 57C406}\n")
+    config = load(tmp_path / "rack.yaml").config
+    assert config is not None
+    path = tmp_path / "stimuli.json"
+    path.write_text('[{"at": 1.5, "module": {"7": {"test_switch": "A", "fault_reset_switch": true}}}]\n')
+    read = read_for_rack(path, Rack(config))
+    assert read.stimuli is not None, read.diagnostics
+    assert [action.of for action in read.stimuli[0].actions] == ["7", "7"]
