@@ -60,7 +60,7 @@ class Session:
         a while (decision).
         """
         from automax_ros.nodes.discovery_range import is_this_host_alone
-        from automax_ros.nodes.participants import ALONE_NS
+        from automax_ros.nodes.operating import ALONE_NS
 
         self._client.find(wait_ns)
         if alone:

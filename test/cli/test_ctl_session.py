@@ -33,7 +33,7 @@ class Message(SimpleNamespace):
     """An answer of ROS, as far as it is looked at."""
 
     def get_fields_and_field_types(self) -> dict[str, str]:
-        return {name: "" for name in vars(self)}
+        return dict.fromkeys(vars(self), "")
 
 
 class Rack:

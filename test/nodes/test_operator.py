@@ -87,7 +87,14 @@ def test_answers_say_what_is_true_now(live, ask) -> None:
     assert ask("run", "OperateTask", task="LINE").status == "running"
     assert ask("clear", "OperateTask", task="LINE").ok
     assert ask("clear_errors", "OperateTask").ok
-    assert ask("set", "SetValue", name="ref%", value="70").now == "70"
+    given = ask("set", "SetValue", name="ref%", value="70")
+    assert (given.now, given.before) == ("70", "100")
+    assert ask("set", "SetValue", name="ref%", value="70").before == "70"
+    read = ask("get", "ReadValues", names=["R*"])
+    assert (list(read.found), list(read.values), list(read.shown)) == (["REF%"], ["70"], [""])
+    stands = ask("status", "ReadStatus")
+    assert (list(stands.display_modules), list(stands.display_codes)) == (["processor_1"], [""])
+    assert (list(stands.drive_faults), stands.ended) == ([], 0)
     forced = ask("force", "SetValue", name="REF%", value="5")
     assert (forced.ok, forced.now) == (True, "5")
     held = ask("set", "SetValue", name="REF%", value="6")

@@ -76,7 +76,9 @@ def test_a_rack_is_operated_from_another_process(tmp_path):
     assert bad["ok"] is False
     assert "no common variable" in bad["reason"]
     assert ctl("tune", "SPEED.TRIM%=5").code == 0
+    assert ctl("tune", "SPEED.TRIM%=5").out == "tune SPEED.TRIM% = 5: was already 5\n"
     assert ctl("get", "REF%", "SPEED.TRIM%", "OUT%").out == "REF% = 200\nSPEED.TRIM% = 5\nOUT% = 205\n"
+    assert ctl("get", "R*").out == "REF% = 200\n"
     assert ctl("force", "OUT%=-1").code == 0
     assert ctl("forces").out == "OUT% = -1\n"
     errors = ctl("errors").out
@@ -131,6 +133,7 @@ def test_what_was_done_is_told_to_late_joiners_and_recorded_and_the_recording_re
         ("stop", False),
         ("set", True),
         ("set", False),
+        ("tune", True),
         ("tune", True),
         ("force", True),
         ("reload", False),
