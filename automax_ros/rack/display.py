@@ -3,9 +3,9 @@
 A code of a STOP ALL is shown by the Processor whose task has caused it; where no Processor's task has (a UDC's has, a
 module was lost, two drive the common clock) by all of them, since the tasks of all have stopped, until the rack runs
 again (decision). A code that stands in the error log of a task, which 87 for a shorted SCR does without a STOP ALL
-(52.3.1), is shown until that log is cleared (decision: J2-3106-1 p. 12-4 names both in one step). A Processor that has nothing to tell, and
-one without power, shows nothing (decision). d0 and E0 are of an installation, which takes no time here and is refused
-with the errors' own words: no rack that answers shows them (decision).
+(52.3.1), is shown until that log is cleared (decision: J2-3106-1 p. 12-4 names both in one step). A Processor that
+has nothing to tell, and one without power, shows nothing (decision). d0 and E0 are of an installation, which takes no
+time here and is refused with the errors' own words: no rack that answers shows them (decision).
 """
 
 from __future__ import annotations
@@ -64,13 +64,17 @@ def _display(rack: Rack, module: str, tasks: list[str]) -> Display:
 def _codes(rack: Rack, tasks: list[str]) -> Iterator[str]:
     """Yield the codes that concern a Processor with these tasks, the one that it shows first."""
     cause = rack.operations.stopped
-    if cause is not None and cause.code:
-        if not _is_on_processor(rack, cause.task):
-            yield cause.code
-        elif cause.task in tasks and rack.task(cause.task).errors.count:
-            yield cause.code
+    if cause is not None and cause.code and _concerns(rack, cause.task, tasks):
+        yield cause.code
     for name in tasks:
         yield from _logged(rack.task(name).errors)
+
+
+def _concerns(rack: Rack, task: str, tasks: list[str]) -> bool:
+    """Return whether a stop that a task has caused ("" is none) is shown by the Processor with these tasks."""
+    if not _is_on_processor(rack, task):
+        return True
+    return task in tasks and rack.task(task).errors.count > 0
 
 
 def _is_on_processor(rack: Rack, task: str) -> bool:
