@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from automax_ros.cli.ctl_ask import Action, Ask, Means
 from automax_ros.cli.ctl_press import press
+from automax_ros.cli.ctl_text import ALREADY
 from automax_ros.cli.ctl_watch import values_of, watch
 from automax_ros.core.text import printable
 
@@ -60,7 +61,7 @@ class Session:
         a while (decision).
         """
         from automax_ros.nodes.discovery_range import is_this_host_alone
-        from automax_ros.nodes.participants import ALONE_NS
+        from automax_ros.nodes.operating import ALONE_NS
 
         self._client.find(wait_ns)
         if alone:
@@ -127,7 +128,8 @@ def _print_json(action: Action, what: str, answers: Answers) -> None:
         if ok and action.read is None:
             told = [shown for name in _NOW if (shown := getattr(answer, name, "")) != ""]
             entry |= {"now": told[0]} if told else {}
-            entry |= {name: text for name in ("before", "lost") if (text := getattr(answer, name, ""))}
+            entry |= {"already": True} if action.told(ask, answer).startswith(ALREADY) else {}
+            entry |= {"lost": text} if (text := getattr(answer, "lost", "")) else {}
         if getattr(answer, "findings", ()):
             entry["findings"] = [ask.worded(text) for text in answer.findings]
         if action.read is not None and ok:

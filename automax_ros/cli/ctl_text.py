@@ -11,6 +11,9 @@ from automax_ros.core.text import count_of
 from automax_ros.core.types import type_of_name
 from automax_ros.core.values import source_text, value_of
 
+ALREADY = "was already"
+"""How it begins where a value was there before."""
+
 
 def fields_of(item: Any) -> dict[str, Any]:
     """Return the fields of a message of plain values."""
@@ -83,7 +86,7 @@ def message_told(_: Ask, answer: Any) -> str:
 def value_told(ask: Ask, answer: Any) -> str:
     """Return whether a value was given, or was there before."""
     if answer.before and answer.before == answer.now and answer.now == _written(ask):
-        return f"was already {ask.fields['value'].strip()}"
+        return f"{ALREADY} {ask.fields['value'].strip()}"
     return "done"
 
 

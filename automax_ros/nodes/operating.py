@@ -13,6 +13,7 @@ from rclpy.parameter import Parameter
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.nodes import participants
 from automax_ros.nodes.context import joined_context
 from automax_ros.nodes.participants import racks_of
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
@@ -20,6 +21,7 @@ from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 _LOOK_S = 0.05
 _SETTLED_NS = 2 * NS_PER_S
 """A rack whose nodes have been seen for so long without its operator has none (decision)."""
+ALONE_NS = participants.ALONE_NS
 _TABLE_TYPE = "automax_msgs/msg/VariableTable"
 _HOME, _OPERATOR = "common_memory", "operator"
 

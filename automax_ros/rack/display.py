@@ -1,11 +1,11 @@
 """What the displays of a rack's Processors show: the code of a fault or of a status, or nothing.
 
 A code of a STOP ALL is shown by the Processor whose task has caused it; where no Processor's task has (a UDC's has, a
-module was lost, two drive the common clock) by all of them, since the tasks of all have stopped (decision). An error
-that is logged with a code and stops nothing, such as 87 for a shorted SCR (52.3.1), is shown while the log of a task
-holds it: a code goes with the error log in which it is (J2-3106-1 p. 12-4). A Processor that has nothing to tell, and
-one without power, shows nothing (decision). d0 and E0 are of an installation, which takes no time here and is refused
-with the errors' own words: no rack that answers shows them (decision).
+module was lost, two drive the common clock) by all of them, since the tasks of all have stopped, until the rack runs
+again (decision). A code that stands in the error log of a task, which 87 for a shorted SCR does without a STOP ALL
+(52.3.1), is shown until that log is cleared (decision: J2-3106-1 p. 12-4 names both in one step). A Processor that
+has nothing to tell, and one without power, shows nothing (decision). d0 and E0 are of an installation, which takes no
+time here and is refused with the errors' own words: no rack that answers shows them (decision).
 """
 
 from __future__ import annotations
@@ -64,10 +64,17 @@ def _display(rack: Rack, module: str, tasks: list[str]) -> Display:
 def _codes(rack: Rack, tasks: list[str]) -> Iterator[str]:
     """Yield the codes that concern a Processor with these tasks, the one that it shows first."""
     cause = rack.operations.stopped
-    if cause is not None and cause.code and (cause.task in tasks or not _is_on_processor(rack, cause.task)):
+    if cause is not None and cause.code and _concerns(rack, cause.task, tasks):
         yield cause.code
     for name in tasks:
         yield from _logged(rack.task(name).errors)
+
+
+def _concerns(rack: Rack, task: str, tasks: list[str]) -> bool:
+    """Return whether a stop that a task has caused ("" is none) is shown by the Processor with these tasks."""
+    if not _is_on_processor(rack, task):
+        return True
+    return task in tasks and rack.task(task).errors.count > 0
 
 
 def _is_on_processor(rack: Rack, task: str) -> bool:

@@ -112,10 +112,10 @@ class Readings:
         return [field.name for field in fields if field.role in (Role.LOCAL, Role.TUNABLE)]
 
     def _known(self, name: str) -> str:
-        known = {item.name for item in self._rack.tasks}
         plain = name.strip().upper()
-        if plain not in known:
-            raise OperationRefused(f"the rack has no task {quoted(name)}: it has {', '.join(sorted(known))}")
+        if plain not in {item.name for item in self._rack.tasks}:
+            known = sorted(task.name for _, task in self._rack.config.placed_tasks)
+            raise OperationRefused(f"the rack has no task {quoted(name)}: it has {', '.join(known)}")
         return plain
 
 

@@ -33,7 +33,7 @@ class Message(SimpleNamespace):
     """An answer of ROS, as far as it is looked at."""
 
     def get_fields_and_field_types(self) -> dict[str, str]:
-        return {name: "" for name in vars(self)}
+        return dict.fromkeys(vars(self), "")
 
 
 class Rack:
@@ -82,7 +82,7 @@ def test_a_value_that_was_there_already_is_told(capsys):
     assert capsys.readouterr().out == "set START_PB@ = 1: was already 1\nset REF% = 6: done\n"
     do(rack, "set", "REF%=6", "--json")
     (entry,) = json.loads(capsys.readouterr().out)
-    assert (entry["before"], entry["now"]) == ("6", "6")
+    assert (entry["already"], entry["now"]) == (True, "6")
 
 
 def test_a_press_sets_holds_and_lets_go(capsys):

@@ -54,3 +54,10 @@ def test_the_first_word_of_a_stop_counts():
 def test_a_process_that_told_nothing_is_named():
     report = merged_report({"home": part()}, ["home", "one"], {"one": 1})
     assert report["processes"]["one"] == {"deaths": 1, "told": False, "differs": []}
+
+
+def test_displays_are_those_of_the_processes_that_have_the_processors():
+    quiet, overlap = {"code": None, "meaning": "no fault"}, {"code": "14", "meaning": "overlap"}
+    parts = {"home": part(displays={"processor_1": quiet}), "two": part(displays={"processor_2": overlap})}
+    report = merged_report(parts, ["home", "two"], {})
+    assert report["displays"] == {"processor_1": quiet, "processor_2": overlap}

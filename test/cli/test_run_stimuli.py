@@ -52,6 +52,7 @@ def test_report_of_a_quiet_run(run):
             "START_PB@": True,
             "FORCINGSTATUS@": True,
         },
+        "displays": {"processor_0": {"code": None, "meaning": "no fault"}},
         "forced": ["REF%"],
         "operations": [{"at": 0.02, "what": "force", "of": "REF%", "ok": True}],
     }

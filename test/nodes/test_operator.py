@@ -89,7 +89,14 @@ def test_answers_say_what_is_true_now(live, ask) -> None:
     assert ask("run", "OperateTask", task="LINE").status == "running"
     assert ask("clear", "OperateTask", task="LINE").ok
     assert ask("clear_errors", "OperateTask").ok
-    assert ask("set", "SetValue", name="ref%", value="70").now == "70"
+    given = ask("set", "SetValue", name="ref%", value="70")
+    assert (given.now, given.before) == ("70", "100")
+    assert ask("set", "SetValue", name="ref%", value="70").before == "70"
+    read = ask("get", "ReadValues", names=["R*"])
+    assert (list(read.found), list(read.values), list(read.shown)) == (["REF%"], ["70"], [""])
+    stands = ask("status", "ReadStatus")
+    assert (list(stands.display_modules), list(stands.display_codes)) == (["processor_1"], [""])
+    assert (list(stands.drive_faults), stands.ended) == ([], 0)
     forced = ask("force", "SetValue", name="REF%", value="5")
     assert (forced.ok, forced.now) == (True, "5")
     held = ask("set", "SetValue", name="REF%", value="6")
@@ -163,3 +170,21 @@ def test_statistics_come_each_second_and_add_up(live, client) -> None:
             assert new.execution_min_total_us <= new.execution_min_us
             assert 0 <= new.lateness_mean_us <= new.lateness_max_us <= new.lateness_max_total_us
             assert new.load_percent == pytest.approx(new.scans * new.execution_mean_us / after.window_s / 1e4)
+
+
+def test_status_and_diagnostics_show_what_the_display_shows(live, ask, client) -> None:
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    heard = []
+    client.node.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)
+    live.rack.operations.stop_all("a module was lost", "31")
+
+    def displayed() -> set[tuple[str, str]]:
+        found = [item for message in heard for item in message.status if "processor_1: 57C" in item.name]
+        values = [{pair.key: pair.value for pair in item.values} for item in found]
+        return {(value["display"], value["display_meaning"].partition(":")[0]) for value in values}
+
+    until(live, client, lambda: ("31", "bus error") in displayed())
+    stands = ask("status", "ReadStatus")
+    assert (list(stands.display_modules), list(stands.display_codes)) == (["processor_1"], ["31"])
+    assert stands.display_meanings[0].startswith("bus error")

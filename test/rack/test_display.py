@@ -51,9 +51,9 @@ def test_a_rack_without_a_fault_shows_nothing(tmp_path):
 
 def test_an_overlap_is_shown_where_it_was_until_the_log_is_cleared(tmp_path):
     rack = made(tmp_path)
+    rack.task("SPEED").errors.add(LogEntry(30, 7070, 5))
     rack.operations.stop_all("task SPEED: overlap", "14", "SPEED")
     assert shown(rack) == {"processor_1": "14", "processor_2": ""}
-    rack.task("SPEED").errors.add(LogEntry(30, 7070, 5))
     rack.operations.run("WORK")
     assert shown(rack)["processor_1"] == "14", "its log still holds it"
     rack.operations.clear_errors("SPEED")

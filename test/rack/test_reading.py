@@ -46,7 +46,7 @@ def orders(rack) -> Orders:
 def test_patterns_mean_commons_elements_and_what_a_task_has(orders):
     assert orders.get(["f_*"]) == [("F_ONE@", "FALSE"), ("F_TWO@", "TRUE")]
     assert [name for name, _ in orders.get(["TABLE%(*)"])] == ["TABLE%(0)", "TABLE%(1)", "TABLE%(2)"]
-    assert [name for name, _ in orders.get(["RE?%", "*"])][0] == "REF%"
+    assert next(name for name, _ in orders.get(["RE?%", "*"])) == "REF%"
     assert orders.get(["SPEED.*"]) == [("SPEED.TRIM%", "1"), ("SPEED.KP", "0.5"), ("SPEED.COUNT%", "4")]
     assert [name for name, _ in orders.get(["F_TWO@", "F_*"])] == ["F_TWO@", "F_ONE@"], "each once"
 

@@ -1,7 +1,9 @@
 """`automax ctl` and the services of a running rack, over real DDS; what was done is recorded and replayed."""
 
 import json
+import os
 import signal
+import subprocess
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -10,7 +12,7 @@ import pytest
 from automax_ros.bags.reader import BagReader
 from automax_ros.replay.engine import ReplayOptions, replay
 
-from .support import RACKS, TYPES, Automax, Client, automax, automax_here
+from .support import COMMAND, PATIENCE_S, RACKS, TYPES, Automax, Client, automax, automax_here, wait_until
 
 OPERATED = RACKS / "operated" / "rack.yaml"
 READY = "Ctrl-C ends the run"
@@ -48,7 +50,11 @@ def one_client(caller, monkeypatch):
 
 
 def ctl(*arguments: str | Path):
-    return automax_here("ctl", "OPERATED", *arguments, *PATIENT)
+    return ctl_of("OPERATED", *arguments)
+
+
+def ctl_of(rack: str, *arguments: str | Path):
+    return automax_here("ctl", rack, *arguments, *PATIENT)
 
 
 @pytest.mark.usefixtures("rack", "one_client")
@@ -76,7 +82,9 @@ def test_a_rack_is_operated_from_another_process(tmp_path):
     assert bad["ok"] is False
     assert "no common variable" in bad["reason"]
     assert ctl("tune", "SPEED.TRIM%=5").code == 0
+    assert ctl("tune", "SPEED.TRIM%=5").out == "tune SPEED.TRIM% = 5: was already 5\n"
     assert ctl("get", "REF%", "SPEED.TRIM%", "OUT%").out == "REF% = 200\nSPEED.TRIM% = 5\nOUT% = 205\n"
+    assert ctl("get", "R*").out == "REF% = 200\n"
     assert ctl("force", "OUT%=-1").code == 0
     assert ctl("forces").out == "OUT% = -1\n"
     errors = ctl("errors").out
@@ -132,6 +140,7 @@ def test_what_was_done_is_told_to_late_joiners_and_recorded_and_the_recording_re
         ("set", True),
         ("set", False),
         ("tune", True),
+        ("tune", True),
         ("force", True),
         ("reload", False),
         ("reload", True),
@@ -184,3 +193,32 @@ def test_wrong_usage(ros_domain_id, arguments, reason):
     result = automax_here("ctl", *arguments)
     assert result.code == 2
     assert reason in result.err
+
+
+def test_two_racks_of_one_name_are_operated_by_nobody(ros_domain_id, tmp_path):
+    """As on two hosts: each has its own folder of locks."""
+    (tmp_path / "other").mkdir()
+    with Automax("run", OPERATED) as first:
+        first.wait_for_line(READY)
+        with Automax("run", OPERATED, environment=os.environ | {"TMPDIR": str(tmp_path / "other")}) as second:
+            second.wait_for_line(READY)
+            refused = ctl("stop-all")
+            assert refused.code == 2
+            assert "2 racks are called /operated" in refused.err
+            assert second.end(signal.SIGINT).code == 0
+        assert first.end(signal.SIGINT).code == 0
+    assert "STOP ALL" not in "".join((*first.out, *second.out))
+
+
+def test_a_prompt_stays_connected_and_a_press_is_seen_by_the_tasks(ros_domain_id):
+    with Automax("run", RACKS / "line4" / "rack.yaml", "--distributed") as rack:
+        rack.wait_for_line(READY)
+        wait_until(lambda: ctl_of("LINE4", "status").code == 0)  # all processes have met
+        lines = "get START_PB@\npress START_PB@ --for 0.05\nget 'START*' NIL@\nget 'RING_9.*'\nstatus\n"
+        command = [*COMMAND, "ctl", "LINE4", "shell"]
+        shell = subprocess.run(command, input=lines, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        assert shell.returncode == 1
+        assert "START_PB@ = FALSE\npress START_PB@: done\nrack LINE4:" in shell.stdout
+        assert "display of processor_4: blank, no fault" in shell.stdout
+        assert shell.stderr.count("refused") == 2
+        assert rack.end(signal.SIGINT).code == 0
