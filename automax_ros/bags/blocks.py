@@ -20,7 +20,7 @@ from automax_ros.bags.chunk_table import MOST_MESSAGES, ChunkTable, WholeChunk
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.opening import size_of
-from automax_ros.bags.reader import BagMessage, BagReader, ChannelReader, DataSource, FileOrder
+from automax_ros.bags.reader import BagMessage, BagReader, ChannelReader, DataSource, FileOrder, goes_backwards
 from automax_ros.bags.unpacking import Buffer
 
 Bytes = NDArray[np.uint8]
@@ -167,8 +167,12 @@ class _BlockFile:
         """Return a table whose messages can all be read, and take over what it tells; else None."""
         if table is None or not self._is_defined(table):
             return None
+        times = table.log_times
+        before = self.last_log
+        if (times[1:] <= times[:-1]).any() or (before is not None and int(times[0]) <= before):
+            return None  # read one by one: the messages before the wrong one count
         if not self._begun:
-            self._order.begin(self._file.path, int(table.log_times[0]))
+            self._order.begin(self._file.path, int(times[0]))
             self._begun = True
         self.last_log = int(table.log_times[-1])
         return table
@@ -251,6 +255,8 @@ class _BlockFile:
             if not self._begun:
                 self._order.begin(self._file.path, raw.log_time)
                 self._begun = True
+            elif self.last_log is not None and raw.log_time <= self.last_log:
+                raise goes_backwards(self._file.path, raw.log_time, self.last_log)
             self.last_log = raw.log_time
             channel = self._source.channel(raw, self._types)
             if channel.wanted:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from automax_ros.bags.errors import BagError
+from automax_ros.bags.reader import ORDER_HINT
 from automax_ros.bags.run_facts import RunFacts
 from automax_ros.bags.variables import Watched, checked_table
 from automax_ros.bags.write_log import WriteLog
@@ -28,12 +29,14 @@ Cell = Value
 _Kind = tuple[Callable[[float], Value] | None, float, float, int, str]
 """How the values of a variable are typed, the least and the greatest, how many elements it has, its name."""
 _CHANNEL_NUMBERS = 256
+MOST_GAPS = 100
 
 
 class CommonLog:
     """Takes the messages of the write log of one run; what is of another run, or known already, is passed over.
 
-    Writes that are missing are an error here, numbers that a variable cannot have are not: ``_bridge``, ``_odd``.
+    Writes that are missing are an error here unless an image makes up for them, numbers that a variable cannot have are
+    not: ``_bridge``, ``_odd``. ``missing_writes`` says which writes are missing, the first ``MOST_GAPS`` times.
 
     Raises:
         BagError: the table of variables is not one that a rack sends.
@@ -45,6 +48,8 @@ class CommonLog:
         self._bag = bag
         self._log = WriteLog(facts.table.run_id)
         self._first_write = facts.first_write
+        self._last_write = -1
+        self.missing_writes: list[str] = []
         self._kinds: dict[int, _Kind] = {
             item.id: (_TYPED.get(kind), *kind.range, math.prod(item.dimensions), name)
             for name, item in self.variables.items()
@@ -74,10 +79,16 @@ class CommonLog:
         if message.run_id != log.run_id or (image and message.sequence + 1 < self._first_write):
             return None
         missing = log.missing(message.sequence, image=image)
+        if not image:
+            if message.sequence <= self._last_write:
+                raise self._goes_backwards(message)
+            self._last_write = message.sequence
         if missing < 0:
             return None
-        if missing and not image:
-            self._bridge(missing, message)
+        if missing:
+            self._note_gap(missing, message)
+            if not image:
+                self._bridge(missing, message)
         log.sequence = message.sequence
         return self.entries(message.values, message.stamp)
 
@@ -126,13 +137,18 @@ class CommonLog:
         return value
 
     def _bridge(self, missing: int, message: CommonImage | CommonWrite) -> None:
-        text = f"writes {message.sequence - missing} to {message.sequence - 1} are missing"
-        raise BagError(
-            "AMX6823",
-            self._bag,
-            f"{text} before {seconds_text(max(0, message.stamp))} s",
-            "the recorder lost messages; `automax run --record` loses none",
-        )
+        text = _missing_text(missing, message)
+        raise BagError("AMX6823", self._bag, text, "the recorder lost messages; `automax run --record` loses none")
+
+    def _note_gap(self, missing: int, message: CommonImage | CommonWrite) -> None:
+        if len(self.missing_writes) < MOST_GAPS:
+            self.missing_writes.append(_missing_text(missing, message))
+
+    def _goes_backwards(self, write: CommonImage | CommonWrite) -> BagError:
+        place, before = seconds_text(max(0, write.stamp)), self._last_write
+        text = f"the write log goes backwards at {place} s: write {write.sequence} after write {before}"
+        twice = ", which stands there twice" if write.sequence == before else ""
+        return BagError("AMX6813", self._bag, f"{text}{twice}", ORDER_HINT)
 
     def _wrong(self, stamp: int, reason: str) -> BagError:
         return BagError("AMX6813", self._bag, f"wrong values at {seconds_text(max(0, stamp))} s: {reason}")
@@ -187,6 +203,14 @@ class WatchedValues:
         shown.update(changed)
         self._told.clear()
         return changed
+
+
+def _missing_text(missing: int, message: CommonImage | CommonWrite) -> str:
+    """Return which writes are missing before a message; an image has the last of them in it."""
+    last = message.sequence - (0 if isinstance(message, CommonImage) else 1)
+    first = last - missing + 1
+    writes = f"writes {first} to {last} are" if missing > 1 else f"write {last} is"
+    return f"{writes} missing before {seconds_text(max(0, message.stamp))} s"
 
 
 def _run_text(table: VariableTable) -> str:

@@ -11,19 +11,18 @@ from pathlib import Path
 
 from mcap.records import Attachment
 
-from automax_ros.bags.common_log import CommonLog, variables_of
+from automax_ros.bags.common_log import variables_of
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_file import TRUNCATED_HINT, McapFile, RawMessage
 from automax_ros.bags.opening import NO_BAG_HINT, size_of
 from automax_ros.bags.reader import BagReader
-from automax_ros.bags.run_facts import run_facts
 from automax_ros.bags.series import Progress
+from automax_ros.bags.soundness import verdict_of
 from automax_ros.bags.unpacking import DAMAGED_HINT
-from automax_ros.core.ticks import seconds_text
+from automax_ros.core.text import count_of
 from automax_ros.wire.cdr import CdrError, decoder
-from automax_ros.wire.definitions import message_types
 from automax_ros.wire.heads import scan_head
-from automax_ros.wire.messages import CommonImage, CommonWrite, Operation, Scan, ScanError, String, VariableTable
+from automax_ros.wire.messages import Operation, Scan, ScanError, String, VariableTable
 from automax_ros.wire.rack_files import RackFilesError, files_from_text
 
 MOST_KEPT = 1000
@@ -103,7 +102,8 @@ class AttachmentInfo:
 class BagInfo:
     """What a recording holds. Stamps are nanoseconds; ``problems`` is empty where it is sound.
 
-    ``texts`` are the rack's file and the sources of its tasks as they are stored inside.
+    ``texts`` are the rack's file and the sources of its tasks as they are stored inside. ``gaps`` says which writes are
+    missing, where that was checked.
     """
 
     path: Path
@@ -119,6 +119,15 @@ class BagInfo:
     attachments: list[AttachmentInfo] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)
     problems: list[BagError] = field(default_factory=list)
+    gaps: list[str] = field(default_factory=list)
+
+    @property
+    def gap_texts(self) -> list[str]:
+        """What is missing in it though it is sound: by its recorder's own word, its write log and its scans."""
+        told = self.custom_data.get("gaps", "")
+        found = [f"the recorder says: {told}"] if told else []
+        scans = [f"{count_of(task.missing, 'scan')} of {name}" for name, task in self.tasks.items() if task.missing]
+        return [*found, *self.gaps, *(f"{text} not there" for text in scans)]
 
     @property
     def duration_ns(self) -> int:
@@ -295,37 +304,11 @@ _MOST_TEXT = 1 << 18
 
 
 def _check(info: BagInfo, progress: Progress | None) -> None:
-    """Decode every message of a type that we know; look for gaps in the write log, and for times that go backwards."""
+    """Decode every message of a type that we know, and look whether all of it is sound."""
     reader = BagReader(info.path)
     if progress is not None:
         reader.on_progress = lambda share: progress((1 + share) / 2)
-    try:
-        _check_order(info, reader)
-    except BagError as error:
-        info.problems.append(error)
-
-
-def _check_order(info: BagInfo, reader: BagReader) -> None:
-    # A recording of others may hold messages in any order, and those of no rack; in ours log times increase.
-    log: CommonLog | None = None
-    last_log = -1
-    last_write = (0, -1)
-    for entry in reader.messages(types=frozenset(message_types())):
-        message = entry.message
-        if reader.is_ours and entry.log_time <= last_log:
-            text = f"log times go backwards: {entry.log_time} ns on {entry.topic[:247]} after {last_log} ns"
-            raise BagError("AMX6813", reader.path, text)
-        last_log = entry.log_time
-        if isinstance(message, CommonWrite):
-            run, sequence = last_write
-            if message.run_id == run and message.sequence <= sequence:
-                place = seconds_text(max(0, message.stamp))
-                text = f"the write log goes backwards at {place} s: write {message.sequence} after write {sequence}"
-                raise BagError("AMX6813", reader.path, text)
-            last_write = message.run_id, message.sequence
-        if isinstance(message, (CommonImage, CommonWrite, VariableTable)):
-            log = log or CommonLog(info.path, run_facts(reader))
-            if isinstance(message, VariableTable):
-                log.check_table(message)
-            else:
-                log.take(message)
+    verdict = verdict_of(reader)
+    info.gaps = list(verdict.gaps)
+    if verdict.fault is not None:
+        info.problems.append(verdict.fault)

@@ -21,6 +21,7 @@ from automax_ros.core.text import printable
 from automax_ros.core.yaml_text import Flaw, YamlFault, read_data
 from automax_ros.wire.cdr import CdrError, Message, decoder
 
+ORDER_HINT = "`automax bag repair` leaves out what does not follow on what stands before it"
 MAX_METADATA_BYTES = 4 << 20
 """Longest metadata.yaml that is read, in bytes (decision: a bound on memory for untrusted recordings)."""
 _MAX_YAML_NODES = 2_000_000
@@ -144,6 +145,8 @@ class BagReader:
                     continue
                 if last_log is None:
                     order.begin(file, record.log_time)
+                elif record.log_time <= last_log and self.is_ours:
+                    raise goes_backwards(file, record.log_time, last_log)
                 last_log = record.log_time
                 yield source, record
             before += data.position
@@ -177,6 +180,15 @@ class BagReader:
                     yield record
 
 
+def goes_backwards(file: Path, log_time: int, before: int) -> BagError:
+    """Return the error of a message of one of our recordings that is not later than the one before it."""
+    if log_time == before:
+        text = f"two messages have the log time {log_time} ns; in a recording of ours each has its own"
+    else:
+        text = f"log times go backwards: {log_time} ns after {before} ns"
+    return BagError("AMX6813", file, text, ORDER_HINT)
+
+
 class FileOrder:
     """Checks that the files of a recording follow each other in time: only then they can be read as one stream."""
 
@@ -192,7 +204,7 @@ class FileOrder:
         Raises:
             BagError: the file before ends later.
         """
-        if self._name and log_time < self._last - self._slack_ns:
+        if self._name and log_time < self._last - self._slack_ns + (not self._slack_ns):
             if log_time < self._first:
                 text = f"is out of order: its messages begin before those of {self._name}, which is listed before it"
                 hint = "`automax bag repair` writes a metadata.yaml that lists the files in the order of their times"

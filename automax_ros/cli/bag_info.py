@@ -57,6 +57,7 @@ def as_data(info: BagInfo, facts: dict[str, TaskFacts], *, checked: bool) -> dic
         "bag": str(info.path),
         "sound": not info.problems,
         "checked": checked,
+        "gaps": info.gap_texts,
         "problems": [
             {"code": item.code, "place": item.place, "message": item.message, "hint": item.hint}
             for item in info.problems

@@ -116,14 +116,20 @@ def _stored(item: Mapping[str, Any]) -> list[str]:
 
 def _verdict(content: Mapping[str, Any]) -> list[str]:
     if content["sound"]:
-        how = "every message decoded, no gap in the write log" if content["checked"] else "all checksums are right"
-        return ["", f"sound: {how}"]
+        how = "every message decoded" if content["checked"] else "all checksums are right"
+        gaps = [printable(gap) for gap in content["gaps"]]
+        if gaps:
+            return ["", f"sound, with gaps: {how}", *(f"  {gap}" for gap in gaps[:_MOST_ROWS]), _GAPS]
+        return ["", f"sound: {how}{', no gap in the write log' if content['checked'] else ''}"]
     lines = ["", "not sound; what is counted above is readable:"]
     hints: dict[str, None] = {}
     for problem in content["problems"]:
         lines.append(f"  {problem['place']}: error[{problem['code']}]: {problem['message']}")
         hints[problem["hint"]] = None
     return [*lines, *(f"  hint: {hint}" for hint in hints if hint)]
+
+
+_GAPS = "  a replay goes on from the next image of memory and the next state of each task"
 
 
 def _section(title: str, rows: Sequence[Sequence[str]]) -> list[str]:

@@ -2,7 +2,8 @@
 
 The recording itself is never changed: what can be saved goes into a new folder, with index, summary and
 metadata.yaml, and what was lost is reported. A sound recording is left alone. Exit code 0: the recording is sound, or a
-repaired one stands next to it; 2: nothing of it can be used.
+repaired one stands next to it; 1: it is not sound all the same, for a reason that no repair mends; 2: nothing of it can
+be used.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     with ProgressBar("repairing", _STEPS) as bar:
         report = repair(arguments.bag, arguments.output, lambda share: bar.show(round(share * _STEPS)))
     print(json.dumps(_data(report), indent=2) if arguments.json else _text(report))
-    return 0
+    return 0 if report.left is None else 1
 
 
 def _text(report: RepairReport) -> str:
@@ -48,6 +49,8 @@ def _text(report: RepairReport) -> str:
         lines += [line for file in report.files for line in _file_lines(file)]
         lines += [f"{bag}: {printable(text)}" for text in report.problems]
         lines.append(f"kept: {_contents(report)}")
+    if report.left is not None:
+        lines.append(f"not sound all the same, and no repair mends it: {printable(str(report.left))}")
     if report.output is not None:
         lines.append(f"{'copied' if report.sound else 'repaired'}: {printable(str(report.output))}")
     return "\n".join(lines)
@@ -94,7 +97,8 @@ def _wall_time(report: RepairReport) -> str:
 def _data(report: RepairReport) -> dict[str, object]:
     return {
         "bag": str(report.bag),
-        "sound": report.sound,
+        "sound": report.sound and report.left is None,
+        "left": None if report.left is None else {"code": report.left.code, "message": report.left.message},
         "output": str(report.output) if report.output is not None else None,
         "messages": sum(file.contents.messages for file in report.files),
         "scans": sum(file.contents.scans for file in report.files),

@@ -122,7 +122,7 @@ class RecordedCommons(CommonLog):
         log = self._log
         if log.sequence is None or int(sequences[0]) != log.sequence + 1:
             return False
-        log.sequence = int(sequences[-1])
+        log.sequence = self._last_write = int(sequences[-1])
         cells = self._begins[views] + elements
         newest = np.full(len(self._cells), -1, np.int64)
         np.maximum.at(newest, cells, np.arange(len(cells)))

@@ -17,6 +17,7 @@ from automax_ros.bags.blocks import MessageBlock, message_blocks
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.run_facts import RunFacts, run_facts
+from automax_ros.bags.soundness import require_tasks
 from automax_ros.bags.span import require_scans
 from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import Diagnostic, SourceText
@@ -191,8 +192,7 @@ class Replay:
                 raise BagError("AMX6832", self.bag, what, "see `automax bag info`, or choose another range")
         if nothing:
             notes = "; ".join(f"{task.name}: {note}" for task in report.tasks for note in task.notes)
-            whose = f"no scan of {', '.join(names)[:80]}" if names else "it has no tasks, so no scan"
-            what = f"{whose} can be executed again"
+            what = f"no scan of {', '.join(names)[:80]} can be executed again"
             raise BagError("AMX6832", self.bag, f"{what}{f' ({notes})' if notes else ''}", "see `automax bag info`")
 
 
@@ -344,6 +344,7 @@ class Run:
 def _stored(reader: BagReader) -> Stored:
     """Read what a recording stores. BagError, SourceRefused: as ``Replay``."""
     rack, facts = stored_rack(reader), run_facts(reader)
+    require_tasks(reader.path, facts.table)
     rack.check_table(facts.table)
     return rack, facts
 

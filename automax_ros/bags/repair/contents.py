@@ -14,10 +14,35 @@ from automax_ros.bags.metadata import FileSummary, TopicSummary
 from automax_ros.bags.schemas import is_known
 from automax_ros.core.yaml_text import YamlFault, read_data
 from automax_ros.wire.cdr import CdrError, decode, decoder
+from automax_ros.wire.heads import scan_head, write_head
 
 SCAN, WRITE, TABLE = (f"automax_msgs/msg/{name}" for name in ("Scan", "CommonWrite", "VariableTable"))
 _MAX_QOS_TEXT = 1 << 14
 _MAX_QOS = 100
+_MOST_RUNS = 1000
+
+
+class FileSequence:
+    """What each message of one of our recordings has to follow: log times and the numbers of writes increase."""
+
+    def __init__(self) -> None:
+        """Nothing has come."""
+        self._last_log = -1
+        self._writes: dict[int, int] = {}
+
+    def fault(self, log_time: int, type_name: str, payload: bytes) -> str:
+        """Return why a message does not follow those before it; empty where it does, and the next follows it."""
+        if log_time <= self._last_log:
+            return "log times that go backwards" if log_time < self._last_log else "log times that stand twice"
+        if type_name == WRITE:
+            with contextlib.suppress(CdrError):
+                head = write_head(payload)
+                if head.sequence <= self._writes.get(head.run_id, -1):
+                    return "numbers of writes that go backwards or stand twice"
+                if head.run_id in self._writes or len(self._writes) < _MOST_RUNS:
+                    self._writes[head.run_id] = head.sequence
+        self._last_log = log_time
+        return ""
 
 
 @dataclass
@@ -55,6 +80,8 @@ class FileContents:
         try:
             if decode_message is not None:
                 decode_message(payload)
+            elif self.type_of(channel) == SCAN:
+                scan_head(payload)  # whatever its definition says, nobody reads it otherwise
         except CdrError as error:
             return str(error)
         return ""

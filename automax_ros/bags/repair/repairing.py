@@ -7,6 +7,7 @@ would not be what the rack has done.
 
 from __future__ import annotations
 
+import copy
 import re
 import shutil
 from collections.abc import Callable
@@ -19,10 +20,11 @@ from automax_ros.bags.mcap_file import McapFile, RawMessage
 from automax_ros.bags.metadata import METADATA_FILE, BagMetadata, FileSummary, TopicSummary
 from automax_ros.bags.opening import NO_BAG_HINT, no_recording
 from automax_ros.bags.reader import MAX_METADATA_BYTES, BagReader, read_information
-from automax_ros.bags.repair.contents import FileContents, topics_of
+from automax_ros.bags.repair.contents import FileContents, FileSequence, topics_of
 from automax_ros.bags.repair.provenance import Provenance
 from automax_ros.bags.repair.rewriting import Definitions, Rewriting
 from automax_ros.bags.repair.salvage import Salvage
+from automax_ros.bags.soundness import verdict_of
 from automax_ros.core.ticks import NS_PER_S
 
 MAX_FILES = 10_000
@@ -47,6 +49,8 @@ class FileReport:
     dropped_scans: int = 0
     error: BagError | None = None
     """Why nothing of it could be read."""
+    before: FileSequence | None = None
+    """What its messages have to follow; None where they may have any order."""
 
     @property
     def usable(self) -> bool:
@@ -63,6 +67,8 @@ class RepairReport:
     problems: list[str] = field(default_factory=list)
     """What is wrong with the recording as a whole."""
     output: Path | None = None
+    left: BagError | None = None
+    """Why it is not sound all the same, which no repair mends: what `bag info --check` says of it."""
 
     @property
     def sound(self) -> bool:
@@ -98,17 +104,22 @@ def repair(bag: Path, output: Path | None = None, on_progress: Callable[[float],
     report = RepairReport(bag)
     paths = _data_files(bag, report)
     provenance = Provenance()
-    for number, path in enumerate(paths):
-        report.files.append(_examined(path, provenance))
-        tell((number + 1) / len(paths) / 2)
+    found: dict[Path, FileReport] = {}
+    sequence = FileSequence() if _is_ours(bag, paths) else None
+    for path in paths if sequence is None else sorted(paths, key=_first_log):
+        found[path] = _examined(path, provenance, sequence)
+        tell(len(found) / len(paths) / 2)
+    report.files += [found[path] for path in paths]
     _check_metadata(bag, report, provenance)
     if report.sound and output is None:
+        report.left = verdict_of(BagReader(bag)).fault
         return report
     was_sound = report.sound
     _write(target, paths, report, provenance, tell)
     if not was_sound:
         _check_gaps(report)
     report.output = target
+    report.left = verdict_of(BagReader(target)).fault
     return report
 
 
@@ -183,26 +194,52 @@ def _place(path: Path) -> tuple[str, int, str]:
     return (match[1], int(match[2]), path.name) if match else (path.name, -1, path.name)
 
 
-def _examined(path: Path, provenance: Provenance) -> FileReport:
+def _is_ours(bag: Path, paths: list[Path]) -> bool:
+    """Whether a recorder of ours made it, so that messages follow each other (``BagReader.is_ours``)."""
+    for path in (bag, *paths):
+        try:
+            if BagReader(path).is_ours:
+                return True
+        except BagError:  # whoever reads it is told
+            continue
+    return False
+
+
+def _first_log(path: Path) -> int:
+    """Return the log time of a file's first message, 0 where none can be read."""
+    try:
+        return next((item.log_time for item in McapFile(path).records() if isinstance(item, RawMessage)), 0)
+    except BagError:
+        return 0
+
+
+def _examined(path: Path, provenance: Provenance, sequence: FileSequence | None) -> FileReport:
     """Read a file to its end; a damaged one is looked at again piece by piece."""
     file = McapFile(path)
     contents = FileContents(path.name, channels=file.channels, schemas=file.schemas)
-    malformed = 0
-    first = ""
+    before = copy.deepcopy(sequence)
+    malformed = strays = 0
+    first = first_stray = ""
     try:
         for record in file.records():
             if isinstance(record, RawMessage):
                 contents.count(record.channel.id, record.log_time, record.publish_time, record.data)
+                place = f"on {record.channel.topic[:247]} at {record.log_time} ns"
+                kind = contents.type_of(record.channel.id)
                 if fault := contents.fault(record.channel.id, record.data):
                     malformed += 1
-                    first = first or f"on {record.channel.topic[:247]} at {record.log_time} ns: {fault}"
+                    first = first or f"{place}: {fault}"
+                elif sequence is not None and (fault := sequence.fault(record.log_time, kind, record.data)):
+                    strays += 1
+                    first_stray = first_stray or f"{place}: {fault}"
             else:
                 provenance.take(record)
     except BagError as error:
-        return FileReport(path.name, _size(path), False, FileContents(path.name), [_told(error)])
-    if malformed:
-        text = f"malformed messages: {malformed}, the first {first}"
-        return FileReport(path.name, _size(path), False, FileContents(path.name), [text])
+        return FileReport(path.name, _size(path), False, FileContents(path.name), [_told(error)], before=before)
+    damage = [f"malformed messages: {malformed}, the first {first}"] if malformed else []
+    damage += [f"messages that do not follow on those before: {strays}, the first {first_stray}"] if strays else []
+    if damage:
+        return FileReport(path.name, _size(path), False, FileContents(path.name), damage, before=before)
     return FileReport(path.name, _size(path), True, contents)
 
 
@@ -313,7 +350,7 @@ def _nothing(report: RepairReport) -> BagError:
 
 def _rewrite(path: Path, target: Path, file: FileReport, provenance: Provenance) -> None:
     salvage = Salvage(path)
-    rewriting = Rewriting(target, salvage, Definitions(path), provenance)
+    rewriting = Rewriting(target, salvage, Definitions(path), provenance, copy.deepcopy(file.before))
     try:
         rewriting.write()
     finally:

@@ -15,7 +15,7 @@ from automax_ros.bags.data_file import DataFile
 from automax_ros.bags.errors import BagError
 from automax_ros.bags.mcap_output import McapOutput
 from automax_ros.bags.metadata import BagMetadata, yaml_text
-from automax_ros.bags.repair.contents import SCAN, WRITE, FileContents
+from automax_ros.bags.repair.contents import SCAN, WRITE, FileContents, FileSequence
 from automax_ros.bags.repair.provenance import Provenance
 from automax_ros.bags.repair.salvage import Piece, Salvage, SoundChunk, parsed, records
 from automax_ros.bags.unpacking import MAX_RECORD_BYTES
@@ -81,9 +81,17 @@ class Definitions:
 class Rewriting:
     """One file being written again. ``write`` does it, ``close`` in any case; then the counts tell how it went."""
 
-    def __init__(self, target: Path, salvage: Salvage, definitions: Definitions, provenance: Provenance) -> None:
-        """Create the file."""
+    def __init__(
+        self,
+        target: Path,
+        salvage: Salvage,
+        definitions: Definitions,
+        provenance: Provenance,
+        sequence: FileSequence | None = None,
+    ) -> None:
+        """Create the file. ``sequence`` is what its messages have to follow, None where they may have any order."""
         self.contents = FileContents(target.name)
+        self._sequence = sequence
         self.contents.schemas, self.contents.channels = definitions.schemas, definitions.channels
         self.dropped_messages = 0
         self.dropped_scans = 0
@@ -133,7 +141,7 @@ class Rewriting:
             if piece.name != "rosbag2":
                 self._output.add_metadata(piece)
         elif isinstance(piece, bytes):
-            self._add([_found(piece)], self._loose)
+            self._add(self._chosen([_found(piece)]), self._loose)
             if self._loose.size > _LOOSE_BYTES:
                 self._end_loose()
 
@@ -141,37 +149,49 @@ class Rewriting:
         """Write a chunk: as it stands if all of it is sound, else what is left of it."""
         found: list[Found] = []
         index: dict[int, list[int]] = {}
-        end = 0
+        end = others = 0
         for opcode, start, end in records(piece.data):
+            others += 1
             if opcode == Opcode.MESSAGE and end - start >= MESSAGE_FIELDS.size:
                 message = _found(piece.data[start:end])
+                others -= 1
                 found.append(message)
                 index.setdefault(message.channel, []).extend((message.log_time, start - RECORD_HEAD.size))
         keep = kept(found, self.contents.type_of, cut=piece.cut) if last or piece.cut else len(found)
         self._drop(found[keep:])
-        whole = keep == len(found) and end == len(piece.data) and all(map(self._is_usable, found))
+        chosen = self._chosen(found[:keep])
+        definitions = definitions_in(piece.data)  # a record that cannot be parsed is not among them
+        whole = len(chosen) == len(found) and end == len(piece.data) and others == len(definitions)
         if piece.packed is None or not whole:
             self._end_loose()
-            self._add(found[:keep], self._loose)
+            self._add(chosen, self._loose)
             self._end_loose()
             return
         builder = ChunkBuilder(index)
         if found:
-            inner = frozenset((type(record), record.id) for record in definitions_in(piece.data))
+            inner = frozenset((type(record), record.id) for record in definitions)
             self._define(index, inner)
             self._output.add_packed_chunk(piece.packed, builder)
             self._count(found)
 
+    def _chosen(self, messages: Sequence[Found]) -> list[Found]:
+        """Return the messages that can be understood and follow each other; the others are dropped."""
+        places = [self._is_usable(message) for message in messages]
+        self._drop([message for message, usable in zip(messages, places, strict=True) if not usable])
+        return [message for message, usable in zip(messages, places, strict=True) if usable]
+
     def _add(self, messages: Sequence[Found], chunk: ChunkBuilder) -> None:
-        known = [message for message in messages if self._is_usable(message)]
-        self._drop([message for message in messages if not self._is_usable(message)])
-        self._define({message.channel for message in known})
-        for message in known:
+        self._define({message.channel for message in messages})
+        for message in messages:
             chunk.add_message(message.channel, message.sequence, message.log_time, message.stamp, message.payload)
-        self._count(known)
+        self._count(messages)
 
     def _is_usable(self, message: Found) -> bool:
-        return self._definitions.usable(message.channel) and not self.contents.fault(message.channel, message.payload)
+        contents, channel, payload = self.contents, message.channel, message.payload
+        if not self._definitions.usable(channel) or contents.fault(channel, payload):
+            return False
+        sequence = self._sequence
+        return sequence is None or not sequence.fault(message.log_time, contents.type_of(channel), payload)
 
     def _define(self, channels: Iterable[int], inner: frozenset[tuple[type, int]] = frozenset()) -> None:
         """Write the definitions of channels that no record has told of yet; ``inner`` stand in the chunk itself."""
