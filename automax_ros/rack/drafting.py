@@ -1,22 +1,23 @@
 """A rack file for a folder of tasks: a beginning for somebody who has the sources of a plant and nothing else.
 
 Every COMMON that a task declares becomes a common variable of the rack. The tasks share the Processors evenly; the one
-that scans most often is served first (decision).
+that scans most often is served first (decision). Tasks that only a UDC runs stand on UDCs (``drafting_udc``).
 """
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
+from automax_ros.compile.cost import Model
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.faults import Fault
 from automax_ros.core.text import quoted
-from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.core.ticks import NS_PER_MS, UDC_TICK_NS
 from automax_ros.core.types import DEFAULT_STRING_LENGTH, TASK_NAME_LIMIT, DataType, declaration_text
 from automax_ros.language.checks.checker import CheckResult
 from automax_ros.language.program import CommonSpec, Program
@@ -24,10 +25,8 @@ from automax_ros.language.syntax.parser import parse
 from automax_ros.language.syntax.task_kind import TaskKind, is_task_file, kind_of_source
 from automax_ros.language.syntax.tree import Declaration, Declared, Scope
 from automax_ros.language.syntax.walk import statements_in_order
-from automax_ros.rack.config import (
-    DEFAULT_OUT_LIMIT,
-    CommonVariable,
-)
+from automax_ros.rack.config import DEFAULT_OUT_LIMIT, MAX_SLOT, CommonVariable
+from automax_ros.rack.drafting_udc import DraftedUdc, drafted_udcs, dual_port_places, is_udc_task
 from automax_ros.rack.files import MAX_BYTES, FileFault, is_inside
 from automax_ros.rack.modules.common_memory import COMMON_REGISTERS
 from automax_ros.rack.modules.processor import MAX_PROCESSORS
@@ -53,11 +52,12 @@ class DraftFault(Fault):
 
 @dataclass(frozen=True)
 class DraftedTask:
-    """A task of the rack to be: its ``file`` as the rack file names it, and its text."""
+    """A task of the rack to be: its ``file`` as the rack file names it, its text, and whether a UDC alone runs it."""
 
     name: str
     file: str
     source: SourceText
+    on_udc: bool = False
 
 
 @dataclass
@@ -82,10 +82,12 @@ class Draft:
         Raises:
             DraftFault: more tasks than these Processors run, or more text than a rack file may have.
         """
-        if len(self.tasks) > processors * MAX_TASKS:
-            message = f"{len(self.tasks)} tasks are more than the {processors * MAX_TASKS} of {processors} Processors"
-            needed = -(-len(self.tasks) // MAX_TASKS)
+        count = sum(not task.on_udc for task in self.tasks)
+        if count > processors * MAX_TASKS:
+            message = f"{count} tasks are more than the {processors * MAX_TASKS} of {processors} Processors"
+            needed = -(-count // MAX_TASKS)
             raise DraftFault(message, f"--processors {needed}" if needed <= MAX_PROCESSORS else "make several racks")
+        udcs = self._udcs(processors)
         lines = [
             "# Made from the tasks of this folder; docs/rack_yaml.md has every key. `ros: in` lets ROS 2 write a",
             "# common, `preset:` gives it a value at the start, `unit:` and `description:` say what it is.",
@@ -94,8 +96,9 @@ class Draft:
             commented(f"  0: {{module: {self._memory_module()}}}", "common memory"),
             *self._processor_lines(processors),
             *self._drive_lines(processors),
+            *(line for udc in udcs for line in udc.lines({task.name: _file_key(task) for task in self.tasks})),
             "common:" if self.commons else "common: {}",
-            *self._common_lines(),
+            *self._common_lines(udcs),
         ]
         text = "\n".join(lines) + "\n"
         if len(text.encode()) > MAX_BYTES:
@@ -103,22 +106,36 @@ class Draft:
         return text
 
     def _processor_lines(self, processors: int) -> Iterator[str]:
-        periods = {task.name: self._period_ns(task) for task in self.tasks}
+        tasks = [task for task in self.tasks if not task.on_udc]
+        periods = {task.name: self._period_ns(task) for task in tasks}
         ranks = sorted(set(periods.values()))
-        share = -(-len(self.tasks) // processors)
+        share = -(-len(tasks) // processors)
         for number in range(processors):
-            own = self.tasks[number * share : (number + 1) * share]
+            own = tasks[number * share : (number + 1) * share]
             yield f"  {number + 1}:"
             yield f"    module: {_PROCESSOR}"
             yield f"    tick_ms: {self.tick_ns / NS_PER_MS:g}"
             yield "    tasks:" if own else "    tasks: {}"
             for task in own:
                 priority = min(MIN_PRIORITY + ranks.index(periods[task.name]), MAX_PRIORITY)
-                file = "" if task.file == f"{task.name}.BLK" else f"file: {_yaml_quoted(task.file)}, "
                 period = periods[task.name]
                 scanned = period < _UNKNOWN_NS
                 comment = f"a scan every {period / NS_PER_MS:g} ms" if scanned else _without_period(task)
-                yield commented(f"      {task.name}: {{{file}priority: {priority}}}", comment)
+                yield commented(f"      {task.name}: {{{_file_key(task)}priority: {priority}}}", comment)
+
+    @property
+    def _programs(self) -> dict[str, Program | None]:
+        return {name: result.program for name, result in self.results.items()}
+
+    def _udcs(self, processors: int) -> list[DraftedUdc]:
+        """Return the UDC modules, in the slots that nothing else has."""
+        drives = {slot for program in self._programs.values() for slot, _ in _drive_modules(program)}
+        free = (slot for slot in range(processors + 1, MAX_SLOT + 1) if slot not in drives)
+        names = [task.name for task in self.tasks if task.on_udc]
+        udcs = drafted_udcs(names, self._programs, free)
+        if sum(len(udc.tasks) for udc in udcs) < len(names):
+            raise DraftFault(f"{len(names)} tasks of UDCs find no slot", "make several racks")
+        return udcs
 
     def _drive_lines(self, processors: int) -> Iterator[str]:
         """Yield the modules whose slots the tasks of drives name, in the order of slots.
@@ -143,15 +160,19 @@ class Draft:
         program = self.results[task.name].program
         return program.period_ns if program is not None and not program.is_basic else _UNKNOWN_NS
 
-    def _common_lines(self) -> Iterator[str]:
+    def _common_lines(self, udcs: Sequence[DraftedUdc]) -> Iterator[str]:
         simple = 0
+        places: dict[str, str] = {}
+        for udc in udcs:
+            places = {**dual_port_places(udc, self._programs, self.commons), **places}
         for spec in self.commons.values():
             simple += not spec.dimensions
-            closed = "{ros: closed}" if not spec.dimensions and simple > DEFAULT_OUT_LIMIT else "{}"
+            options = [places[spec.name]] if spec.name in places else []
+            options += ["ros: closed"] if not spec.dimensions and simple > DEFAULT_OUT_LIMIT else []
             users = self.users[spec.name]
             more = ", ..." if len(users) > _MOST_NAMED else ""
             text = declaration_text(spec.name, spec.dimensions, spec.length)
-            yield commented(f"  {text}: {closed}", ", ".join(users[:_MOST_NAMED]) + more)
+            yield commented(f"  {text}: {{{', '.join(options)}}}", ", ".join(users[:_MOST_NAMED]) + more)
 
     def _memory_module(self) -> str:
         """Return the smallest common memory that holds the commons, else the largest."""
@@ -169,6 +190,11 @@ def _drive_modules(program: Program | None) -> list[tuple[int, str]]:
         return []
     facts = program.cml.facts
     return [(int(facts[item.variable]), item.module) for item in program.cml.block.inputs if item.module]
+
+
+def _file_key(task: DraftedTask) -> str:
+    """Return the key of a task's file, where its name does not say which it is."""
+    return "" if task.file == f"{task.name}.BLK" else f"file: {_yaml_quoted(task.file)}, "
 
 
 def _without_period(task: DraftedTask) -> str:
@@ -195,7 +221,8 @@ def draft(folder: Path, rack_folder: Path, tick_ns: int) -> Draft:
         reasons = "".join(f"; {quoted(name)} {reason}" for name, reason in found.left_out[:3])
         raise DraftFault(f"{folder} holds no task (.BLK, .BAS){reasons}")
     for task in found.tasks:
-        found.results[task.name] = check_source(task.source, task.name, tick_ns, found.commons)
+        tick, model = (UDC_TICK_NS, Model.UDC) if task.on_udc else (tick_ns, Model.NONE)
+        found.results[task.name] = check_source(task.source, task.name, tick, found.commons, model)
     return found
 
 
@@ -222,9 +249,10 @@ def _take(found: Draft, path: Path, folder: Path, inner: Path) -> None:
     except FileFault as fault:
         found.left_out.append((path.name, str(fault)))
         return
-    task = DraftedTask(_task_name(path.stem, {task.name for task in found.tasks}), str(inner / path.name), source)
-    found.tasks.append(task)
     module, _ = parse(source)
+    name = _task_name(path.stem, {task.name for task in found.tasks})
+    task = DraftedTask(name, str(inner / path.name), source, is_udc_task(module))
+    found.tasks.append(task)
     for statement, *_ in statements_in_order(module.statements):
         if isinstance(statement, Declaration) and statement.scope is Scope.COMMON:
             for declared in statement.variables:

@@ -31,7 +31,10 @@ def test_a_rack_file_that_passes_the_check(plant):
         result.err
     )
     assert "LINE1.CNF:6:1: warning[AMX6787]: task GONE is left out: GONE.BLK is not in the folder" in result.err
-    assert plant("check", "rack.yaml") == (0, "", "")
+    checked = plant("check", "rack.yaml")
+    assert (checked.code, checked.err) == (0, "")
+    assert "warning[AMX6497]: the common PRESET% (line 20) is used by no task\n" in checked.out
+    assert checked.out.count("[AMX") == 1
     config = load(plant.folder / "rack.yaml").config
     assert (config.name, config.executive) == ("LINE1", 21)
     assert [(item.slot, item.model) for item in config.modules] == [
@@ -93,3 +96,42 @@ def test_the_registers_of_a_drive_are_recognised(plant, register, models):
     plant.write("LINE1.CNF", f"10 IODEF TLD%[SLOT=7, REGISTER={register}]\n" + CNF)
     result = plant("import", "LINE1.CNF")
     assert f"generic, registers up to {register}: {models}\n" in result.out
+
+
+def test_a_network_variable_stands_on_its_57c404(plant):
+    """NETDEF names slot, drop and register; which drop the rack is, no line of the old configuration says."""
+    plant.write(
+        "LINE1.CNF",
+        "10 NETDEF REF%[SLOT=9, DROP=2, REGISTER=32]\n20 NETDEF THERE@[SLOT=9, DROP=2, REGISTER=1, BIT=3]\n"
+        "30 MEMDEF START_PB@, LAMP@\n40 TASK SPEED[TYPE=CONTROL, SLOT=1, PRIORITY=5]\n",
+    )
+    result = plant("import", "LINE1.CNF", "--output", "rack.yaml")
+    assert (result.code, result.err) == (0, "")
+    assert "  9: {module: 57C404, network: NET, drop: 0}" in (plant.folder / "rack.yaml").read_text()
+    config = load(plant.folder / "rack.yaml").config
+    assert [task.name for _, task in config.placed_tasks] == ["SPEED"]
+    points = {item.name: item.point for item in config.declared if item.point is not None}
+    assert {name: (point.slot, point.register, point.bit) for name, point in points.items()} == {
+        "REF%": (9, 2 * 64 + 32, None), "THERE@": (9, 2 * 64 + 1, 3)
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("word", "file"), [("CONTROL", "ONE.BLK"), ("BASIC", "ONE.BAS"), ("BLK", "ONE.BLK")])
+def test_types_of_tasks_in_words(automax, word, file):
+    automax.write(
+        file, "10 LOCAL A%\n20 A% = 1\n30 END\n" if word == "BASIC" else "10 CALL SCAN_LOOP(TICKS=2)\n20 END\n"
+    )
+    automax.write("R.CNF", f"10 TASK ONE[TYPE={word}, SLOT=1, PRIORITY=5]\n")
+    assert automax("import", "R.CNF", "--output", "r.yaml").code == 0
+    ((_, task),) = load(automax.folder / "r.yaml").config.placed_tasks
+    assert task.file.name == file
+
+
+def test_a_variable_named_like_a_word_of_the_language_is_told_and_left_out(automax):
+    """No task could use it, and the rack file would have an error; the others of its line are there."""
+    automax.write("R.CNF", "10 MEMDEF END, A%, STEP, TO%\n")
+    result = automax("import", "R.CNF", "--output", "r.yaml")
+    assert result.code == 1
+    assert "R.CNF:1:11: error[AMX6401]: END is a word of the language" in result.err
+    assert result.err.count("error[") == 2
+    assert [item.name for item in load(automax.folder / "r.yaml").config.declared] == ["A%", "TO%"]

@@ -228,3 +228,46 @@ def test_any_text_gives_a_rack_file_that_loads(tmp_path, text):
     (tmp_path / "ANY.BLK").write_bytes(b"10 COMMON A%\n" + text)
     assert main(["new", str(tmp_path), "--force"]) in (0, 1)
     assert load(tmp_path / "rack.yaml").config is not None
+
+
+UDC_TASK = (
+    "10 COMMON REF%, FB%, CUR%, OL@, RUN@, GAIN, WIDE!\n20 CALL SCAN_LOOP(TICKS={})\n"
+    "30 CALL LAG(INPUT=REF%, WLG=GAIN, RESET=-RUN@, OUTPUT=CUR%)\n"
+    "40 CALL THERMAL_OVERLOAD(I_FDBK=FB%, LIM_BAR=150, OVERLOAD=OL@)\n50 END\n"
+)
+
+
+def test_tasks_with_blocks_of_a_udc_stand_on_one(automax):
+    """Nothing says where their commons stand: each gets a place in the dual port that the check accepts."""
+    (automax.folder / "plant").mkdir()
+    other = UDC_TASK.replace("CUR%", "CUR_B%").replace("OL@", "OL_B@")
+    automax.write("plant/WIND_A.BLK", UDC_TASK.format(4))
+    automax.write("plant/WIND_B.BLK", other.format(4))
+    automax.write("plant/SPEED.BLK", "10 COMMON REF%, RUN@\n20 CALL SCAN_LOOP(TICKS=2)\n30 REF% = 5\n40 END\n")
+    result = automax("new", "plant")
+    assert (result.code, result.err) == (0, "")
+    config = load("plant/rack.yaml").config
+    modules = [(item.slot, item.model, [task.name for task in item.tasks]) for item in config.modules]
+    assert modules == [(0, "57C413", []), (1, "57C435", ["SPEED"]), (2, "57552", ["WIND_A", "WIND_B"])]
+    points = {item.name: item.point for item in config.declared}
+    assert {point.slot for point in points.values()} == {2}
+    places = [(point.register, point.bit) for point in points.values()]
+    assert len(set(places)) == len(places)
+    flags = {name: points[name].register for name in ("OL@", "OL_B@", "RUN@")}
+    assert flags["OL@"] // 2 == flags["OL_B@"] // 2 != flags["RUN@"] // 2  # a pair of registers goes one way
+    checked = automax("check", "plant/rack.yaml")
+    assert checked.code == 0
+    assert "error[" not in checked.out
+
+
+def test_tasks_of_other_ticks_have_a_udc_of_their_own(automax):
+    (automax.folder / "plant").mkdir()
+    other = UDC_TASK.replace("REF%", "R_B%").replace("FB%", "F_B%").replace("CUR%", "CUR_B%").replace("OL@", "OL_B@")
+    other = other.replace("RUN@", "RUN_B@").replace("GAIN", "G_B").replace("WIDE!", "W_B!")
+    automax.write("plant/WIND_A.BLK", UDC_TASK.format(4))
+    automax.write("plant/WIND_B.BLK", other.format(6))
+    assert automax("new", "plant", "--processors", "2").code == 0
+    modules = load("plant/rack.yaml").config.modules
+    assert [(item.slot, [task.name for task in item.tasks]) for item in modules if item.model == "57552"] == [
+        (3, ["WIND_A"]), (4, ["WIND_B"])
+    ]  # fmt: skip

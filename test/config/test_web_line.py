@@ -202,6 +202,15 @@ def changed(tmp_path: Path, ticks: int, scans: int, winder_ticks: int) -> Path:
     return folder
 
 
+def test_the_winder_does_not_turn_backwards_after_a_break():
+    rack = playing(WEB_BREAK)
+    speeds = [values(rack, 30 + number / 10, "WIND_SPD%", "WEB_LENGTH!") for number in range(80)]
+    assert min(speed for speed, _ in speeds) >= 0
+    lengths = [length for _, length in speeds]
+    assert lengths == sorted(lengths)
+    assert values(rack, 38.5, "WIND_RUN@") == [True]
+
+
 def test_with_two_ticks_the_udc_overlaps(tmp_path):
     """1241.73 us in 2 x 500 us: the README's exercise."""
     folder = changed(tmp_path, ticks=2, scans=10, winder_ticks=10)

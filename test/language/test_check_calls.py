@@ -236,3 +236,34 @@ def test_initial_values_before_scan_loop_are_no_conflict() -> None:
 
 def test_hexadecimal_constant_without_its_0_gets_a_hint():
     assert one(task("A% = FFH", declare=DECLARE)).hint == "a hexadecimal constant begins with a digit: 0FFH"
+
+
+@pytest.mark.parametrize(
+    ("call", "hint"),
+    [
+        ("LAGN(INPUT=A%, OUTPUT=B%)", "LOW_PASS_FILTER is meant"),
+        ("LEADN(INPUT=A%, OUTPUT=B%)", "HIGH_PASS_FILTER is meant"),
+        ("MULDIV(INPUT1=A%, OUTPUT=B%)", "MULTIPLY_DIVIDE is meant"),
+        ("DIFERENCE(INPUT1=A%, OUTPUT=B%)", "did you mean DIFFERENCE?"),
+        ("FOO(INPUT1=A%, OUTPUT=B%)", "`automax blocks` lists all blocks"),
+        ("NOTCHN(INPUT=A%, Q_FACTOR=1.0, WN=5.0, ORDER=2, OUTPUT=B%)", "it runs in UDC tasks: call it in one of these"),
+        ("LIMIT(INPUT=A%, LIMIT_PLUS=1.5, OUTPUT=B%)", "write a whole number"),
+        ("AND(INPUT1=X@, INPUT2=1, OUTPUT=Y@)", "write TRUE or FALSE"),
+    ],
+)
+def test_hints_say_what_to_do(call: str, hint: str) -> None:
+    assert (one(task(f"CALL {call}")).hint or "").startswith(hint)
+
+
+def test_what_moves_a_boolean() -> None:
+    found = problems(task("CALL MOVE(INPUT1=X@, OUTPUT1=Y@)"))
+    assert [item.code for item in found] == ["AMX2015", "AMX2015"]
+    assert all((item.hint or "").startswith("OR with INPUT1 alone passes a BOOLEAN on") for item in found)
+    assert codes(task("CALL OR(INPUT1=X@, OUTPUT=Y@)")) == []
+
+
+def test_a_number_that_does_not_fit_names_the_type_that_holds_it() -> None:
+    hint = "a DOUBLE INTEGER, which ends with !, is -2147483648 to 2147483647"
+    assert one(task("A% = 40000")).hint == hint
+    assert one(task("A% = 0FFFFH")).hint != hint
+    assert "at most 2147483647" in (problems(task("R = 99999999999"))[0].hint or "")
