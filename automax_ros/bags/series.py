@@ -14,7 +14,8 @@ from automax_ros.bags.reader import BagMessage, BagReader
 from automax_ros.bags.run_facts import run_facts
 from automax_ros.bags.span import span_of
 from automax_ros.bags.variables import Watched, watched_by_default, watched_by_name
-from automax_ros.core.names import NameFault
+from automax_ros.core.kinds import WriteKind, WriterKind
+from automax_ros.core.names import NameFault, element_name
 from automax_ros.core.ticks import seconds_text
 from automax_ros.wire.messages import CommonImage, CommonWrite, PlantState, Scan, TaskState, Variable, VariableTable
 
@@ -29,6 +30,9 @@ Change = tuple[int, dict[int, Cell]]
 """Nanoseconds from the start of the run, and the new values by index of column."""
 Progress = Callable[[float], None]
 """Takes the share that is done, 0 to 1."""
+TakeWrites = Callable[[int, WriterKind, Sequence[tuple[str, Cell]]], None]
+"""Takes the time from the start of the run in ns, who has written, and names with values."""
+_OUTSIDE = (WriterKind.ROS, WriterKind.OPERATOR)
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,10 @@ class Window:
     end_ns: int | None = None
     step_ns: int = 0
 
+    def holds(self, time_ns: int) -> bool:
+        """Whether an instant lies in it."""
+        return time_ns >= self.start_ns and (self.end_ns is None or time_ns <= self.end_ns)
+
 
 WHOLE_RUN = Window()
 
@@ -54,7 +62,7 @@ class Series:
     locals of tasks like ``SPEED.RATIO%``, signals of plants like ``UNWIND/current_a``.
     ``columns`` are the watched variables, ``rack`` and ``origin_ns`` the rack's name and the stamp at the start of its
     run; ``end_ns`` is the end of what was read, once it is read. ``take_scan``, if given, is called with each scan of
-    the window.
+    the window, ``take_writes`` with what operators, stimuli and ROS have written: who, and names with their values.
 
     Raises:
         BagError: the recording cannot be read or has no common memory, or a name in ``watch`` is unknown.
@@ -67,12 +75,13 @@ class Series:
         window: Window = WHOLE_RUN,
         progress: Progress | None = None,
         take_scan: Callable[[int, Scan], None] | None = None,
+        take_writes: TakeWrites | None = None,
     ) -> None:
         self._bag = bag
         self._window = window
         self._reader = BagReader(bag)
         self._reader.on_progress = progress
-        self._take_scan = take_scan
+        self._take_scan, self._take_writes = take_scan, take_writes
         types = _TYPES | {_SCAN} if take_scan else _TYPES
         if any(map(is_local, watch or ())):
             types |= {_STATE}
@@ -87,6 +96,8 @@ class Series:
         self.origin_ns = table.stamp
         self.end_ns = 0
         self._values = WatchedValues(self.columns)
+        self._outside = {item.id: WriterKind(item.kind) for item in table.writers if item.kind in _OUTSIDE}
+        self._named = {item.id: item for item in variables.values()}
         self._require_few_rows(progress)
 
     def changes(self) -> Iterator[Change]:
@@ -139,6 +150,8 @@ class Series:
                 told = self._plants.values(message)
             elif isinstance(message, (CommonImage, CommonWrite)):
                 entries = self._log.take(message)
+                if self._take_writes is not None and entries and isinstance(message, CommonWrite):
+                    self._tell_writes(message, entries)
             else:
                 self._take_other(entry)
                 continue
@@ -163,8 +176,19 @@ class Series:
             self._log.check_table(message)
         elif isinstance(message, Scan) and self._take_scan is not None:
             time = max(0, message.stamp - self.origin_ns)
-            if time >= self._window.start_ns and (self._window.end_ns is None or time <= self._window.end_ns):
+            if self._window.holds(time):
                 self._take_scan(time, message)
+
+    def _tell_writes(self, message: CommonWrite, entries: Iterable[Entry]) -> None:
+        """Tell what came from outside; the registers under I/O points are the same write once more."""
+        writer, time = self._outside.get(message.writer), max(0, message.stamp - self.origin_ns)
+        if writer is None or message.kind != WriteKind.OUTSIDE or not self._window.holds(time):
+            return
+        named = [(self._named[number], index, value) for number, index, value in entries if number in self._named]
+        points = [item for item in named if ":" not in item[0].name]
+        found = [(element_name(variable, index), value) for variable, index, value in points or named]
+        assert self._take_writes is not None
+        self._take_writes(time, writer, found)
 
     def _in_window(self, changes: Iterator[Change]) -> Iterator[Change]:
         """Leave out what is not wanted; begin with what holds at the start of the window."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from automax_ros.bags.errors import BagError
-from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
+from automax_ros.bags.series import WHOLE_RUN, Progress, Series, TakeWrites, Window
 from automax_ros.bags.variables import Watched
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
@@ -29,6 +30,16 @@ MAX_ERRORS = 1000
 Floats = npt.NDArray[np.float64]
 
 
+class Role(enum.IntEnum):
+    """What a line is among those of its lane, in the order of meaning: what is wanted, what comes of it, what is so."""
+
+    REFERENCE = 0
+    LAGGED = 1
+    FEEDBACK = 2
+    PLANT = 3
+    OTHER = 4
+
+
 @dataclass(frozen=True)
 class Line:
     """The course of one variable: each value holds from its time, in s of the run, to the next."""
@@ -36,6 +47,7 @@ class Line:
     variable: Watched
     times: Floats
     values: Floats
+    role: Role = Role.OTHER
 
 
 @dataclass(frozen=True)
@@ -60,14 +72,29 @@ class Traces:
     unmarked: int
 
 
-def traces(bag: Path, names: Sequence[str], window: Window = WHOLE_RUN, progress: Progress | None = None) -> Traces:
+def traces(
+    bag: Path,
+    names: Sequence[str],
+    window: Window = WHOLE_RUN,
+    progress: Progress | None = None,
+    take_scan: Callable[[int, Scan], None] | None = None,
+    take_writes: TakeWrites | None = None,
+) -> Traces:
     """Return the lines of variables such as ``REF%``, ``RUN@`` and ``TABLE%(3)``, in memory of bounded size.
+
+    ``take_scan`` and ``take_writes`` get what ``Series`` tells them on the way.
 
     Raises:
         BagError: the recording cannot be read, a name is unknown or a text, there are too many, or the window is empty.
     """
     errors = ErrorMarks()
-    series = Series(bag, names, window, progress, errors.take)
+
+    def scanned(time_ns: int, scan: Scan) -> None:
+        errors.take(time_ns, scan)
+        if take_scan is not None:
+            take_scan(time_ns, scan)
+
+    series = Series(bag, names, window, progress, scanned, take_writes)
     _check_names(bag, series.columns)
     courses = [Course() for _ in series.columns]
     for time, changed in series.changes():

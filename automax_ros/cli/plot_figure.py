@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from automax_ros.bags.traces import ErrorMark, Line, Traces, thinned
+from automax_ros.bags.traces import ErrorMark, Line, Role, Traces, thinned
 from automax_ros.bags.whole_file import written_whole
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import printable
@@ -24,6 +24,14 @@ _HIGHEST_IN = 40.0
 _ROW_FILL = 0.7
 _THICKEST = 1.9
 """Lines get thinner one after the other, and the later ones have gaps, so that one that lies under another is seen."""
+_ROLES: dict[Role, dict[str, Any]] = {
+    Role.PLANT: {"color": "#b4bfc5", "linewidth": 4.0, "linestyle": "-", "zorder": 2.0},
+    Role.FEEDBACK: {"color": "#1565c0", "linewidth": 1.3, "linestyle": "-", "zorder": 2.1},
+    Role.LAGGED: {"color": "#ef6c00", "linewidth": 1.3, "linestyle": (0, (5, 4)), "zorder": 2.2},
+    Role.REFERENCE: {"color": "#000000", "linewidth": 1.3, "linestyle": (0, (1, 4)), "zorder": 2.3},
+}
+"""How lines look that mean the same, and mostly agree: the plant's wide and pale underneath, what is wanted in thin
+dots on top, so that each is seen where all are equal (decision)."""
 _MOST_LONG_MARKS = 40
 """Up to this many errors are marked by a line through all lanes too."""
 _LABEL_PX = 90
@@ -126,17 +134,18 @@ def _points(line: Line, traces: Traces, width_px: int) -> tuple[list[float], lis
 def _draw_analog(axis: Any, lines: Sequence[Line], traces: Traces, width_px: int) -> None:
     drawn = []
     for number, line in enumerate(lines):
-        style = _LINE_STYLES[(number + number // 20) % len(_LINE_STYLES)]  # 40 lines look different
-        drawn += axis.plot(
-            *_points(line, traces, width_px),
-            drawstyle="steps-post",
-            linewidth=min(1.1 + 0.4 * (len(lines) - 1 - number), _THICKEST),
-            color=f"C{number % 10}",
-            linestyle=style,
-            gid=line.variable.label,
-        )
+        others = {
+            "linewidth": min(1.1 + 0.4 * (len(lines) - 1 - number), _THICKEST),
+            "color": f"C{number % 10}",
+            "linestyle": _LINE_STYLES[(number + number // 20) % len(_LINE_STYLES)],  # 40 lines look different
+        }
+        look = _ROLES.get(line.role, others)
+        points = _points(line, traces, width_px)
+        drawn += axis.plot(*points, drawstyle="steps-post", gid=line.variable.label, **look)
     labels = [f" {_plain(line.variable.label)}" for line in lines]  # a name may begin with _, which legends leave out
-    axis.legend(drawn, labels, loc="center left", bbox_to_anchor=(1.005, 0.5), fontsize=8, frameon=False)
+    axis.legend(
+        drawn, labels, loc="center left", bbox_to_anchor=(1.005, 0.5), fontsize=9, frameon=False, handlelength=3
+    )
     axis.set_ylabel(_plain(lines[0].variable.unit[:40]), fontsize=9)
     axis.tick_params(labelsize=8)
     axis.ticklabel_format(axis="y", useOffset=False)

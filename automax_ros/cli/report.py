@@ -1,8 +1,9 @@
-"""Report a drive's run from a recording: one HTML page that is whole by itself, and a picture.
+"""Report a run from a recording: one HTML page that is whole by itself, and a picture.
 
-Speed, current reference and feedback, DELTA, bridge, faults and errors with their times, rms current and energies, and
-what happened in which order; of every drive of the rack, or of the one whose current minor loop is in a task. Without
---output and --png both are written next to the recording: BAG_report.html and BAG_report.png.
+Of every drive of the rack, or of the one whose current minor loop is in a task: speed, current reference and feedback,
+DELTA, bridge, faults and errors with their times, rms current and energies, and what happened in which order. Of a rack
+without a drive the commons that its file watches, its tasks and what happened. Without --output and --png both are
+written next to the recording: BAG_report.html and BAG_report.png.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from automax_ros.bags.traces import MAX_LINES, Traces
 from automax_ros.cli.output_files import require_different_files, require_writable, write_text
 from automax_ros.cli.plot_figure import Layout, figure_of, picture_of, save
 from automax_ros.cli.progress import share_shown
-from automax_ros.cli.report_page import page
+from automax_ros.cli.report_page import page, rack_page
 from automax_ros.cli.signals import ended_by_signals
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import add_window_arguments, window_of
 from automax_ros.replay.drive_report import DriveReport, drive_report
+from automax_ros.replay.rack_report import RackReport, rack_report
 from automax_ros.replay.stored_rack import SourceRefused
 
 _WIDTH_PX = 1400
@@ -34,6 +36,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", "-o", type=Path, metavar="FILE.html", help="the page")
     parser.add_argument("--png", type=Path, metavar="FILE.png", help="the picture of all drives")
     parser.add_argument("--task", type=str.upper, metavar="NAME", help="the drive whose DC_DRIVE_CML is in this task")
+    parser.add_argument(
+        "--speed-ref",
+        action="append",
+        type=str.upper,
+        default=[],
+        metavar="[DRIVE=]NAME",
+        help="the common with a drive's speed reference: rpm where that is its unit, else 4095 counts at full speed "
+        "(default: that of its plant's joint)",
+    )
     add_window_arguments(parser)
 
 
@@ -47,19 +58,32 @@ def run(arguments: argparse.Namespace) -> int:
     require_different_files({}, {"--output": output, "--png": png})
     try:
         with ended_by_signals(), share_shown("report") as progress:
-            report = drive_report(bag, arguments.task, window_of(arguments), progress)
+            report = drive_report(bag, arguments.task, window_of(arguments), progress, _references(arguments.speed_ref))
+            whole = None if report.drives else rack_report(bag, window_of(arguments), progress)
     except SourceRefused as error:
         for source, diagnostics in error.findings:
             print_diagnostics(diagnostics, source, sys.stderr)
         raise UsageError(f"{bag}: the rack file stored inside has errors") from error
     name = bag.resolve().name
+    title = f"{report.rack[:80]}: {name[:80]}"
     if output is not None:
-        write_text(output, page(report, name, _pictures(report)))
+        write_text(output, page(report, name, _pictures(report)) if whole is None else _rack_page(whole, name))
     if png is not None:
-        save(figure_of(_together(report), Layout(f"{report.rack[:80]}: {name[:80]}", _WIDTH_PX)), png)
+        save(figure_of(_drawable(_together(report) if whole is None else whole.traces), Layout(title, _WIDTH_PX)), png)
     if arguments.output is None and arguments.png is None and sys.stderr.isatty():
         print(f"{output}, {png}", file=sys.stderr)
     return 0
+
+
+def _references(texts: list[str]) -> dict[str, str]:
+    """Return the commons that ``--speed-ref`` names, by drive; "" for the only one."""
+    found: dict[str, str] = {}
+    for text in texts:
+        drive, _, name = text.rpartition("=")
+        if drive.strip() in found:
+            raise UsageError(f"--speed-ref {text}: the drive has one already")
+        found[drive.strip()] = name.strip()
+    return found
 
 
 def _places(arguments: argparse.Namespace) -> tuple[Path | None, Path | None]:
@@ -75,6 +99,12 @@ def _places(arguments: argparse.Namespace) -> tuple[Path | None, Path | None]:
     return output, png
 
 
+def _rack_page(report: RackReport, name: str) -> str:
+    shown = report.traces
+    picture = picture_of(figure_of(shown, Layout(shown.rack[:80], _WIDTH_PX))) if shown.lines or shown.errors else None
+    return rack_page(report, name, picture)
+
+
 def _pictures(report: DriveReport) -> dict[str, bytes]:
     """Return the picture of each drive that has a course, as a PNG file."""
     found: dict[str, bytes] = {}
@@ -85,15 +115,15 @@ def _pictures(report: DriveReport) -> dict[str, bytes]:
     return found
 
 
-def _together(report: DriveReport) -> Traces:
-    """Return the lines of all drives for one picture: each has lanes of its own.
+def _drawable(traces: Traces) -> Traces:
+    if not traces.lines:
+        raise UsageError("the recording holds no course to draw", "--output alone writes the page")
+    return traces
 
-    Raises:
-        UsageError: the recording holds no course of a drive.
-    """
+
+def _together(report: DriveReport) -> Traces:
+    """Return the lines of all drives for one picture: each has lanes of its own."""
     all_traces = [report.traces(run, marks) for run, marks in report.drives]
-    if not any(traces.lines for traces in all_traces):
-        raise UsageError("the recording holds no course of a drive to draw", "--output alone writes the page")
     if len(all_traces) == 1:
         return all_traces[0]
     lines = []

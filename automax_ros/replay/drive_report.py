@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +11,10 @@ from automax_ros.bags.errors import BagError
 from automax_ros.bags.reader import BagReader
 from automax_ros.bags.series import WHOLE_RUN, Progress, Series, Window
 from automax_ros.bags.traces import MAX_LINES, ErrorMarks, Traces
-from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.display import meaning_of
 from automax_ros.replay.drive_run import DriveRun
 from automax_ros.replay.drive_signals import ReportDrive, report_drives
+from automax_ros.replay.happenings import ValuesSet, error_text, operation_text
 from automax_ros.replay.stored_rack import stored_rack
 from automax_ros.wire.messages import NAMES, Operation, PlantState, Scan
 
@@ -39,18 +38,26 @@ class DriveReport:
 
 
 def drive_report(
-    bag: Path, task: str | None = None, window: Window = WHOLE_RUN, progress: Progress | None = None
+    bag: Path,
+    task: str | None = None,
+    window: Window = WHOLE_RUN,
+    progress: Progress | None = None,
+    references: Mapping[str, str] | None = None,
 ) -> DriveReport:
-    """Return what a recording tells of its drives, or of the one whose loop is in ``task``.
+    """Return what a recording tells of its drives, or of the one whose loop is in ``task``; none where it has none.
+
+    ``references`` are commons with speed references, by the name of their drive (``report_drives``).
 
     Raises:
-        BagError: the recording cannot be read, has no drive, or holds nothing of it in the window.
+        BagError: the recording cannot be read, ``task`` has no drive, or it holds nothing of them in the window.
         SourceRefused: the rack file stored inside has errors.
     """
     stored = stored_rack(BagReader(bag))
-    drives = report_drives(stored, task)
+    drives = report_drives(stored, task, references)
     if len(drives) > MOST_DRIVES:
         raise BagError("AMX6826", bag, f"{len(drives)} drives for one report: {MOST_DRIVES} are the limit")
+    if not drives:
+        return DriveReport(stored.config.name, 0.0, 0.0, ())
     reader = _Reader(bag, drives, window)
     reader.read_commons(progress and (lambda share: progress(share / 2)))
     reader.read_plants(progress and (lambda share: progress((1 + share) / 2)))
@@ -63,6 +70,7 @@ class _Reader:
     def __init__(self, bag: Path, drives: Sequence[ReportDrive], window: Window) -> None:
         self._bag, self._window = bag, window
         self._found = [(DriveRun(drive), ErrorMarks()) for drive in drives]
+        self._set = ValuesSet()
         self._rack = ""
         self._origin_ns = 0
         self._start_s: float | None = None
@@ -74,7 +82,7 @@ class _Reader:
         for run, _ in self._found:
             for keyword, signal in run.drive.signals.items():
                 wanted[signal.variable].append((run, keyword))
-        series = Series(self._bag, list(wanted), self._window, progress, self._take_scan)
+        series = Series(self._bag, list(wanted), self._window, progress, self._take_scan, self._set.take)
         self._rack, self._origin_ns = series.rack, series.origin_ns
         of_column = [wanted[item.label] for item in series.columns]
         for time_ns, changed in series.changes():
@@ -106,12 +114,12 @@ class _Reader:
             message = entry.message
             assert isinstance(message, (PlantState, Operation))
             time_ns = message.stamp - self._origin_ns
-            if time_ns < self._window.start_ns or (self._window.end_ns is not None and time_ns > self._window.end_ns):
+            if not self._window.holds(time_ns):
                 continue
             time_s = time_ns / NS_PER_S
             if isinstance(message, Operation):
-                for run, _ in self._found:
-                    run.tell(time_s, "operation", operation_text(message))
+                for run, _ in self._found if (text := operation_text(message)) else ():
+                    run.tell(time_s, "operation", text)
             elif message.plant in runs:
                 runs[message.plant].take_plant(time_s, message)
                 self._start_s = time_s if self._start_s is None else min(self._start_s, time_s)
@@ -121,22 +129,6 @@ class _Reader:
         """Return all that was read."""
         for run, _ in self._found:
             run.finish(self._end_s)
+            run.happened.finish(self._set)
         start_s = max(self._start_s or 0.0, self._window.start_ns / NS_PER_S)
         return DriveReport(self._rack, start_s, self._end_s, tuple(self._found))
-
-
-def error_text(code: int, line: int) -> str:
-    """Return an entry of a task's error log in words."""
-    name = f"AMX{code:04d}"
-    problem = PROBLEMS.get(name)
-    title = f": {problem.title}" if problem is not None else ""
-    hardware = f", code {problem.hardware}" if problem is not None and problem.hardware else ""
-    return f"{name}{title} (line {line}{hardware})"
-
-
-def operation_text(operation: Operation) -> str:
-    """Return an operation in words."""
-    words = " ".join(text for text in (operation.what, operation.task, operation.detail) if text)
-    if operation.what == "stop_all" and operation.detail:
-        words += f": code {operation.detail}, {meaning_of(operation.detail)}"
-    return words if operation.ok else f"{words}: refused, {operation.reason}"

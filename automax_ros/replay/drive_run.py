@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 
-from automax_ros.bags.traces import Course, Line
+from automax_ros.bags.traces import Course, Line, Role
 from automax_ros.bags.variables import Watched
 from automax_ros.core.types import DataType
 from automax_ros.drive.cml.faults import KINDS
 from automax_ros.drive.cml.reference import FULL
 from automax_ros.drive.errors import LARGEST
 from automax_ros.drive.scr import FORWARD, PARTNER
-from automax_ros.replay.drive_signals import ReportDrive, Signal
+from automax_ros.replay.drive_signals import SPEED_REF, ReportDrive, Signal
 from automax_ros.replay.drive_totals import CountTotals, PlantTotals, rpm_of
+from automax_ros.replay.happenings import MOST_EVENTS, Event, Happenings
 from automax_ros.wire.messages import PlantState
 
 FAULTS = tuple(kind.output.upper() for kind in KINDS)
@@ -33,22 +33,9 @@ STATES = {
 DRAWN_STATES = ("CML_RUN", "DC_CML_STATE", "BRIDGE_POL")
 SUSPECT = "BAD_SCR_NUM"
 """The output with the number of a suspected SCR: that one or its anti-parallel partner (52.3.1)."""
-MOST_EVENTS = 2000
-"""Most events of a kind, and faults, of one drive that are kept; the first ones are (decision: a bound on memory)."""
 MOST_BROKEN = 40
 """Most things that are broken in one plant."""
-LONGEST = 300
-"""Longest text of an event."""
 PERCENT_SPEED, PERCENT_CURRENT, DEGREES = "% of full speed", "% of rated current", "deg"
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened, s of the run. ``kind``: ``state``, ``fault``, ``error``, ``plant`` or ``operation``."""
-
-    time_s: float
-    kind: str
-    text: str
 
 
 @dataclass(frozen=True)
@@ -71,7 +58,7 @@ class DriveRun:
         counts: totals from its commons.
         plant: totals from its plant's messages.
         faults: fault outputs that were on and are off again; ``finish`` adds the others. ``fault_count`` is how many.
-        events: what happened, at most ``MOST_EVENTS`` of a kind; ``untold`` counts the rest.
+        happened: the events, by which the sequence is told.
         starts, changes: how often it began to run, and how often the bridge changed while it ran.
     """
 
@@ -79,22 +66,23 @@ class DriveRun:
     counts: CountTotals = field(init=False)
     plant: PlantTotals = field(default_factory=PlantTotals)
     faults: list[FaultSpan] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
+    happened: Happenings = field(default_factory=Happenings)
     fault_count: int = 0
-    untold: int = 0
     starts: int = 0
     changes: int = 0
     _values: dict[str, float] = field(default_factory=dict)
-    _courses: dict[tuple[str, str, DataType], Course] = field(default_factory=dict)
+    _courses: dict[tuple[str, str, DataType, Role], Course] = field(default_factory=dict)
     _begun: dict[str, float] = field(default_factory=dict)
     _time_s: float | None = None
     _broken: tuple[str, ...] = ()
     _contactor: bool | None = None
-    _told: Counter[str] = field(default_factory=Counter)
+    _base_rpm: float | None = field(init=False)
 
     def __post_init__(self) -> None:
         """Begin with nothing known."""
-        self.counts = CountTotals(self.drive.parameters)
+        parameters = self.drive.parameters
+        self.counts = CountTotals(parameters)
+        self._base_rpm = rpm_of(parameters.values["base_speed_rad_s"].value) if parameters is not None else None
 
     def take(self, time_s: float, changed: Mapping[str, float]) -> None:
         """Take the new values of signals, by keyword, at an instant; a fault is told before what follows from it.
@@ -172,13 +160,33 @@ class DriveRun:
             unit, convert = _CONVERSIONS[keyword]
             found = convert(self)
             shown = (unit, found) if found is not None else ("counts", self._values[keyword])
-            self._append(label, shown[0], DataType.REAL, time_s, shown[1])
+            self._append(label, shown[0], DataType.REAL, time_s, shown[1], _ROLES.get(keyword, Role.OTHER))
+        elif keyword == SPEED_REF:
+            self._draw_reference(label, time_s, signal)
         elif keyword.startswith("register "):
-            self._append(label, "counts", DataType.REAL, time_s, self._values[keyword])
+            self._append(label, signal.text or "counts", DataType.REAL, time_s, self._values[keyword])
 
-    def _append(self, label: str, unit: str, kind: DataType, time_s: float, value: float) -> None:
+    def _append(
+        self, label: str, unit: str, kind: DataType, time_s: float, value: float, role: Role = Role.OTHER
+    ) -> None:
         if isfinite(value):
-            self._courses.setdefault((label, unit, kind), Course()).append(time_s, value)
+            self._courses.setdefault((label, unit, kind, role), Course()).append(time_s, value)
+
+    def _draw_reference(self, label: str, time_s: float, signal: Signal) -> None:
+        value = self._values[signal.keyword]
+        if signal.scale is not None:
+            value = signal.scale.value_of(int(value))
+        if signal.is_rpm:
+            self._draw_speed(label, time_s, value, Role.REFERENCE)
+        else:
+            self._append(label, PERCENT_SPEED, DataType.REAL, time_s, 100 * value / FULL, Role.REFERENCE)
+
+    def _draw_speed(self, label: str, time_s: float, rpm: float, role: Role) -> None:
+        """Draw a speed in rpm next to the counts of SPEED_FDBK, where the motor's base speed is known."""
+        if self._base_rpm is None:
+            self._append(label, "rpm", DataType.REAL, time_s, rpm, role)
+        else:
+            self._append(label, PERCENT_SPEED, DataType.REAL, time_s, 100 * rpm / self._base_rpm, role)
 
     def degrees(self) -> float | None:
         """Return DELTA in degrees of the line's period, measured where it is recorded."""
@@ -192,14 +200,13 @@ class DriveRun:
             return
         self.plant.take(message)
         parameters = self.drive.parameters
+        self._draw_speed("speed of the plant", time_s, message.speed_rpm, Role.PLANT)
+        label = "current of the plant"
         if parameters is None:
-            self._append("speed of the plant", "rpm", DataType.REAL, time_s, message.speed_rpm)
-            self._append("current of the plant", "A", DataType.REAL, time_s, message.current_a)
+            self._append(label, "A", DataType.REAL, time_s, message.current_a, Role.PLANT)
         else:
-            base = rpm_of(parameters.values["base_speed_rad_s"].value)
-            speed, current = 100 * message.speed_rpm / base, 100 * message.current_a / parameters.amps
-            self._append("speed of the plant", PERCENT_SPEED, DataType.REAL, time_s, speed)
-            self._append("current of the plant", PERCENT_CURRENT, DataType.REAL, time_s, current)
+            current = 100 * message.current_a / parameters.amps
+            self._append(label, PERCENT_CURRENT, DataType.REAL, time_s, current, Role.PLANT)
         if "BRIDGE_POL" not in self.drive.signals:
             for number in (1, 2):
                 conducts = float(message.bridge == number)
@@ -219,13 +226,19 @@ class DriveRun:
                 self.tell(time_s, "plant", f"the plant has {name} no longer")
         self._broken = broken
 
+    @property
+    def events(self) -> list[Event]:
+        """What happened, in the order of time once it is finished."""
+        return self.happened.events
+
+    @property
+    def untold(self) -> int:
+        """How many events are not kept."""
+        return self.happened.untold
+
     def tell(self, time_s: float, kind: str, text: str) -> None:
         """Note an event."""
-        self._told[kind] += 1
-        if self._told[kind] <= MOST_EVENTS:
-            self.events.append(Event(time_s, kind, text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."))
-        else:
-            self.untold += 1
+        self.happened.tell(time_s, kind, text)
 
     def finish(self, end_s: float) -> None:
         """End the run: what still holds, holds to the end."""
@@ -236,16 +249,18 @@ class DriveRun:
             self.faults.append(FaultSpan(keyword, signal.variable, what, begin_s, None))
         self._begun.clear()
         self.faults.sort(key=lambda span: (span.begin_s, FAULTS.index(span.keyword)))
-        self.events.sort(key=lambda event: event.time_s)
 
     @property
     def lines(self) -> list[Line]:
-        """The courses for a picture: speed, current, DELTA, what else is counted, then booleans."""
-        order = [PERCENT_SPEED, "rpm", PERCENT_CURRENT, "A", DEGREES, "counts", ""]
-        keys = sorted(self._courses, key=lambda key: order.index(key[1]))
+        """The courses for a picture: speed, current, DELTA, counts, words of bits, then booleans; by their meaning."""
+        order = {
+            unit: place for place, unit in enumerate((PERCENT_SPEED, "rpm", PERCENT_CURRENT, "A", DEGREES, "counts"))
+        }
+        keys = sorted(self._courses, key=lambda key: (not key[1], order.get(key[1], len(order)), key[3]))
         return [
-            Line(Watched(label, number, 0, kind, unit), *self._courses[label, unit, kind].line())
-            for number, (label, unit, kind) in enumerate(keys)
+            Line(Watched(label, number, 0, kind, unit), *self._courses[key].line(), role)
+            for number, key in enumerate(keys)
+            for label, unit, kind, role in [key]
         ]
 
 
@@ -274,3 +289,9 @@ _CONVERSIONS: dict[str, tuple[str, Callable[[DriveRun], float | None]]] = {
     "DELTA": (DEGREES, DriveRun.degrees),
 }
 """The numbers that are drawn: unit and value; counts where the scale is not known."""
+_ROLES = {
+    "REFERENCE": Role.REFERENCE,
+    "REF_LAG_OUT": Role.LAGGED,
+    "I_FDBK": Role.FEEDBACK,
+    "SPEED_FDBK": Role.FEEDBACK,
+}

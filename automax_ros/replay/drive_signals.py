@@ -7,17 +7,21 @@ from dataclasses import dataclass, field
 
 from automax_ros.bags.errors import BagError
 from automax_ros.core.names import NameFault, element
+from automax_ros.core.text import quoted
+from automax_ros.core.types import DataType
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.nameplate import DriveParameters
+from automax_ros.drive.pmi_table import COMMAND_REGISTERS, CURRENT, FEEDBACK_REGISTERS, SPEED
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.statement_text import print_expression
 from automax_ros.language.syntax.tree import Element, Expression, Reference, Scope, Unary
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.drives import RackDrive, given_inputs, rack_drives
+from automax_ros.rack.scale import Scale
 from automax_ros.replay.stored_rack import StoredRack
 
-CURRENT_REGISTER = 207
-"""Register of a UDC with the current feedback of drive A, 4095 at the Motor Overload Ratio (36)."""
+SPEED_REF = "SPEED_REF"
+"""The keyword of the speed reference, which is no parameter of the block: the rack file or a person names it."""
 SECOND_DRIVE = 1000
 """What is added to a register of drive A for that of drive B."""
 PMI_REGISTERS = range(100, 300)
@@ -35,12 +39,16 @@ class Signal:
         variable: the common, or the element of one, as a recording names it.
         inverted: whether the CALL turns it round.
         text: what the signal is, in words.
+        scale: what its counts mean in rpm, None for one that is not counts of rpm.
+        is_rpm: whether it is a speed in rpm, by its scale or as it is.
     """
 
     keyword: str
     variable: str
     inverted: bool = False
     text: str = ""
+    scale: Scale | None = None
+    is_rpm: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,11 +76,15 @@ class ReportDrive:
     line_hz: float = 60.0
 
 
-def report_drives(stored: StoredRack, task: str | None = None) -> list[ReportDrive]:
+def report_drives(
+    stored: StoredRack, task: str | None = None, references: Mapping[str, str] | None = None
+) -> list[ReportDrive]:
     """Return the drives of a recorded rack in the order of slots, or the one whose loop is in ``task``.
 
+    ``references`` are the commons with the drives' speed references, by the drive's name, "" for the only one.
+
     Raises:
-        BagError: there is no drive, or no such task, or it has no current minor loop.
+        BagError: no such task, or it has no current minor loop; a reference is of no drive, or not a common.
     """
     programs = stored.programs()
     drives = rack_drives(stored.config, programs)
@@ -80,15 +92,46 @@ def report_drives(stored: StoredRack, task: str | None = None) -> list[ReportDri
     if task is not None:
         stored.require_tasks([task])
         drives = [drive for drive in drives if drive.program is not None and drive.program.name == task]
-    if not drives:
-        what = f"task {task} of it has no DC_DRIVE_CML" if task is not None else "its rack has no drive"
-        hint = "a drive is a 57C406 or a UDC with a plant, or a task with DC_DRIVE_CML; `automax plot` draws variables"
-        hint = f"give --task {' or '.join(loops)}, or leave it out" if loops else hint
-        raise BagError("AMX6860", stored.bag, f"{what}, so there is nothing to report", hint)
-    return [_report_drive(drive, stored.config, programs) for drive in drives]
+        if not drives:
+            named = f"give --task {' or '.join(loops)}, or leave it out: " if loops else ""
+            hint = f"{named}without --task the report is of the whole rack"
+            raise BagError("AMX6860", stored.bag, f"task {task} of it has no DC_DRIVE_CML", hint)
+    given = _given_references(stored, [drive.name for drive in drives], references or {})
+    return [_report_drive(drive, stored.config, programs, given.get(drive.name)) for drive in drives]
 
 
-def _report_drive(drive: RackDrive, config: RackConfig, programs: Sequence[Program]) -> ReportDrive:
+def _given_references(stored: StoredRack, drives: Sequence[str], references: Mapping[str, str]) -> dict[str, Signal]:
+    """Return the speed references that a person names, by drive."""
+    found: dict[str, Signal] = {}
+    for drive, name in references.items():
+        owner = drives[0] if not drive and len(drives) == 1 else drive
+        if owner not in drives:
+            what = (
+                f"{quoted(drive)} is not a drive of the report" if drive else f"the report is of {len(drives)} drives"
+            )
+            hint = f"write {' or '.join(f'{item}={name}' for item in drives)}" if drives else None
+            raise BagError("AMX6841", stored.bag, f"speed reference {quoted(name)}: {what}", hint)
+        try:
+            meant = element(name, stored.config.by_name, "speed reference: the rack has no common variable")
+        except NameFault as fault:
+            raise BagError("AMX6841", stored.bag, fault.message, fault.hint) from fault
+        if meant.variable.type in (DataType.STRING, DataType.BOOLEAN):
+            raise BagError("AMX6841", stored.bag, f"speed reference: {meant.label} is {meant.variable.type.word}")
+        found[owner] = Signal(SPEED_REF, meant.label, is_rpm=meant.variable.unit.strip().lower() == "rpm")
+    return found
+
+
+def _named_reference(drive: RackDrive, config: RackConfig) -> Signal | None:
+    """Return the speed reference that the rack file names: the common of the velocity of its plant's joint."""
+    for command in config.joint_commands:
+        if drive.plant is not None and (command.plant, command.interface) == (drive.plant.name, "velocity"):
+            return Signal(SPEED_REF, command.common, scale=command.scale, is_rpm=True)
+    return None
+
+
+def _report_drive(
+    drive: RackDrive, config: RackConfig, programs: Sequence[Program], reference: Signal | None
+) -> ReportDrive:
     try:
         data = drive.data
     except ParameterError:  # the rack file was right when it was recorded; the report does without
@@ -98,6 +141,9 @@ def _report_drive(drive: RackDrive, config: RackConfig, programs: Sequence[Progr
     signals, unseen = _of_call(drive, config)
     if drive.letter:
         signals = _of_registers(drive, config)
+    reference = reference or _named_reference(drive, config)
+    if reference is not None:
+        signals[SPEED_REF] = reference
     hertz = data.parameters.line_hz if data is not None else line_hz.value if line_hz is not None else None
     return ReportDrive(
         drive.name,
@@ -146,11 +192,18 @@ def _common(expression: Expression, program: Program, config: RackConfig) -> str
 def _of_registers(drive: RackDrive, config: RackConfig) -> dict[str, Signal]:
     """Return the command and feedback registers of a UDC's drive that have commons."""
     found = sorted(_registers(drive, config))[:MOST_REGISTERS]
-    return {_keyword(register): Signal(_keyword(register), name) for register, name in found}
+    return {
+        (keyword := _KEYWORDS.get(register, f"register {register}")): Signal(
+            keyword, name, text=_WORDS.get(register, "")
+        )
+        for register, name in found
+    }
 
 
-def _keyword(register: int) -> str:
-    return "I_FDBK" if register == CURRENT_REGISTER else f"register {register}"
+_KEYWORDS = {CURRENT: "I_FDBK", SPEED: "SPEED_FDBK"}
+"""What registers of a PMI are that a current minor loop has too; 4095 counts are full scale of both (36)."""
+_WORDS = {item.number: item.meaning for item in (*COMMAND_REGISTERS, *FEEDBACK_REGISTERS) if item.bits}
+"""Registers of a PMI that are words of bits: a number says nothing next to others."""
 
 
 def _registers(drive: RackDrive, config: RackConfig) -> Iterator[tuple[int, str]]:

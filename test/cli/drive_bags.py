@@ -5,7 +5,7 @@ from pathlib import Path
 from bags.recordings import RUN
 
 from automax_ros.bags.writer import BagWriter
-from automax_ros.core.kinds import WriteKind
+from automax_ros.core.kinds import WriteKind, WriterKind
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.wire.cdr import encode
 from automax_ros.wire.messages import (
@@ -18,11 +18,17 @@ from automax_ros.wire.messages import (
     ScanError,
     Variable,
     VariableTable,
+    Writer,
 )
 from automax_ros.wire.qos import LATCHED, SCAN
 from automax_ros.wire.values import Values
 
 S = 1_000_000_000
+WRITERS = (
+    Writer(1, "ros", WriterKind.ROS, 0),
+    Writer(2, "operator", WriterKind.OPERATOR, 0),
+    Writer(3, "T", WriterKind.TASK, 1),
+)
 
 
 class DriveBag:
@@ -35,7 +41,7 @@ class DriveBag:
         for name, text in sources.items():
             self._writer.attach(name, "text/plain", text.encode())
         variables = tuple(Variable(number, name, type_of_name(name).number) for number, name in enumerate(names))
-        self._send("variables", VariableTable(0, "D1", RUN, variables, ()), 0, LATCHED)
+        self._send("variables", VariableTable(0, "D1", RUN, variables, WRITERS), 0, LATCHED)
         zeros = [0.0 for name in names if type_of_name(name) is not DataType.STRING]
         values = Values(range(len(names)), [0] * len(names), zeros, ())
         self._send("backplane/snapshot", CommonImage(0, RUN, 0, values), 0, LATCHED)
@@ -48,12 +54,19 @@ class DriveBag:
 
     def write(self, time_s: float, **changes: float) -> None:
         """Change commons; a name ends with I for %, B for @, so REF_I is REF%."""
+        self._write(time_s, 3, WriteKind.COMMIT, changes)
+
+    def outside(self, time_s: float, writer: str, **changes: float) -> None:
+        """Let the operator, or somebody in ROS, change commons."""
+        self._write(time_s, {"ros": 1, "operator": 2}[writer], WriteKind.OUTSIDE, changes)
+
+    def _write(self, time_s: float, writer: int, kind: WriteKind, changes: dict[str, float]) -> None:
         self._sequence += 1
         marks = {"I": "%", "B": "@"}
         numbers = [self._names.index(f"{name[:-2]}{marks[name[-1]]}") for name in changes]
         values = Values(numbers, [0] * len(numbers), [float(value) for value in changes.values()], ())
         stamp = round(time_s * S)
-        self._send("backplane", CommonWrite(stamp, RUN, 1, 1, WriteKind.COMMIT, self._sequence, values), stamp, SCAN)
+        self._send("backplane", CommonWrite(stamp, RUN, writer, 1, kind, self._sequence, values), stamp, SCAN)
 
     def error(self, time_s: float, task: str, line: int, code: int) -> None:
         """Let a task log an error."""

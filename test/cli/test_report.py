@@ -9,7 +9,9 @@ import zlib
 import pytest
 
 from automax_ros.bags.series import Window
+from automax_ros.cli.plot_figure import Layout, figure_of
 from automax_ros.replay.drive_report import drive_report
+from automax_ros.replay.rack_report import rack_report
 
 from .drive_bags import DriveBag
 from .drive_racks import COMMONS, loop_task, rack_file, write_rack
@@ -207,6 +209,51 @@ def test_a_window_holds_what_was_before_it(automax, bag):
     assert run.events == []
 
 
+def test_lines_of_a_lane_that_agree_are_all_seen(automax, bag):
+    """Finding 16: the last line hid the others. Now the plant's is wide and underneath, the reference on top."""
+    with bag() as recording:
+        run_of(recording)
+        recording.plant(2.0, current_a=AMPS / 4)
+    report = drive_report(automax.folder / "bag")
+    ((run, marks),) = report.drives
+    figure = figure_of(report.traces(run, marks), Layout("one"))
+    lane = next(axis for axis in figure.axes if axis.get_ylabel() == "% of rated current")
+    lines = [line for line in lane.get_lines() if line.get_gid()]  # the others mark errors
+    labels = [text.get_text().strip() for text in lane.get_legend().get_texts()]
+    assert labels == [line.get_gid() for line in lines] == [
+        "REFERENCE REF%", "REF_LAG_OUT CUR_REF%", "I_FDBK CUR_FB%", "current of the plant"
+    ]  # fmt: skip
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 4
+    *others, plant = lines
+    assert plant.get_zorder() < min(line.get_zorder() for line in others)
+    assert plant.get_linewidth() > 2 * max(line.get_linewidth() for line in others)
+    assert [line.get_zorder() for line in lines] == sorted((line.get_zorder() for line in lines), reverse=True)
+
+
+def test_a_speed_reference_is_drawn_where_somebody_names_it(automax, bag):
+    """Finding 22. The joint of the plant names one; `--speed-ref` names another."""
+    rack = rack_file(more="  SP%: {unit: rpm, ros: in}\n  COUNTS%: {}\n  NOTE$: {}\n")
+    joint = rack.replace(
+        "  UNWIND: {", "  UNWIND: {joint: {velocity: {common: SP%, scale: {counts: [0, 100], value: [0, 875]}}}, "
+    )
+    assert joint != rack
+    names = [*COMMONS, "SP%", "COUNTS%"]
+    for name, text in (("bag", rack), ("joint", joint)):
+        with bag(name=name, rack=text, names=names) as recording:
+            recording.write(1.0, SP_I=100, COUNTS_I=2048)
+    assert not any("SPEED_REF" in label for label in lines_of(automax.folder / "bag"))
+    line = lines_of(automax.folder / "joint")["SPEED_REF SP%"]
+    assert (line.variable.unit, line.values[-1]) == ("% of full speed", pytest.approx(50.0, rel=1e-3))
+    line = lines_of(automax.folder / "bag", references={"": "SP%"})["SPEED_REF SP%"]
+    assert line.values[-1] == pytest.approx(100 / 17.5, rel=1e-3)
+    line = lines_of(automax.folder / "joint", references={"UNWIND": "COUNTS%"})["SPEED_REF COUNTS%"]
+    assert line.values[-1] == pytest.approx(2048 / 40.95)
+    for given, told in (("NONE%", "no common variable"), ("NOTE$", "is STRING"), ("WIND=SP%", "is not a drive of it")):
+        result = automax("report", "bag", "--speed-ref", given, "--output", "page.html")
+        assert (result.code, "AMX6841" in result.err, told in result.err) == (2, True, True), result.err
+    assert "has one already" in automax("report", "bag", "--speed-ref", "SP%", "--speed-ref", "SP%").err
+
+
 def test_an_inverted_input_is_turned_round(automax, bag):
     with bag(task=loop_task(CML_RUN="-RUN@")) as recording:
         recording.write(1.0, RUN_B=1)
@@ -342,13 +389,19 @@ def test_a_drive_of_a_udc_is_reported_as_far_as_it_is_known(automax, bag):
     rack = (
         "rack: U\nslots:\n  0: {module: 57C413}\n  1: {module: 57C435}\n  5: {module: 57552, plants: {B: W}}\nplants:\n"
         "  W: {motor: dc_10hp_240v, motor_overload_ratio: 200}\ncommon:\n  CUR%: {slot: 5, register: 1207}\n"
+        "  SPD%: {slot: 5, register: 1204}\n  FAULTS%: {slot: 5, register: 1202}\n"
         "  CMD%: {slot: 5, register: 1101}\n  OTHER%: {slot: 5, register: 207}\n"
     )
     folder = automax.folder / "bag"
-    with DriveBag(folder, rack, ["CUR%", "CMD%", "OTHER%"], {}) as recording:
-        recording.write(1.0, CUR_I=4095, CMD_I=7, OTHER_I=3)
+    with DriveBag(folder, rack, ["CUR%", "CMD%", "OTHER%", "SPD%", "FAULTS%"], {}) as recording:
+        recording.write(1.0, CUR_I=4095, CMD_I=7, OTHER_I=3, SPD_I=409, FAULTS_I=-32768)
         recording.plant(2.0, "W", speed_rpm=175.0, slot=5, drive="B")
     lines = lines_of(folder)
+    speed = [lines[label] for label in ("SPEED_FDBK SPD%", "speed of the plant")]
+    assert [line.variable.unit for line in speed] == ["% of full speed"] * 2  # finding 22: the fault word stood there
+    assert (lines["register 202 FAULTS%"].variable.unit, lines["register 101 CMD%"].variable.unit) == (
+        "faults, latched", "counts"
+    )  # fmt: skip
     assert lines["I_FDBK CUR%"].values[-1] == pytest.approx(200.0)
     assert lines["register 101 CMD%"].values[-1] == 7
     assert lines["speed of the plant"].values[-1] == pytest.approx(10.0)
@@ -386,13 +439,67 @@ def test_a_cut_recording_is_refused_with_the_way_to_repair_it(automax, bag):
     assert not (automax.folder / "page.html").exists()
 
 
-def test_a_recording_without_a_drive_is_refused(automax, bag):
-    with bag(rack="rack: D\nslots: {0: {module: 57C413}, 1: {module: 57C435}}\ncommon: {REF%: {}}\n", names=["REF%"]):
+PLAIN = (
+    "rack: D\nwatch: [REF%, RUN@]\nslots: {0: {module: 57C413}, 1: {module: 57C435, tasks: {LINE: {priority: 5}}}}\n"
+    "common: {SP%: {ros: in}, REF%: {unit: fpm}, RUN@: {}}\n"
+)
+LINE = "10 COMMON SP%, REF%\n20 CALL SCAN_LOOP(TICKS=2)\n30 CALL LIMIT(INPUT=SP%, OUTPUT=REF%)\n40 END\n"
+
+
+def test_a_rack_without_a_drive_is_reported_as_far_as_it_goes(automax):
+    """Finding 22: such a recording was refused."""
+    with DriveBag(automax.folder / "bag", PLAIN, ["SP%", "REF%", "RUN@"], {"LINE.BLK": LINE}) as recording:
+        recording.write(1.0, RUN_B=1)
+        recording.error(1.5, "LINE", 30, 7001)
+        recording.write(2.0, REF_I=1500)
+        recording.operation(3.0, "stop", "", "it is critical")
+    result = automax("report", "bag")
+    assert (result.code, result.out, result.err) == (0, "", "")
+    page = (automax.folder / "bag_report.html").read_text()
+    assert ["LINE", "57C435 in slot 1", "11", "1", "1"] in cells_of(page)
+    told = [row for row in sequence_of(page) if row[1]]
+    assert [(time, kind) for time, kind, _ in told] == [("1.5000", "error"), ("3.0000", "operation")]
+    assert told[0][2].startswith("LINE: AMX7001")
+    assert told[1][2] == "stop: refused, it is critical"
+    assert "data:image/png" in page
+    assert chunks_of((automax.folder / "bag_report.png").read_bytes())[0] == b"IHDR"
+    report = rack_report(automax.folder / "bag")
+    assert [line.variable.label for line in report.traces.lines] == ["REF%", "RUN@"]
+    later = rack_report(automax.folder / "bag", Window(2 * 10**9, None))
+    assert [(task.scans, task.errors) for task in later.tasks] == [(0, 0)]
+
+
+def test_a_rack_without_anything_to_draw_has_a_page(automax):
+    rack = "rack: D\nslots: {0: {module: 57C413}, 1: {module: 57C435}}\ncommon: {REF%: {ros: closed}}\n"
+    with DriveBag(automax.folder / "bag", rack, ["REF%"], {}):
         pass
-    result = automax("report", "bag", "--output", "page.html")
-    assert result.code == 2
-    assert "AMX6860" in result.err
-    assert "hint: a drive is a 57C406" in result.err
+    assert automax("report", "bag", "--output", "page.html").code == 0
+    result = automax("report", "bag", "--png", "page.png")
+    assert (result.code, "no course to draw" in result.err) == (2, True)
+
+
+def test_what_an_operator_a_person_in_ros_and_stimuli_set_is_in_the_sequence(automax, bag):
+    """Finding 22: it was missing. A ramp's samples are one event; what ROS says again is told once."""
+    names = [*COMMONS, "SP%"]
+    with bag(rack=rack_file(more="  SP%: {ros: in}\n"), names=names) as recording:
+        recording.outside(1.0, "operator", SP_I=5)
+        recording.outside(1.2, "operator", SP_I=5)
+        for step in range(50):
+            recording.outside(2.0 + step * 0.001, "operator", SP_I=step)
+        for step in range(5):
+            recording.outside(3.0 + 0.1 * step, "ros", RUN_B=1)
+        recording.write(4.0, SP_I=7)
+        recording.operation(4.5, "set", "SP% = 5")
+        recording.outside(4.5, "operator", SP_I=5)
+    assert automax("report", "bag", "--output", "page.html").err == ""
+    page = (automax.folder / "page.html").read_text()
+    assert [row for row in sequence_of(page) if row[1] == "operation"] == [
+        ("1.0000", "operation", "set SP% = 5"),
+        ("1.2000", "operation", "set SP% = 5"),
+        ("2.0000", "operation", "set SP% = 0, then 49 more values to 49 at 2.049 s"),
+        ("3.0000", "operation", "ROS sets RUN@ = TRUE"),
+        ("4.5000", "operation", "set SP% = 5"),
+    ]
 
 
 def test_a_rack_file_with_errors_inside_is_refused(automax, bag):
@@ -439,7 +546,9 @@ def test_a_run_of_a_simulated_rack(automax):
     result = automax("run", ".", "--simulated", "--duration", "2.5", "--stimuli", "s.yaml", "--record", "bag")
     assert result.code == 0, result
     ((run, _),) = drive_report(automax.folder / "bag").drives
-    assert [event.text for event in run.events[:1]] == ["start is requested (RUN@)"]
+    assert [event.text for event in run.events[:4]] == [
+        "set PERM@ = TRUE", "set REF% = 1500", "set RUN@ = TRUE", "start is requested (RUN@)"
+    ]  # fmt: skip
     assert run.starts == 1
     assert run.plant.greatest_rpm > 100
     assert run.plant.rms_a == pytest.approx(run.counts.rms / 100 * AMPS, rel=0.06)

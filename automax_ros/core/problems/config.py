@@ -152,6 +152,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6833", "value that the recording does not hold"),
     Problem("AMX6834", "picture cannot be drawn"),
     Problem("AMX6840", "nothing to play"),
+    Problem("AMX6841", "speed reference of a report"),
     Problem("AMX6850", "plant not in the recording"),
     Problem("AMX6851", "no Dask"),
     Problem("AMX6852", "no Dask scheduler"),
@@ -161,7 +162,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6856", "recording that a worker cannot read"),
     Problem("AMX6857", "another Python, NumPy or arithmetic on a worker"),
     Problem("AMX6858", "worker that does not answer"),
-    Problem("AMX6860", "recording without a drive to report"),
+    Problem("AMX6860", "task without a drive to report"),
     # the command line: files and the tables of `automax trace` and `automax compare`
     Problem("AMX6900", "file that no task can be named after", Severity.WARNING),
     Problem("AMX6910", "not a CSV table"),
