@@ -10,6 +10,8 @@ from collections.abc import Callable
 from typing import Any
 
 from automax_ros.cli.window import seconds_above_0
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
 
 DEFAULT_EVERY_S = "0.5"
@@ -58,5 +60,12 @@ def watch(read: Read, arguments: argparse.Namespace, is_over: Callable[[], bool]
 
 
 def values_of(answer: Any) -> list[dict[str, str]]:
-    """Return the names and values of an answer."""
+    """Return the names and values of an answer.
+
+    Raises:
+        Fault: they are not as many: no rack of ours answers so.
+    """
+    if len(answer.found) != len(answer.values):
+        count = f"{count_of(len(answer.found), 'name')} and {count_of(len(answer.values), 'value')}"
+        raise Fault(f"the rack answers with {count}", "look who else serves its operator's services in this ROS domain")
     return [{"name": name, "value": text} for name, text in zip(answer.found, answer.values, strict=True)]

@@ -213,7 +213,7 @@ def _merged(response: Any, request: Any, shares: Sequence[Share], answers: dict[
 def _in_order(response: Any, names: list[str]) -> None:
     """Put what was read into the order in which it was asked for, each once."""
     places = {name.strip().upper(): place for place, name in reversed(list(enumerate(names)))}
-    read = dict(zip(response.found, response.values, strict=True))
+    read = dict(zip(response.found, response.values, strict=False))  # a stranger may answer with fewer values
     pairs = sorted(read.items(), key=lambda pair: places.get(pair[0].upper(), len(places)))
     response.found, response.values = [name for name, _ in pairs], [value for _, value in pairs]
 
