@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from automax_ros.cli.window import seconds_above_0
-from automax_ros.core.text import printable
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 
 DEFAULT_EVERY_S = "0.5"
@@ -60,7 +61,14 @@ def watch(read: Read, arguments: argparse.Namespace, is_over: Callable[[], bool]
 
 
 def values_of(answer: Any) -> list[dict[str, str]]:
-    """Return the names and values of an answer; ``shown`` where a value has a unit."""
+    """Return the names and values of an answer; ``shown`` where a value has a unit.
+
+    Raises:
+        Fault: they are not as many: no rack of ours answers so.
+    """
+    if not len(answer.found) == len(answer.values) == len(answer.shown):
+        count = f"{count_of(len(answer.found), 'name')} and {count_of(len(answer.values), 'value')}"
+        raise Fault(f"the rack answers with {count}", "look who else serves its operator's services in this ROS domain")
     items = zip(answer.found, answer.values, answer.shown, strict=True)
     return [{"name": name, "value": text} | ({"shown": shown} if shown else {}) for name, text, shown in items]
 

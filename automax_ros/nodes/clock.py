@@ -56,7 +56,7 @@ class RackClock:
         self._topic = CLOCK
         self._publish: Callable[[bytes], object] = _unsent
         self._encode = encoder(_TYPE)
-        self._throttle = Throttle(_LOOK_INTERVAL_S)
+        self._throttle, self._telling = Throttle(_LOOK_INTERVAL_S), Throttle(_LOOK_INTERVAL_S)
         self._follower: FollowingPacer | None = None
         self.pace: Pace
         if simulated is not None:
@@ -104,14 +104,26 @@ class RackClock:
             assert isinstance(message, Clock)
             if not 0 <= message.clock < _LATEST_NS:
                 raise CdrError(f"{message.clock} ns is not a time that a clock tells")
+            self._follow(message.clock)
         except CdrError as error:
             text = f"{CLOCK}: {error}"
             self._site.health.note(MALFORMED, CLOCK, lambda: text)
             return
+        self._look_around(own=0)
+
+    def _follow(self, clock_ns: int) -> None:
+        """Take a time of the clock.
+
+        Raises:
+            CdrError: stamps, which are ahead of a clock that went back, would come to the end of what ROS can tell.
+        """
+        assert self._site is not None
         assert self._follower is not None
         with self._site.lock.scanner:
-            self._follower.heard(message.clock)
-        self._look_around(own=0)
+            stamp = self._site.stream.stamp(self._follower.now_ns) + self._follower.ahead_ns(clock_ns)
+            if stamp >= _LATEST_NS:
+                raise CdrError(f"{clock_ns} ns comes after a clock that went back, and would be a stamp of {stamp} ns")
+            self._follower.heard(clock_ns)
 
     def _look_around(self, own: int) -> None:
         """Warn where more than one node sends ``/clock``."""
@@ -132,7 +144,8 @@ class RackClock:
         else:
             text = f"/clock went back by {-by_ns / NS_PER_S:.9g} s: rack time and stamps go on from where they are"
         self._site.health.note(JUMP, by_ns > 0, lambda: text)
-        self._node.get_logger().warning(text)
+        if self._telling.passes():
+            self._node.get_logger().warning(text)
 
 
 class _ClockWay:

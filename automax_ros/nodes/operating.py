@@ -114,7 +114,7 @@ class RackClient:
         """Ask a service of the rack and return its answer.
 
         Raises:
-            NotOperable: no answer within the time.
+            NotOperable: no answer within the time, or none that can be read.
         """
         asking = self._clients.get(name)
         if asking is None:
@@ -136,7 +136,13 @@ class RackClient:
         if time.monotonic_ns() > deadline:
             hint = "it may be busy or gone; --timeout waits longer. What was asked may still happen"
             raise NotOperable(f"rack {self._space} does not answer on {name}", hint)
-        self._executor.spin_once(timeout_sec=_LOOK_S)
+        try:
+            self._executor.spin_once(timeout_sec=_LOOK_S)
+        except Exception as error:  # whatever rclpy makes of bytes that are no answer
+            if not self._context.ok():
+                raise
+            hint = "look who else serves its operator's services in this ROS domain"
+            raise NotOperable(f"what rack {self._space} answers on {name} cannot be read", hint) from error
 
     def _racks(self) -> int:
         return len(racks_of(self._node, self._space))

@@ -213,7 +213,8 @@ def _merged(response: Any, request: Any, shares: Sequence[Share], answers: dict[
 def _in_order(response: Any, names: list[str]) -> None:
     """Put what was read into the order in which it was asked for, each once."""
     places = {name.strip().upper(): place for place, name in reversed(list(enumerate(names)))}
-    read = {item[0]: item for item in zip(response.found, response.values, response.shown, strict=True)}
+    # A stranger may answer with fewer values than names.
+    read = {item[0]: item for item in zip(response.found, response.values, response.shown, strict=False)}
     items = sorted(read.values(), key=lambda item: places.get(item[0].upper(), len(places)))
     response.found, response.values, response.shown = ([item[column] for item in items] for column in range(3))
 

@@ -76,12 +76,16 @@ class FollowingPacer:
         self._heard_ns = clock_ns
         if self._zero_ns is None or self._is_over():
             return
-        ahead = clock_ns - self._zero_ns - self._scheduler.now_ns
+        ahead = self.ahead_ns(clock_ns)
         if ahead < 0 or ahead > LONGEST_JUMP_NS:
             self._zero_ns += ahead
             self._jumped(ahead)
         else:
             self._pass(self._scheduler.now_ns + ahead)
+
+    def ahead_ns(self, clock_ns: int) -> int:
+        """Return how far a time of the clock is ahead of the last one, 0 before the rack has begun."""
+        return 0 if self._zero_ns is None else clock_ns - self._zero_ns - self._scheduler.now_ns
 
     def _pass(self, target_ns: int) -> None:
         if self._until_ns is not None and target_ns >= self._until_ns:

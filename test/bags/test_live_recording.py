@@ -25,7 +25,7 @@ from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.replay.engine import replay
-from automax_ros.wire.cdr import decode
+from automax_ros.wire.cdr import decode, encode
 from automax_ros.wire.rack_files import RackFile, files_of
 from automax_ros.wire.stream import RackStream
 
@@ -453,6 +453,37 @@ def test_repeated_messages_are_dropped(wire, tmp_path):
     assert recording.ended is None
     assert recording.gaps == []
     assert recording.writes == sum(item.topic == "/line1/backplane" for item in sent)
+
+
+FORGED = {"/line1/scans": "Scan", "/line1/backplane": "CommonWrite", "/line1/states": "TaskState"}
+
+
+@pytest.mark.parametrize("stamp", [-1, -(1 << 31) * 1_000_000_000, (1 << 31) * 1_000_000_000 - 1])
+def test_a_message_of_an_impossible_time_is_left_out_and_ends_no_recording(wire, tmp_path, stamp):
+    wire.run(0.3)
+    recording = recording_of(wire, tmp_path / "bag")
+    sent = wire.end()
+    forged = []
+    for topic, kind in FORGED.items():
+        payload = next(item.payload for item in sent if item.topic == topic)
+        message: Any = decode(f"automax_msgs/msg/{kind}", payload)
+        forged.append(Sent(topic, encode(message._replace(stamp=stamp))))
+    feed(recording, sent[:50] + forged + sent[50:])
+    recording.close()
+    assert (recording.failure, recording.ended, recording.gaps) == (None, None, [])
+    assert recording.malformed == len(forged)
+    assert check_scans_saw_memory(tmp_path / "bag") > 50
+
+
+def test_a_value_sent_at_the_end_of_time_ends_no_recording(wire, tmp_path):
+    wire.run(0.3)
+    recording = recording_of(wire, tmp_path / "bag")
+    sent = wire.end()
+    for number, (topic, payload) in enumerate(sent):
+        is_value = topic == "/line1/common/REF"
+        recording.take(topic, (1 << 63) - 1 if is_value else number * SENT + 1, payload)
+    recording.close()
+    assert recording.failure is None
 
 
 def test_malformed_messages_are_left_out_and_told(wire, tmp_path):

@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+from types import SimpleNamespace
 
 import pytest
 from system.support import RACKS
@@ -9,6 +10,7 @@ from system.support import RACKS
 from automax_ros.cli.ctl_actions import ACTIONS
 from automax_ros.cli.rack_space import space_of
 from automax_ros.cli.usage import UsageError
+from automax_ros.core.faults import Fault
 
 
 def asked(action: str, *words: str) -> list[dict[str, object]]:
@@ -96,3 +98,11 @@ def test_every_action_asks_a_service_with_fields_that_it_has(name, tmp_path):
     for ask in ACTIONS[name].asks(parser.parse_args(list(given))):
         package, _, kind = ask.type_name.partition("/")
         assert getattr(importlib.import_module(f"{package}.srv"), kind).Request(**ask.fields)
+
+
+def test_an_answer_with_more_names_than_values_is_an_error_and_no_traceback():
+    """Our racks answer one for each; a stranger may serve the same service."""
+    answer = SimpleNamespace(found=["REF%", "OUT%"], values=["1"])
+    for action in ("get", "watch", "forces"):
+        with pytest.raises(Fault, match="the rack answers with 2 names and 1 value"):
+            ACTIONS[action].read(answer)

@@ -215,6 +215,27 @@ def test_a_clock_at_the_end_of_time_is_refused_and_the_rack_goes_on(made, client
         following.end()
 
 
+def test_a_clock_that_leaps_again_and_again_does_not_bring_stamps_to_the_end_of_time(made, client):
+    """Each leap is added to the stamps, which do not go back with the clock: two of 13 years would be beyond 2038."""
+    live = made("-p", "use_sim_time:=true")
+    following = Following(live, client)
+    leap_ns = 400_000_000 * NS_PER_S
+    try:
+        following.begin()
+        following.tell(EPOCH_NS + leap_ns)
+        wait_until(lambda: live.health.counts["clock jump"] == 1)
+        following.tell(EPOCH_NS)
+        wait_until(lambda: live.health.counts["clock jump"] == 2)
+        following.tell(EPOCH_NS + leap_ns)
+        wait_until(lambda: live.health.counts["malformed /clock"] == 1)
+        following.tell(EPOCH_NS + NS_PER_S)
+        wait_until(lambda: live.rack.now_ns == NS_PER_S)
+        assert live.stream.stamp(live.rack.now_ns) == EPOCH_NS + leap_ns + NS_PER_S
+        assert not live.health.counts["failed callback"]
+    finally:
+        following.end()
+
+
 def test_clock_that_goes_back_or_leaps_is_told_and_rack_time_goes_on(made, client):
     live = made("-p", "use_sim_time:=true")
     following = Following(live, client)

@@ -59,3 +59,19 @@ def test_a_service_that_does_not_answer_is_an_error_and_not_a_wait(ros_domain_id
         client.find(0)
         with pytest.raises(NotOperable, match="rack /pm1 does not answer on stop_all"):
             client.call(Trigger, "stop_all", Trigger.Request(), 200 * NS_PER_MS)
+
+
+def test_an_answer_that_cannot_be_read_is_an_error_and_no_traceback(ros_domain_id, monkeypatch):
+    """A stranger may serve the operator's service; of bytes that are no answer rcl's own error leaves the executor."""
+    from rclpy.impl.implementation_singleton import rclpy_implementation
+    from std_srvs.srv import Trigger
+
+    from automax_ros.nodes.operating import NotOperable, RackClient
+
+    def malformed(*_, **__):
+        raise rclpy_implementation.RCLError("Failed to take response from service")
+
+    with RackClient("/pm1") as client:
+        monkeypatch.setattr(client._executor, "spin_once", malformed)
+        with pytest.raises(NotOperable, match="what rack /pm1 answers on stop_all cannot be read"):
+            client.call(Trigger, "stop_all", Trigger.Request(), 60_000 * NS_PER_MS)

@@ -21,7 +21,6 @@ READY = "Ctrl-C ends the run"
 BEGUN = "recording since"
 LOG = {"automax_msgs/msg/Scan", "automax_msgs/msg/CommonWrite", "automax_msgs/msg/TaskState"}
 TASKS = {"FAST", "SLOW", "COPY"}
-"""The promise is 1 s, which is printed; a test on a busy machine only asks that the end comes."""
 
 
 @pytest.fixture(scope="module")

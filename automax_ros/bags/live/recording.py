@@ -16,11 +16,11 @@ from typing import Any
 from automax_ros.bags.errors import RecordingError
 from automax_ros.bags.live.provenance import lacking, provenance
 from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.bags.live.tracks import Gap, TaskTrack, has_written, task_head
+from automax_ros.bags.live.tracks import Gap, TaskTrack, has_written, possible, task_head, timely
 from automax_ros.bags.recording import Recording
 from automax_ros.bags.storage import StorageOptions
 from automax_ros.bags.write_log import WriteLog
-from automax_ros.bags.writer import BagWriter, Channel
+from automax_ros.bags.writer import MAX_STAMP, BagWriter, Channel
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.wire.cdr import CdrError, decode
@@ -158,10 +158,10 @@ class LiveRecording(Recording):
             self._finish()
 
     def _take_table(self, topic: str, sent_ns: int, payload: bytes) -> None:  # noqa: ARG002
-        self._check_run(table_of(payload).run_id)
+        self._check_run(timely(table_of(payload)).run_id)
 
     def _take_image(self, topic: str, sent_ns: int, payload: bytes) -> None:
-        head = image_head(payload)
+        head = timely(image_head(payload))
         if not self._check_run(head.run_id):
             return
         if self._image is not None and head.sequence == self._image[1].sequence:
@@ -180,7 +180,7 @@ class LiveRecording(Recording):
         self._image, self._proven_ns = (sent_ns, head, payload), sent_ns
 
     def _take_write(self, topic: str, sent_ns: int, payload: bytes) -> None:
-        head = write_head(payload)
+        head = timely(write_head(payload))
         if not self._check_run(head.run_id):
             return
         if not self._recording and self._image is not None:
@@ -202,7 +202,7 @@ class LiveRecording(Recording):
         self._write(topic, sent_ns, head.stamp, payload)
 
     def _record_scan(self, topic: str, sent_ns: int, payload: bytes) -> None:
-        head = scan_head(payload)
+        head = timely(scan_head(payload))
         track = self._tasks.get(head.task)
         if track is None:
             return
@@ -224,6 +224,7 @@ class LiveRecording(Recording):
 
     def _record_state(self, topic: str, sent_ns: int, payload: bytes) -> None:
         state: Any = decode("automax_msgs/msg/TaskState", payload)
+        possible(state.stamp)
         track = self._tasks.get(state.task)
         if track is None:
             return
@@ -237,12 +238,12 @@ class LiveRecording(Recording):
         self._look_whether_replayable(state.stamp)
 
     def _record_operation(self, topic: str, sent_ns: int, payload: bytes) -> None:
-        stamp, run_id = operation_head(payload)
+        stamp, run_id = timely(operation_head(payload))
         if run_id == self._log.run_id and stamp >= (self.first_stamp or 0):  # older ones wait for late joiners too
             self._write(topic, sent_ns, stamp, payload)
 
     def _record_plant(self, topic: str, sent_ns: int, payload: bytes) -> None:
-        stamp = plant_stamp(self._topics.plants[topic].type_name, payload)
+        stamp = possible(plant_stamp(self._topics.plants[topic].type_name, payload))
         self._write(topic, sent_ns, stamp, payload)
 
     def _record_value(self, topic: str, sent_ns: int, payload: bytes) -> None:
@@ -250,7 +251,8 @@ class LiveRecording(Recording):
         self._values_now[topic] = payload
         # A value carries no stamp: it belongs to the instant of the message before, or came so much later.
         later = max(0, sent_ns - self._last_sent) if self._last_sent else 0
-        self._write(topic, 0, self.last_stamp + (later if later > NS_PER_S // 1000 else 0), payload)
+        stamp = self.last_stamp + (later if later > NS_PER_S // 1000 else 0)
+        self._write(topic, 0, min(stamp, MAX_STAMP), payload)
 
     def _keep(self, topic: str, sent_ns: int, payload: bytes) -> None:
         """Let a message wait for the next write, which says whether one is missing before it."""

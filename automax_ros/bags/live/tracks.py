@@ -3,11 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from automax_ros.bags.live.topics import LiveTopics
+from automax_ros.bags.writer import MAX_STAMP
 from automax_ros.wire.cdr import CdrError, decode
 from automax_ros.wire.heads import ScanHead, StateHead, scan_head, state_head
+
+
+class Stamped(Protocol):
+    """A message, or its head, with the time at which it is true (ns)."""
+
+    @property
+    def stamp(self) -> int:
+        """The time."""
+        ...
+
+
+_Stamped = TypeVar("_Stamped", bound=Stamped)
+
+
+def possible(stamp: int) -> int:
+    """Return a stamp.
+
+    Raises:
+        CdrError: no recording has a place for it: what has it is left out, and ends nothing.
+    """
+    if not 0 <= stamp <= MAX_STAMP:
+        raise CdrError(f"{stamp} ns is not the time of a message")
+    return stamp
+
+
+def timely(message: _Stamped) -> _Stamped:
+    """Return a message, or its head, whose stamp is ``possible``."""
+    possible(message.stamp)
+    return message
 
 
 @dataclass(frozen=True)
@@ -74,8 +104,8 @@ def task_head(topics: LiveTopics, topic: str, payload: bytes) -> ScanHead | Stat
     """Return the head of a scan or of a task's state; None for what is neither, or malformed."""
     try:
         if topic == topics.scans:
-            return scan_head(payload)
-        return state_head(payload) if topic == topics.states else None
+            return timely(scan_head(payload))
+        return timely(state_head(payload)) if topic == topics.states else None
     except CdrError:
         return None
 
