@@ -79,7 +79,7 @@ class SyncSignal(Stateful):
 
     @property
     def is_there(self) -> bool:
-        """Whether the signal rises through zero once a cycle."""
+        """Whether the signal rises through zero in each cycle."""
         return self._rise < inf
 
     def since(self, turn: float) -> float:

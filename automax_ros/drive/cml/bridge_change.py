@@ -61,7 +61,16 @@ class BridgeChange(Stateful):
         self.bridge = bridge
         self.stage = Stage.NONE
 
-    def scan(self, measured: Measured, wanted: float, scan_us: float, *, fast: bool, late: bool = False) -> bool:
+    def scan(
+        self,
+        measured: Measured,
+        wanted: float,
+        scan_us: float,
+        *,
+        fast: bool,
+        late: bool = False,
+        gated: bool = False,
+    ) -> bool:
         """Move on by a scan; return whether the other bridge is in use from now on.
 
         Args:
@@ -71,6 +80,8 @@ class BridgeChange(Stateful):
             fast: whether the fast change is on.
             late: whether commands come after their interrupt: the gates have gone on meanwhile, so what was measured
                 before the change began does not tell that no current flows.
+            gated: whether a gate of the old bridge, fired after this interrupt, may come before the command: it
+                conducts again then, and the other bridge would fire across.
         """
         # Its sign decides, from one count on (52.1.2): what keeps it from chattering is the change itself.
         against = round(wanted if self.bridge == 2 else -wanted)
@@ -86,7 +97,7 @@ class BridgeChange(Stateful):
         if measured.tail_us <= 0:
             self.stage = Stage.BACK
             return False
-        if not fast and measured.tail_us < int(scan_us):
+        if gated or (not fast and measured.tail_us < int(scan_us)):
             self.stage = Stage.OFF
             return False
         self.begin(3 - self.bridge)

@@ -24,6 +24,9 @@ COUNTS: Final = FULL * 100 / RATED
 """Counts of feedback per unit of ``Measured.current`` where LIM_BAR is 1 %."""
 LONGEST_ZERO_US: Final = 3472
 """Largest DC_TIME, us (52.2.1)."""
+AHEAD_US: Final = 50
+"""By how much a command must come before the next pulse of the old bridge, us (decision: no two scans take the same
+time)."""
 FRESH_SCANS: Final = 2
 """Scans that a preset is given to show a current before the search goes on from it (decision)."""
 
@@ -101,9 +104,12 @@ class CurrentControl(Stateful):
         scan_us = period_us / 6
         wanted = self.chain.scan(reference, settings.ref_rate, settings.ref_lag, scan_us * 1e-6)
         fast = settings.fast_change
+        late = self._late_us
+        # The pulse that was planned ahead stands where DELTA has it in a scan; without gates there is none.
+        gated = not self.block and late > (3.0 * scan_us - self.regulator.delta_us) % scan_us - AHEAD_US
         self.block = False
         guard_ns = 0
-        if self.change.scan(measured, wanted, scan_us, fast=fast, late=self._late_us > 0):
+        if self.change.scan(measured, wanted, scan_us, fast=fast, late=late > 0, gated=late > 0 and gated):
             bridge = self.change.bridge
             self._take(bridge, preset_us(measured, bridge, abs(wanted), settings.cc_thresh, period_us) if fast else 0.0)
             self.block = True

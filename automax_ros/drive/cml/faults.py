@@ -27,7 +27,7 @@ EXT_IET: Final = 1 << 4
 PHROT: Final = 1 << 5
 BAD_SCR: Final = 1 << 6
 HARDWARE: Final = 1 << 7
-"""Stands beside OSV among the causes where the hardware's overspeed circuit saw it and OSV_FDBK does not."""
+"""Stands next to OSV among the causes where the hardware's overspeed circuit saw it and OSV_FDBK does not."""
 OSV_PROBLEM: Final = 7113
 OVERSPEED_TRIP: Final = 7119
 """What an OSV is logged as, and what it is logged as then."""

@@ -52,9 +52,24 @@ class Bench:
     """A drive that runs; ``scans`` keeps every scan."""
 
     def __init__(
-        self, size="150hp", hertz=60, *, inertia=HELD, tests_scrs=False, energy=False, lim_bar=LIM_BAR, **inputs
+        self,
+        size="150hp",
+        hertz=60,
+        *,
+        inertia=HELD,
+        tests_scrs=False,
+        energy=False,
+        lim_bar=LIM_BAR,
+        inductance_h=None,
+        late_ns=0,
+        **inputs,
     ):
+        """``inductance_h`` replaces the armature's; commands come ``late_ns`` after their interrupts."""
         self.parameters = parameters_of(size, hertz)
+        if inductance_h is not None:
+            motor = replace(self.parameters.motor, inductance_h=inductance_h)
+            self.parameters = replace(self.parameters, motor=motor)
+        self.late_ns = late_ns
         self.plant = DrivePlant(PlantData(self.parameters, inertia=inertia), energy=energy)
         self.hardware = DriveController(self.plant)
         self.loop = CurrentMinorLoop(tests_scrs=tests_scrs)
@@ -77,7 +92,7 @@ class Bench:
         """Execute a scan and let time pass to the next interrupt."""
         measured = self.hardware.measure(self.now_ns, self.status, self.registers)
         outcome = self.loop.scan(self.now_ns, measured, self.inputs)
-        self.hardware.command(outcome.command, self.now_ns)
+        self.hardware.command(outcome.command, self.now_ns, self.now_ns + self.late_ns)
         if outcome.outputs is not None:
             self.outputs = outcome.outputs
         control = self.loop.control

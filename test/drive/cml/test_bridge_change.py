@@ -8,8 +8,10 @@ import pytest
 from automax_ros.drive.cml.bridge_change import FLOOR, BridgeChange, Stage, preset_us
 from automax_ros.drive.cml.outputs import OUTPUTS
 from automax_ros.drive.cml.signals import OVERCURRENT, VOLTAGE, VOLTS, Measured, gate_numbers
+from automax_ros.drive.events import EventKind
+from automax_ros.drive.limits import largest_inductance_mh
 
-from .support import Bench
+from .support import Bench, parameters_of
 
 EMF = {"10hp": 210.0, "150hp": 450.0, "800hp": 640.0}
 FAST = 1
@@ -107,6 +109,40 @@ def test_fast_change_without_voltage_does_no_harm_at_standstill():
     scans, dead = change(bench, 2047, -2047)
     assert dead < 6.0
     assert not any(scan.measured.status & OVERCURRENT for scan in scans)
+
+
+def crossfires(bench, emf, amount):
+    """Let a drive change its bridges to and fro, fast; return how often both conduct at once."""
+    bench.emf(emf)
+    bench.registers = (109, 4, 2, FAST)
+    bench.status |= VOLTAGE
+    bench.start()
+    bench.plant.circuit.take_events()
+    for sign in (1, -1, 1, -1):
+        bench.set(reference=sign * amount)
+        bench.run(0.3)
+    assert {scan.bridge for scan in bench.scans} == {1, 2}
+    return sum(event.kind is EventKind.CROSS_FIRE for event in bench.plant.circuit.take_events())
+
+
+@pytest.mark.parametrize("late_us", [600, 1450, 1600, 1900])
+@pytest.mark.parametrize("part", [-1.0, 0.4, 1.0])
+def test_a_command_that_comes_late_fires_nothing_across(late_us, part):
+    """From 1.5 ms on a pulse of the old bridge, planned ahead, comes between interrupt and command."""
+    for amount in (60, 800, 4095):
+        assert crossfires(Bench("150hp", late_ns=late_us * 1000), part * EMF["150hp"], amount) == 0
+
+
+@pytest.mark.parametrize("late_us", [0, 1900])
+@pytest.mark.parametrize("times", [1.1, 2.0, 5.0, 20.0])
+@pytest.mark.parametrize("size", ["10hp", "800hp"])
+def test_above_the_limits_of_table_3_nothing_fires_across_either(size, times, late_us):
+    """The loop of this emulator waits for the end of the current itself, not for a signal that tells of it (52.6)."""
+    parameters = parameters_of(size)
+    inductance_h = times * largest_inductance_mh(parameters.line_v, parameters.amps) * 1e-3
+    for part, amount in ((-1.0, 800), (0.4, 2047), (1.0, 4095)):
+        bench = Bench(size, inductance_h=inductance_h, late_ns=late_us * 1000)
+        assert crossfires(bench, part * EMF[size], amount) == 0
 
 
 def test_a_reference_that_turns_back_before_zero_current_changes_nothing():
