@@ -53,7 +53,7 @@ class InputTable(CsvTable):
     def rows(self) -> Iterator[int]:
         """Set the variables to each row's cells in turn, and yield the row's line before each scan.
 
-        An empty cell leaves its variable as it is. In a table with times and without numbers of scans a row is set
+        An empty cell leaves its variable as it is. In a table with times, but without numbers of scans, a row is set
         before the first scan at or after its time, counted from the first row's, and holds until the next one's.
 
         Raises:

@@ -49,7 +49,7 @@ def test_inputs_that_the_table_lacks_are_named(automax):
     automax.write("IN.csv", "time_s\n0\n0.1\n")
     assert automax("trace", "HOLD.BLK", "--input", "IN.csv").err == "HOLD: IN.csv does not set REF%: they stay 0\n"
     automax.write("IN.csv", "REF%\n1\n")
-    assert automax("trace", "HOLD.BLK", "--input", "IN.csv").err == "", "what it writes itself is no input"
+    assert automax("trace", "HOLD.BLK", "--input", "IN.csv").err == "", "it writes the other one itself"
 
 
 def test_exported_scans_are_traced_again(automax):
