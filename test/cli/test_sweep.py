@@ -252,8 +252,12 @@ def test_ctrl_c_keeps_the_runs_that_are_done(sweep, tmp_path, monkeypatch: pytes
 def test_a_folder_that_stays_empty_is_taken_away(tmp_path, written):
     """As where the disk is full when the tables are written; what was written stays."""
     folder = tmp_path / "out"
-    with pytest.raises(OSError, match="No space"), prepared(folder):
+
+    def write() -> None:
         if written:
             (folder / "runs.csv").write_text("x")
         raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space"), prepared(folder):
+        write()
     assert folder.exists() == written
