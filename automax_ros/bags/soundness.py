@@ -2,7 +2,7 @@
 
 Readers refuse by themselves what is damaged, malformed or out of order (``BagReader``, ``CommonLog``); here all
 messages are read once, and it is told what a recording of ours lacks of a rack. Missing writes that an image makes up
-for are no fault: a replay goes on after them, and they are told.
+for do not make it unsound: a replay goes on after them, and they are told.
 """
 
 from __future__ import annotations

@@ -161,9 +161,9 @@ def _carry_out(sweep: _Sweep, arguments: argparse.Namespace, stop: StopRequest) 
             rows = _rows(sweep, stop)
         else:
             rows = record_run(plan, points[0], arguments.record, lambda: stop.requested)
-    output = Output(plan, wanted, rows, len(points))
-    if arguments.output is not None:
-        output.write(arguments.output)
+        output = Output(plan, wanted, rows, len(points))
+        if arguments.output is not None:
+            output.write(arguments.output)
     if arguments.json:
         print(json.dumps(records(plan, rows, output.repeat), indent=1, allow_nan=False))
     else:

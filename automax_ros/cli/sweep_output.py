@@ -8,7 +8,7 @@ import shlex
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,7 +84,8 @@ def prepared(folder: Path | None) -> Iterator[None]:
         yield
     except BaseException:
         if made:
-            folder.rmdir()
+            with suppress(OSError):  # something of it was written
+                folder.rmdir()
         raise
 
 

@@ -44,6 +44,7 @@ from automax_ros.running.lone_task import LoneTask, LoneVariable
 from automax_ros.running.task import ScanRecord, Status
 
 _USAGE = "usage: automax trace FILE --input IN.csv, or: automax trace FILE --stimuli FILE"
+_NAMED = 20
 _CHARACTERS_A_ROW = 8
 """For how many characters of a table a scan is expected where it says nothing of its size (decision)."""
 _ROWS_A_LOOK = 256
@@ -97,6 +98,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("the stimuli have no end: a sine or a square lacks `for`", "give --duration S")
     with ExitStack() as files:
         table = files.enter_context(InputTable(arguments.input, lone)) if arguments.input is not None else None
+        if table is not None and not stimuli and (unset := table.unset(lone)):
+            names = f"{', '.join(unset[:_NAMED])}{' ...' if len(unset) > _NAMED else ''}"
+            print(f"{lone.task.name}: {arguments.input} does not set {names}: they stay 0", file=sys.stderr)
         scans = StimulatedScans(lone, stimuli, table, arguments.duration)
         output = files.enter_context(opened_for_writing(arguments.output))
         errors = files.enter_context(opened_for_writing(arguments.errors)) if arguments.errors else None

@@ -1,20 +1,34 @@
-"""The CSV table that ``automax trace`` reads: its header names variables of the task, each row sets them for a scan."""
+"""The CSV table that ``automax trace`` reads: its header names variables of the task, each row sets them for a scan.
+
+In a table with ``time_s`` and without ``scan`` rows hold until the time of the next one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
 
 from automax_ros.cli.csv_table import CsvTable
 from automax_ros.core.names import NameFault, UnknownName
 from automax_ros.core.text import quoted
+from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
 from automax_ros.core.values import is_number, value_of, value_text, wanted
 from automax_ros.language.program import Symbol
+from automax_ros.language.syntax.tree import Scope
+from automax_ros.language.written import lines_that_write
 from automax_ros.running.lone_task import LoneTask, LoneVariable
 
-_NOT_SET = ("scan", "time_s")
-"""Columns that tables of ``trace`` and ``export`` have: a row is a scan whatever they say."""
+_SCAN, _TIME = "scan", "time_s"
+_NOT_SET = (_SCAN, _TIME, "duration_ns", "skipped", "errors", "error_line", "error_code")
+"""Columns that tables of ``trace`` and ``export`` have, which set nothing."""
+_SET, _NOT_SET_HERE = "in.", ("out.", "local.")
+"""How the columns of ``export --scans`` begin: what a scan saw is set, what came of it is not."""
+_LATEST_S = 10**10
+"""Times of day are below this, s."""
+_LONGEST_NS = 10**6 * NS_PER_S
+"""A table lasts at most 11 days (decision): whoever wrote ms for s is told."""
 
 
 class InputTable(CsvTable):
@@ -28,26 +42,61 @@ class InputTable(CsvTable):
             CsvFault: the header is at fault.
         """
         super().__init__(path)
+        self._period_ns = task.task.period_ns
         try:
             self.columns = self._columns(task)
+            self._time = self._time_column()
         except BaseException:
             self.close()
             raise
 
     def rows(self) -> Iterator[int]:
-        """Set the variables to each row's cells in turn, and yield the row's line.
+        """Set the variables to each row's cells in turn, and yield the row's line before each scan.
 
-        An empty cell leaves its variable as it is.
+        An empty cell leaves its variable as it is. In a table with times, but without numbers of scans, a row is set
+        before the first scan at or after its time, counted from the first row's, and holds until the next one's.
 
         Raises:
             UsageError: the file cannot be read any more.
             CsvFault: a row is at fault.
         """
+        scans, first_ns, before_ns, last = 0, 0, -1, 0
         for line, cells in self.numbered_rows():
+            if self._time is not None:
+                time_ns = self._time_of(cells[self._time], line)
+                if last and time_ns < before_ns:
+                    raise self.fault("AMX6803", f"{cells[self._time]} s is earlier than the row before", line=line)
+                first_ns, before_ns = first_ns if last else time_ns, time_ns
+                if time_ns - first_ns > _LONGEST_NS:
+                    raise self.fault("AMX6803", f"{cells[self._time]} s is days after the first row", line=line)
+                for _ in range(-(-(time_ns - first_ns) // self._period_ns) - scans):
+                    yield last
+                    scans += 1
             for variable, cell in zip(self.columns, cells, strict=True):
                 if cell and variable is not None:
                     self._set(variable, self._decimal(cell, variable), line)
-            yield line
+            last = line
+            if self._time is None:
+                yield line
+        if last and self._time is not None:
+            yield last
+
+    def unset(self, task: LoneTask) -> list[str]:
+        """Return the commons that the task works on, does not write itself and has no column for."""
+        given = {variable.symbol.name for variable in self.columns if variable is not None}
+        written = lines_that_write(task.program)
+        commons = (item.name for item in task.program.symbols.values() if item.scope is Scope.COMMON)
+        return [name for name in commons if name not in given and name not in written]
+
+    def _time_column(self) -> int | None:
+        names = [name.strip() for name in self.header]
+        return names.index(_TIME) if _TIME in names and _SCAN not in names else None
+
+    def _time_of(self, cell: str, line: int) -> int:
+        text = cell.strip().replace(",", ".")
+        if is_number(text) and 0 <= (seconds := Decimal(text)) <= _LATEST_S:
+            return int(seconds * NS_PER_S)
+        raise self.fault("AMX6803", f"time_s = {quoted(cell, marks='')}, it must be a time in s, 0 or more", line=line)
 
     def _decimal(self, cell: str, variable: LoneVariable) -> str:
         """Return a cell with a decimal point, where the table may have a comma."""
@@ -56,8 +105,12 @@ class InputTable(CsvTable):
     def _columns(self, task: LoneTask) -> list[LoneVariable | None]:
         columns: dict[str, LoneVariable | None] = {}
         for name in self.header:
+            plain = name.strip()
+            if plain.startswith(_NOT_SET_HERE):
+                columns[name] = None
+                continue
             try:
-                variable = task.variable(name)
+                variable = task.variable(plain.removeprefix(_SET))
             except NameFault as fault:
                 if name.strip() in _NOT_SET and name not in columns:
                     columns[name] = None

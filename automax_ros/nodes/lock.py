@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -48,7 +49,7 @@ class RackLock:
         self._rack, self._seat = f"rack /{namespace} in ROS domain {domain}", seat
         name = f"automax_ros_{os.getuid()}_{domain}_{namespace.replace('/', '.')}"
         self._path = Path(tempfile.gettempdir()) / f"{name}.lock"
-        self._files: list[int] = []
+        self._files: list[tuple[int, Path]] = []
 
     def __enter__(self) -> RackLock:
         """Take the lock.
@@ -73,27 +74,59 @@ class RackLock:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Free the lock; its files stay, since removing one would let two processes hold two files of one name."""
+        """Free the lock, and take its files away."""
         self._free()
 
     def _take(self, path: Path, what: str, how: int) -> None:
-        try:
-            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
-        except OSError as error:
-            raise LockError(f"{what}: cannot open the lock file {path}: {error.strerror}") from error
-        self._files.append(file)
-        try:
-            fcntl.flock(file, how | fcntl.LOCK_NB)
-        except BlockingIOError:
-            holder = os.pread(file, 32, 0).decode("ascii", "replace").strip()
-            # Those who share a file leave it empty.
-            by = f" (process {holder})" if holder.isdigit() else " (distributed over several processes)"
-            raise RackAlreadyRuns(f"{what} runs already{by}: stop it first, or set another ROS_DOMAIN_ID") from None
+        file = self._locked(path, what, how)
+        self._files.append((file, path))
         os.ftruncate(file, 0)
         if how == fcntl.LOCK_EX:
             os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
 
+    @staticmethod
+    def _locked(path: Path, what: str, how: int) -> int:
+        """Return the lock file, open and locked: the one that stands at the path, not one that was taken away."""
+        while True:
+            try:
+                file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+            except OSError as error:
+                raise LockError(f"{what}: cannot open the lock file {path}: {error.strerror}") from error
+            try:
+                fcntl.flock(file, how | fcntl.LOCK_NB)
+                if _stands_at(file, path):
+                    return file
+            except BlockingIOError:
+                raise _taken(file, what) from None
+            except BaseException:
+                os.close(file)
+                raise
+            os.close(file)
+
     def _free(self) -> None:
-        for file in self._files:
+        """Take away the files that nobody else holds, while they are locked, and close all."""
+        for file, path in self._files:
+            with suppress(OSError):  # others share it, or it is not ours to take away
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if _stands_at(file, path):
+                    path.unlink()
             os.close(file)
         self._files.clear()
+
+
+def _stands_at(file: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path, follow_symlinks=False))
+    except FileNotFoundError:
+        return False
+
+
+def _taken(file: int, what: str) -> RackAlreadyRuns:
+    """Return the error of a lock file that another process holds; the file is closed."""
+    try:
+        holder = os.pread(file, 32, 0).decode("ascii", "replace").strip()
+    finally:
+        os.close(file)
+    # Those who share a file leave it empty.
+    by = f" (process {holder})" if holder.isdigit() else " (distributed over several processes)"
+    return RackAlreadyRuns(f"{what} runs already{by}: stop it first, or set another ROS_DOMAIN_ID")

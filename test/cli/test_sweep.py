@@ -1,6 +1,7 @@
 """`automax sweep`: its table and files, the command that repeats a run, what is refused, how it ends."""
 
 import csv
+import errno
 import json
 import os
 import shlex
@@ -13,6 +14,7 @@ import pytest
 from sweep.helpers import LOOP, RACK
 
 from automax_ros.bags.data_file import DataFile
+from automax_ros.cli.sweep_output import prepared
 from automax_ros.rack.rack import Rack
 
 from .support import Automax, Result
@@ -244,3 +246,18 @@ def test_ctrl_c_keeps_the_runs_that_are_done(sweep, tmp_path, monkeypatch: pytes
     assert [row["REF%"] for row in rows_of(tmp_path / "out")] == ["100", "200", "300"]
     assert json.loads((tmp_path / "out" / "sweep.json").read_text())["done"] == 3
     assert len(begun) == 4
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_a_folder_that_stays_empty_is_taken_away(tmp_path, written):
+    """As where the disk is full when the tables are written; what was written stays."""
+    folder = tmp_path / "out"
+
+    def write() -> None:
+        if written:
+            (folder / "runs.csv").write_text("x")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space"), prepared(folder):
+        write()
+    assert folder.exists() == written

@@ -85,3 +85,29 @@ def test_wrong_domain(monkeypatch, text):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)
     with pytest.raises(RosUnavailable, match="is not a number from 0 to 232"):
         domain_id()
+
+
+def test_no_file_is_left_behind(folder):
+    with RackLock("line1", 7):
+        assert len(list(folder.iterdir())) == 1
+    assert list(folder.iterdir()) == []
+    with RackLock("line1", 7, "processor_1"):
+        with RackLock("line1", 7, "processor_2"):
+            pass
+        assert len(list(folder.iterdir())) == 2, "the rack's own is shared, and one seat is held"
+    assert list(folder.iterdir()) == []
+    with RackLock("line1", 7), pytest.raises(RackAlreadyRuns):
+        RackLock("line1", 7).__enter__()
+    assert list(folder.iterdir()) == []
+
+
+def test_a_file_that_was_taken_away_meanwhile_does_not_lock(folder):
+    """Between open and flock the holder may have ended: whoever comes then locks the file that stands there now."""
+    first = RackLock("line1", 7)
+    first.__enter__()
+    (path,) = folder.iterdir()
+    path.unlink()
+    with RackLock("line1", 7):
+        inode = path.stat().st_ino
+        first.__exit__(None, None, None)
+        assert path.stat().st_ino == inode, "the other's file is left alone"

@@ -129,6 +129,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6800", "folder for a recording exists already"),
     Problem("AMX6801", "recording cannot be written"),
     Problem("AMX6802", "message cannot be recorded"),
+    Problem("AMX6803", "time of a row"),
     Problem("AMX6810", "not a recording"),
     Problem("AMX6811", "recording of another kind"),
     Problem("AMX6812", "recording is truncated"),
