@@ -62,6 +62,12 @@ def test_the_folder_for_the_converted_files_is_made(automax, old):
     assert (automax.folder / "new" / "tasks" / old).is_file()
 
 
+def test_the_check_of_an_old_file_names_the_command_that_mends_it(automax, old):
+    assert f"`automax convert {old}` mends the whole file" in automax("check", old).out
+    automax("convert", old, "--output", "new")
+    assert "automax convert" not in automax("check", f"new/{old}").out
+
+
 def test_errors_that_are_left_are_told(automax):
     result = automax("convert", automax.write("WRONG.BLK", b"10 CALL SCAN_LOOP(TICKS=4)\r\n20 X% = 1\r\n30 END\r\n"))
     assert result.code == 1

@@ -445,3 +445,16 @@ def test_line_that_a_narrower_terminal_has_wrapped_is_erased_whole():
     assert erasing(79, 40) == "\r\x1b[1A\x1b[J"
     assert erasing(79, 20) == "\r\x1b[3A\x1b[J"
     assert fitting(["1.0 s"], -1) == ""
+
+
+def test_warnings_of_sources_are_counted_and_shown_by_check(automax):
+    """A run is repeated often: it does not print the same warnings each time."""
+    lines = "30 A% = 1\n40 B% = 1\n50 CALL SUMMER(INPUT1=A%, INPUT2=B%, OUTPUT=A%)\n60 END\n"
+    task = f"10 COMMON A%, B%\n20 CALL SCAN_LOOP(TICKS=2)\n{lines}"
+    automax.write("ONE.BLK", task)
+    slots = "slots: {0: {module: 57C435, tasks: {ONE: {priority: 5}}}}"
+    automax.write("r.yaml", f"rack: R1\n{slots}\ncommon: {{A%: {{}}, B%: {{}}}}\n")
+    result = automax("run", "r.yaml", "--simulated", "--duration", "0.1")
+    assert (result.code, result.err) == (0, "2 warnings of its tasks: automax check r.yaml shows them\n")
+    checked = automax("check", "r.yaml")
+    assert (checked.code, checked.out.count("warning[AMX4086]")) == (0, 2)

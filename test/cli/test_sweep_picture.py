@@ -84,3 +84,26 @@ def test_without_matplotlib_it_is_said(drawn, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
     with pytest.raises(UsageError, match="a picture needs matplotlib"):
         drawn(["REF%=1,2"])
+
+
+def test_long_labels_are_folded_not_cut(drawn):
+    """Each is as long as its axis at most: a saved picture shows it whole."""
+    for texts, count in (
+        (["REF%=5,1,3"], 0),
+        (["REF%=10,0", "LOOP.STEPS=1,2,4"], 0),
+        (["REF%=0:100", "LOOP.STEPS=1:9"], 6),
+    ):
+        figure, _, plan = drawn(
+            texts, count, measures="abs_max(ERR%, from=0.0125, to=0.1987654) rms(ERR%, from=0.0125, to=0.198765)"
+        )
+        figure.canvas.draw()
+        width, height = figure.canvas.get_width_height()
+        renderer = figure.canvas.get_renderer()
+        for axis in figure.axes:
+            named = (axis.xaxis.label, axis.yaxis.label, axis.title)
+            for text in (item for item in named if item.get_text()):
+                box = text.get_window_extent(renderer)
+                assert -1 <= box.x0 <= box.x1 <= width + 1, text.get_text()
+                assert -1 <= box.y0 <= box.y1 <= height + 1, text.get_text()
+        found = {" ".join(text.split()) for axis in figure.axes for text in (axis.get_ylabel(), axis.get_title())}
+        assert {measure.label for measure in plan.measures} <= found

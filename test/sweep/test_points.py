@@ -144,3 +144,9 @@ def test_a_share_of_one_is_the_last_value(rack: Rack, monkeypatch: pytest.Monkey
     monkeypatch.setattr(qmc.LatinHypercube, "random", lambda _, count: np.ones((count, 3)))
     varied = [read_varied(rack, text) for text in ("LOOP.KP=0.1:2.1", "REF%=0:9999", "SLOW=1,2,3,4")]
     assert sample(varied, 1, 1) == [(single("2.1"), 9999, 4.0)]
+
+
+def test_a_tunable_without_its_task_gets_the_name_that_is_meant(rack):
+    with pytest.raises(Fault) as caught:
+        read_varied(rack, "STEPS=1,2")
+    assert caught.value.hint == "a tunable belongs to its task: write LOOP.STEPS"
