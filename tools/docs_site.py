@@ -6,6 +6,7 @@ the page that shows the file; where there is none, only its text is left.
 
 from __future__ import annotations
 
+import html
 import posixpath
 import re
 from typing import TYPE_CHECKING
@@ -31,6 +32,10 @@ LINK = re.compile(r"(?<!!)\[(?P<text>[^\]]*)\]\((?P<target>[^)\s]+)\)")
 FENCE = re.compile(r"^```(?P<language>\w+)(?: (?P<file>\w+\.\w+))?[^\n`]*$", re.MULTILINE)
 """The head of a fence: its language, and the file that it shows or what its test needs to know."""
 CODE = re.compile(r"(^```.*?^```$|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
+TEXT = re.compile(r'(?P<head><div class="(?:language-text )?highlight">)(?P<text><pre>.*?</pre>)', re.DOTALL)
+TAG = re.compile(r"<[^>]*>")
+COLUMNS = 88
+"""As many letters of code are in a line of the column on a usual screen."""
 PROBLEM = re.compile(r"automax_ros/core/pages/(AMX(\d)\d+)\.md")
 
 
@@ -53,6 +58,20 @@ def on_page_markdown(markdown: str, *, page: Page, files: Files, **_: object) ->
     parts = CODE.split(markdown)
     text = (part if index % 2 else linked(part, source, place, known) for index, part in enumerate(parts))
     return FENCE.sub(headed, "".join(text))
+
+
+def on_page_content(content: str, **_: object) -> str:
+    """Let drawings and other wide blocks of text fit into the column (docs/assets/pages.css)."""
+    return TEXT.sub(fitted, content)
+
+
+def fitted(match: re.Match[str]) -> str:
+    """Return a block of text, one that is wider than the column with the number of its columns."""
+    columns = max(len(line) for line in html.unescape(TAG.sub("", match["text"])).splitlines() or [""])
+    head = match["head"]
+    if columns > COLUMNS:
+        head = head.replace('<div class="', f'<div style="--columns: {columns}" class="drawing ')
+    return head + match["text"]
 
 
 def headed(match: re.Match[str]) -> str:

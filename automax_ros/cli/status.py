@@ -172,9 +172,10 @@ class StatusDisplay:
 
 
 def _shown(item: CommonElement, value: Value) -> str:
-    """Return a value as the rack file means it: by its scale, with its unit."""
+    """Return a value as the rack file means it: by its scale, with its unit; the unit `counts` goes without saying."""
     variable = item.variable
     text = value_text(value)
     if variable.scale is not None and isinstance(value, int):
         text = f"{variable.scale.value_of(value):.6g}"
-    return printable(f"{text} {variable.unit}".rstrip())
+    unit = "" if variable.unit.strip() == "counts" else variable.unit
+    return printable(f"{text} {unit}".rstrip())

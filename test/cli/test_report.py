@@ -248,7 +248,11 @@ def test_a_speed_reference_is_drawn_where_somebody_names_it(automax, bag):
     assert line.values[-1] == pytest.approx(100 / 17.5, rel=1e-3)
     line = lines_of(automax.folder / "joint", references={"UNWIND": "COUNTS%"})["SPEED_REF COUNTS%"]
     assert line.values[-1] == pytest.approx(2048 / 40.95)
-    for given, told in (("NONE%", "no common variable"), ("NOTE$", "is STRING"), ("WIND=SP%", "is not a drive of it")):
+    for given, told in (
+        ("NONE%", "no common variable"),
+        ("NOTE$", "is STRING"),
+        ("WIND=SP%", "is not a drive of the report"),
+    ):
         result = automax("report", "bag", "--speed-ref", given, "--output", "page.html")
         assert (result.code, "AMX6841" in result.err, told in result.err) == (2, True, True), result.err
     assert "has one already" in automax("report", "bag", "--speed-ref", "SP%", "--speed-ref", "SP%").err

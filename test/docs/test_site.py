@@ -77,6 +77,60 @@ def test_it_needs_no_network(site):
         assert fetched == [], page
 
 
+def test_its_search_works_from_the_disk(site):
+    """Finding 23. Browsers let a page from the disk neither fetch the index nor start a worker: both are scripts."""
+    index = (site / "search" / "search_index.js").read_text(encoding="utf-8")
+    assert index.startswith("var __index = {")
+    assert '"location":"start.html#' in index
+    shim = site / "assets" / "iframe-worker.js"
+    assert 'location.protocol === "file:"' in shim.read_text(encoding="utf-8")
+    for page in site.rglob("*.html"):
+        (place,) = re.findall(r'<script src="([^"]*iframe-worker.js)"', page.read_text(encoding="utf-8"))
+        assert (page.parent / place).resolve() == shim or page.name == "404.html"
+
+
+def test_pictures_have_a_size_of_their_own(site):
+    """Finding 23: an SVG without width and height is 0 x 0 pixels in its figure."""
+    pictures = sorted({*(ROOT / "docs").rglob("*.svg"), *(ROOT / "docs").rglob("*.png")})
+    assert len(pictures) >= 4
+    for path in pictures:
+        assert path.stat().st_size < 200_000
+        assert (site / path.relative_to(ROOT / "docs")).is_file()
+        if path.suffix == ".svg":
+            assert re.match(
+                r'<svg [^>]*width="\d+" height="\d+" viewBox="0 0 \d+ \d+"', path.read_text(encoding="utf-8")
+            )
+
+
+def test_drawings_fit_into_the_column(site):
+    """Finding 23: they were cut at half. A block wider than the column says how many letters it is wide."""
+    page = (site / "examples" / "dc_drive.html").read_text(encoding="utf-8")
+    (columns,) = re.findall(
+        r'<div style="--columns: (\d+)" class="drawing [^"]*"><pre>(?:<[^>]*>)*   panel 57C419', page
+    )
+    drawing = (
+        (ROOT / "config" / "dc_drive" / "README.md").read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
+    )
+    assert int(columns) == max(map(len, drawing.splitlines())) > SITE.COLUMNS
+    assert "assets/pages.css" in page
+    assert "var(--columns)" in (site / "assets" / "pages.css").read_text(encoding="utf-8")
+
+
+def test_the_pictures_are_of_the_racks_as_they_are():
+    """What the terminal shows is made again; `tools/docs_pictures.py` renews it with the others."""
+    drawn = (ROOT / "docs" / "pictures" / "screen.svg").read_text(encoding="utf-8")
+    assert tool("docs_pictures").screen() == drawn
+
+
+@pytest.mark.soak
+def test_the_pictures_of_report_and_plot_are_made_again(tmp_path):
+    """Where another matplotlib draws other bytes, the size is the same."""
+    tool("docs_pictures").make(tmp_path)
+    for name in ("report.png", "plot.png"):
+        made, committed = (folder.joinpath(name).read_bytes() for folder in (tmp_path, ROOT / "docs" / "pictures"))
+        assert made[16:24] == committed[16:24]
+
+
 def test_links_to_elsewhere_are_whole(site):
     texts = (page.read_text(encoding="utf-8") for page in site.rglob("*.html"))
     for link in {link for text in texts for link in re.findall(r"href=[\"']?(https?:[^\"' >]+)", text)}:

@@ -1,0 +1,104 @@
+"""Makes the pictures of the documentation from a simulated run of the example rack, so that they stay true.
+
+`.venv/bin/python tools/docs_pictures.py` writes them into docs/pictures/: what `automax report` and `automax plot`
+draw of the tour through config/dc_drive, and what the terminal shows while the rack runs. The same rack and the same
+matplotlib give the same bytes.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from html import escape
+from pathlib import Path
+
+from automax_ros.cli.main import main
+from automax_ros.cli.status import StatusDisplay
+from automax_ros.cli.status_parts import Progress, Summary
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.loader import load
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.settings import watched
+
+ROOT = Path(__file__).resolve().parent.parent
+RACK = ROOT / "config" / "dc_drive"
+PICTURES = ROOT / "docs" / "pictures"
+PLOTTED = ("SPEED_REF%", "SPD%", "CUR_REF%", "CUR_FB%", "BRIDGE@", "F_SCR@")
+SCREEN_S = (1, 3, 5, 8)
+"""Seconds of the run at which the line of status is shown."""
+_LETTER, _LINE, _EDGE = 8.0, 19, 14
+"""Width of a letter and height of a line of the terminal, and the room around them, in pixels."""
+
+
+def make(folder: Path) -> None:
+    """Write all pictures into a folder."""
+    with tempfile.TemporaryDirectory() as scratch:
+        bag = Path(scratch) / "tour"
+        tour = ("--simulated", "--duration", "40", "--stimuli", RACK / "tour.yaml", "--record", bag)
+        _automax("run", RACK, *tour)
+        _automax("report", bag, "--png", folder / "report.png", "--speed-ref", "SPEED_REF%")
+        _automax("plot", bag, *PLOTTED, "--to", "24", "--size", "1200x640", "-o", folder / "plot.png")
+    (folder / "screen.svg").write_text(screen(), encoding="utf-8")
+
+
+def screen() -> str:
+    """Return the terminal of a run as SVG: the line of status at some instants."""
+    lines = ["$ make run", *status_lines()]
+    width = round(2 * _EDGE + _LETTER * max(map(len, lines)))
+    height = 2 * _EDGE + _LINE * len(lines)
+    rows = "\n".join(
+        f'<text x="{_EDGE}" y="{_EDGE + _LINE * number + 14}" textLength="{_LETTER * len(line):g}" '
+        f'lengthAdjust="spacingAndGlyphs" xml:space="preserve">{escape(line)}</text>'
+        for number, line in enumerate(lines)
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" '
+        'font-family="monospace" font-size="13" fill="#e0e0e0" role="img">\n'
+        "<title>The line of status of a rack: its time, scans, and the commons that its file watches</title>\n"
+        f'<rect width="{width}" height="{height}" rx="6" fill="#20262b"/>\n{rows}\n</svg>\n'
+    )
+
+
+def status_lines() -> list[str]:
+    """Return the lines of status of the rack as `automax run` shows them, without what the host's speed decides."""
+    config = load(RACK / "rack.yaml").config
+    assert config is not None
+    rack = Rack(config)
+    shown = _Shown()
+    display = StatusDisplay(rack, watched(config, None), live=False, screen=shown)
+    rack.start()
+    for second in SCREEN_S:
+        rack.scheduler.run_until(second * NS_PER_S)
+        display.update(rack.now_ns)
+    return ["  ".join(part for part in parts if not part.endswith("x")) for parts in shown.lines]
+
+
+class _Shown:
+    """A screen that keeps what it is shown; it is always time for the next line."""
+
+    began_ns = 0
+
+    def __init__(self) -> None:
+        self.lines: list[list[str]] = []
+
+    def due(self) -> int:
+        return 1
+
+    def progress(self, progress: Progress) -> None:
+        self.lines.append(progress.parts)
+
+    def message(self, text: str) -> None:
+        raise RuntimeError(f"the example has trouble: {text}")
+
+    def summary(self, summary: Summary) -> None:
+        """Keep nothing of it."""
+
+
+def _automax(*words: object) -> None:
+    if main([str(word) for word in words]):
+        sys.exit(f"automax {words[0]} failed")
+
+
+if __name__ == "__main__":
+    PICTURES.mkdir(exist_ok=True)
+    make(PICTURES)
