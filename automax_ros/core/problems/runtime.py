@@ -42,5 +42,6 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX7114", "drive fault: external instantaneous electronic trip (IET)"),
     Problem("AMX7115", "drive fault: incorrect phase rotation"),
     Problem("AMX7116", "drive fault: shorted SCR", hardware="87"),
+    Problem("AMX7117", "register 4137 of a 57C406 is not twice register 4138"),
     Problem("AMX7042", "deadline missed on the wall clock"),
 )
