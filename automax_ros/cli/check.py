@@ -120,14 +120,18 @@ def _rack_file(path: Path, *, allow_outside: bool) -> list[_Findings]:
     """
     # Whoever checks a task alone need not wait until the reader of racks is loaded.
     from automax_ros.cli.rack_file import is_text, load_rack_file, size_of
+    from automax_ros.rack.cpu_load import late_loops, loads_of
     from automax_ros.rack.tasks_check import check_tasks, forgotten
 
     rack = load_rack_file(path, allow_outside=allow_outside)
     tasks = check_tasks(rack.config) if rack.config is not None else []
+    whole: list[Diagnostic] = []
+    if rack.config is not None:
+        whole = [*forgotten(rack.config, tasks), *late_loops(loads_of(rack.config, tasks))]
     return [
         _Findings(
             rack.source,
-            [*rack.diagnostics, *(forgotten(rack.config, tasks) if rack.config is not None else ())],
+            [*rack.diagnostics, *whole],
             [],
             size=size_of(rack.config) if rack.config is not None else "",
             usable=is_text(rack),

@@ -10,13 +10,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 
 from automax_ros.cli.rack_file import add_outside_argument, load_rack_file
 from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.core.diagnostics import has_errors
-from automax_ros.core.text import table
+from automax_ros.core.text import count_of, table
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_US
 from automax_ros.rack.cpu_load import ModuleLoad, TaskLoad, faults, loads_of
 from automax_ros.rack.tasks_check import check_tasks
@@ -70,10 +70,11 @@ def _task_record(task: TaskLoad) -> dict[str, object]:
         "period_us": None if task.period_ns is None else task.period_ns / NS_PER_US,
         "load_percent": None if task.percent is None else round(task.percent, 2),
         "estimated": task.times.estimated,
+        **({"accesses_57c406": {str(slot): count for slot, count in task.accesses.items()}} if task.accesses else {}),
     }
 
 
-def _text(loads: Iterable[ModuleLoad]) -> list[str]:
+def _text(loads: Sequence[ModuleLoad]) -> list[str]:
     lines: list[str] = []
     for load in loads:
         ticks = "" if load.least_ticks is None else f", at least {load.least_ticks} TICKS"
@@ -82,6 +83,10 @@ def _text(loads: Iterable[ModuleLoad]) -> list[str]:
         if load.tasks:
             header = ("  task", "least us", "most us", "period us", "load %", "")
             lines += table([header, *map(_row, load.tasks)], right=range(1, 5))
+    for task in (task for load in loads for task in load.tasks):
+        for slot, count in task.accesses.items():
+            what = f"{task.task} latches {count_of(count, 'register')} of the 57C406 in slot {slot} each scan"
+            lines += ["", f"{what}: {task.delay_percent(slot):.2f} % of the time of its microprocessor (52.7)"]
     if any(task.times.estimated for load in loads for task in load.tasks):
         lines += ["", "estimated: BASIC statements or a drive's loop are in the sum, whose times no manual prints"]
     return lines

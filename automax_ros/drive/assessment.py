@@ -9,6 +9,7 @@ from automax_ros.drive.drive_rules import (
     bridge_change,
     inertia_time,
     line_frequency,
+    line_synchronization,
     overcurrent,
     pmi_overcurrent,
     tach_loss,
@@ -18,6 +19,7 @@ from automax_ros.drive.gain_rules import GAIN_RULES
 Rule = Callable[[DriveCase], Finding]
 LOOP_RULES: tuple[Rule, ...] = (
     line_frequency,
+    line_synchronization,
     tach_loss,
     inertia_time,
     bridge_change,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
 
-from automax_ros.drive.limits import DEFAULT_THRESHOLD_DEG
+from automax_ros.drive.limits import DEFAULT_PERIOD_STEP_US, DEFAULT_PHASE_STEP_US, DEFAULT_THRESHOLD_DEG
 from automax_ros.drive.nameplate import DriveParameters
 
 
@@ -68,6 +68,8 @@ class DriveCase:
         task: the task with its current minor loop, "" where that is not a task's.
         inputs: the inputs of DC_DRIVE_CML by keyword, those not programmed left out.
         threshold: register 4136.
+        phase_step: register 4137.
+        period_step: register 4138.
         fast_change: bit 0 of register 4146; value None where it may be either.
         voltage: whether the armature voltage is wired to a 57C405.
         registers: whether it is driven by a 57C406, with registers and a loop in a task.
@@ -82,6 +84,8 @@ class DriveCase:
     task: str = ""
     inputs: Mapping[str, Given] = field(default_factory=dict)
     threshold: Given = Given(DEFAULT_THRESHOLD_DEG, "default")
+    phase_step: Given = Given(DEFAULT_PHASE_STEP_US, "default")
+    period_step: Given = Given(DEFAULT_PERIOD_STEP_US, "default")
     fast_change: Given = Given(0, "default")
     voltage: bool = False
     registers: bool = True
@@ -102,6 +106,11 @@ class DriveCase:
     def rated_n_m(self) -> float:
         """Rated torque at the shaft, N m."""
         return self.parameters.values["shaft_torque_n_m"].value
+
+    @property
+    def most_n_m(self) -> float:
+        """Torque that the armature makes of its rated current with the whole field, N m, friction not taken off."""
+        return self.parameters.motor.k_v_s * self.parameters.amps
 
     @property
     def loop_inductance_h(self) -> float:

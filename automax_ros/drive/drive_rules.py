@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil, floor
+
 from automax_ros.blocks.cml_limits import ioc_is_possible
 from automax_ros.drive.drive_case import DriveCase, Finding, Verdict
 from automax_ros.drive.errors import ParameterError
@@ -93,13 +95,15 @@ def _jbar(case: DriveCase) -> float | None:
     if not lim_bar or lim_bar < 0:
         return None
     inertia = case.parameters.motor.inertia_kg_m2 * case.inertia
-    return jbar_s(inertia, case.base_rpm, case.rated_n_m * lim_bar / 100)
+    return floor(1000 * jbar_s(inertia, case.base_rpm, case.most_n_m * lim_bar / 100)) / 1000
 
 
 def inertia_time(case: DriveCase) -> Finding:
     """JBAR, which says whether the threshold may be raised (52.4.1, equation 2).
 
-    WR2 is that of motor and load as the plant has them; T is LIM_BAR of the rated torque at the shaft (decision).
+    WR2 is that of motor and load as the plant has them. T is what the armature makes of LIM_BAR of the rated current,
+    with the whole of its torque per ampere: what friction takes of it, and a load that brakes, could be missing. JBAR
+    is rounded down to a millisecond. Both err on the safe side (decision).
     """
     formula = "JBAR = (WR x WR x SB) / (308 T) >= 0.2 s (52.4.1, equation 2)"
     jbar = _jbar(case)
@@ -107,16 +111,36 @@ def inertia_time(case: DriveCase) -> Finding:
         result = f"LIM_BAR is {case.text('LIM_BAR')}: the largest torque is not known"
         return Finding("JBAR", Verdict.ATTENTION, result, formula)
     wr2 = case.parameters.motor.inertia_kg_m2 * case.inertia / KG_M2_PER_LB_FT2
-    torque = case.rated_n_m * (case.value("LIM_BAR") or 0.0) / 100 * LB_FT_PER_N_M
+    percent = case.value("LIM_BAR") or 0.0
+    torque = case.most_n_m * percent / 100
     enough = jbar >= LEAST_JBAR_S
     result = (
-        f"{jbar:.3g} s: the tach loss threshold may be raised"
+        f"{jbar:.3f} s: the tach loss threshold may be raised"
         if enough
-        else f"{jbar:.3g} s, less than {LEAST_JBAR_S:g}: leave register 4136 at {DEFAULT_THRESHOLD_DEG}"
+        else f"{jbar:.3f} s, less than {LEAST_JBAR_S:g}: leave register 4136 at {DEFAULT_THRESHOLD_DEG}"
     )
+    result += f"; T is the {torque:.4g} N m of this plant's armature at LIM_BAR, JBAR is rounded down"
     verdict = Verdict.FINE if enough else Verdict.ATTENTION
-    numbers = f"({wr2:.4g} lb ft2 x {case.base_rpm:.4g} rpm) / (308 x {torque:.4g} lb ft) = {jbar:.3g} s"
-    return Finding("JBAR", verdict, result, formula, numbers, {"jbar_s": jbar})
+    pounds = ceil(10 * torque * LB_FT_PER_N_M) / 10
+    numbers = f"({wr2:.4g} lb ft2 x {case.base_rpm:.4g} rpm) / (308 x {pounds:.1f} lb ft) = {jbar:.3f} s"
+    return Finding("JBAR", verdict, result, formula, numbers, {"jbar_s": jbar, "torque_n_m": torque})
+
+
+def line_synchronization(case: DriveCase) -> Finding:
+    """Registers 4137 and 4138: above 0, one twice the other (52.5.1); what is not so is used as it is (decision)."""
+    formula = "register 4137 = 2 x register 4138 > 0 (52.5.1)"
+    phase, period = case.phase_step, case.period_step
+    programmed = f"register 4137: {phase.text}, 4138: {period.text}"
+    values = {"register_4137": phase.value, "register_4138": period.value}
+    if phase.value is None or period.value is None:
+        verdict, why = Verdict.ATTENTION, "not known whether one is twice the other"
+    elif min(phase.value, period.value) <= 0:
+        verdict, why = Verdict.WRONG, "neither may be 0 or less: the line sync is lost"
+    elif phase.value != 2 * period.value:
+        verdict, why = Verdict.ATTENTION, "the first is not twice the second: both are used as they are (AMX7117)"
+    else:
+        verdict, why = Verdict.FINE, "one is twice the other"
+    return Finding("line synchronization", verdict, f"{programmed}; {why}", formula, "", values)
 
 
 def bridge_change(case: DriveCase) -> Finding:

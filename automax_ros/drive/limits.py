@@ -14,6 +14,8 @@ from automax_ros.drive.nameplate import KG_M2_PER_LB_FT2
 
 DEFAULT_THRESHOLD_DEG, LARGEST_THRESHOLD_DEG = Measured(0).tach_threshold, TACH_HIGHEST_DEG
 """Register 4136 after initialisation, and the largest value that the tach loss function uses (52.4.1)."""
+DEFAULT_PHASE_STEP_US, DEFAULT_PERIOD_STEP_US = Measured(0).phase_step, Measured(0).period_step
+"""Registers 4137 and 4138 after initialisation, us per line cycle (52.5.1)."""
 LEAST_JBAR_S = 0.2
 """JBAR from which on the threshold may be raised, s (52.4.1, equation 2)."""
 OVERCURRENT_RATIO = 1.8

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from automax_ros.compile.cost import MOST_SHARED_TICKS
 from automax_ros.compile.scan_times import ScanTimes, period_ns, scan_times
@@ -12,6 +13,8 @@ from automax_ros.core.ticks import NS_PER_US
 from automax_ros.language.program import Program
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.executive import version_text
+from automax_ros.rack.modules.drive_controller import ACCESS_NS
+from automax_ros.rack.modules.drive_rules import latched_registers
 from automax_ros.rack.modules.kind import ModuleConfig, cost_model
 from automax_ros.rack.modules.registry import SUPPORTED
 from automax_ros.rack.tasks_check import CheckedTask
@@ -32,6 +35,12 @@ class TaskLoad:
     times: ScanTimes
     period_ns: int | None
     fires: bool = False
+    accesses: Mapping[int, int] = field(default_factory=dict)
+    """How many registers of a 57C406 it latches in a scan, by slot: each delays the microprocessor there (52.7)."""
+
+    def delay_percent(self, slot: int) -> float:
+        """Return the share of the time of the 57C406 in a slot that its accesses cost."""
+        return 0.0 if self.period_ns is None else _WHOLE * self.accesses[slot] * ACCESS_NS / self.period_ns
 
     @property
     def percent(self) -> float | None:
@@ -63,13 +72,19 @@ class ModuleLoad:
 def loads_of(config: RackConfig, checked: Iterable[CheckedTask]) -> list[ModuleLoad]:
     """Return the loads of all modules that run tasks, in the order of slots; tasks with errors are left out."""
     programs = {item.task.name: item.result.program for item in checked}
-    return [_load_of(module, programs) for module in config.task_modules]
+    return [_load_of(config, module, programs) for module in config.task_modules]
 
 
-def _load_of(module: ModuleConfig, programs: Mapping[str, Program | None]) -> ModuleLoad:
+def _load_of(config: RackConfig, module: ModuleConfig, programs: Mapping[str, Program | None]) -> ModuleLoad:
     model = cost_model(module)
     tasks = tuple(
-        TaskLoad(task.name, scan_times(program, model), period_ns(program), program.cml is not None)
+        TaskLoad(
+            task.name,
+            scan_times(program, model),
+            period_ns(program),
+            program.cml is not None,
+            Counter(point.slot for _, point, _ in latched_registers(config, program)),
+        )
         for task in module.tasks
         if (program := programs[task.name]) is not None
     )
@@ -79,13 +94,12 @@ def _load_of(module: ModuleConfig, programs: Mapping[str, Program | None]) -> Mo
 def faults(config: RackConfig, loads: Iterable[ModuleLoad]) -> list[Diagnostic]:
     """Return what is wrong with the loads of a rack, each at the place of its module in the rack file."""
     known = list(loads)
-    late = (found for load in known for found in _late_loops(load))
-    return [*_old_executive(config), *(found for load in known for found in _overload(load)), *late]
+    return [*_old_executive(config), *(found for load in known for found in _overload(load)), *late_loops(known)]
 
 
-def _late_loops(load: ModuleLoad) -> Iterator[Diagnostic]:
+def late_loops(loads: Iterable[ModuleLoad]) -> Iterator[Diagnostic]:
     """Tell of current minor loops whose command comes in the second half of a sixth of a line cycle."""
-    for task in load.tasks:
+    for load, task in ((module, task) for module in loads for task in module.tasks):
         if task.fires and task.percent is not None and task.percent > _HALF:
             took, sixth = task.times.most_ns / NS_PER_US, (task.period_ns or 0) / NS_PER_US
             due = f"half of a sixth of a line cycle ({sixth:.0f} us)"

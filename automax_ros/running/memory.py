@@ -44,6 +44,8 @@ class CommonMemory(Image):
         """Whether a write of a view writes its cell and nothing else."""
         self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
         self._gate = array("q", (1, 0))
+        self.accesses: dict[int, Callable[[], None]] = {}
+        """Who is told of each access that a scan in modeled time makes to a view: see ``watch_accesses``."""
 
     @property
     def sequence(self) -> int:
@@ -184,6 +186,13 @@ class CommonMemory(Image):
         It may do no more than post an event, since the write may be one of several.
         """
         self._watched.setdefault((bank, register), []).append(written)
+
+    def watch_accesses(self, bank: int, accessed: Callable[[], None]) -> None:
+        """Call ``accessed`` for each read and write of a module's registers by a scan that takes modeled time."""
+        self.accesses[bank] = accessed
+        for view, spec in enumerate(self.specs):
+            if spec.place is not None and spec.place.bank == bank:
+                self.accesses[view] = accessed
 
     def keep_log(self) -> None:
         """Begin to keep the write log; whoever asks must ``take_writes`` or ``drain`` it."""

@@ -15,6 +15,7 @@ from automax_ros.compile.scan_io import StateValues
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import Latched, Value
 from automax_ros.running.error_log import ErrorLog, LogEntry
+from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scan_record import ScanRecord
 from automax_ros.running.task_io import Call, ScanMemory
 from automax_ros.running.views import LatchPlan
@@ -26,12 +27,15 @@ Progress = Mapping[str, Any]
 class HeardMemory:
     """Memory as a scan under way uses it: ``heard`` is all that it was given since it began.
 
-    After ``tell`` it gives what an earlier scan was given and writes nothing, until ``live``.
+    After ``tell`` it gives what an earlier scan was given and writes nothing, until ``live``. ``latched`` are the views
+    that a latch takes.
     """
 
     def __init__(self, memory: ScanMemory) -> None:
         """Take the memory that the task works on."""
         self._memory = memory
+        self._accesses: Mapping[int, Call] = memory.accesses if isinstance(memory, CommonMemory) else {}
+        self.latched: Sequence[int] = ()
         self._told: Iterator[Any] | None = None
         self.heard: list[Any] = []
         self.latched_ns = 0
@@ -59,6 +63,7 @@ class HeardMemory:
         if self._told is None:
             self.latched_ns = self._memory.now_ns
             values = self._memory.latch(plan)
+            self._tell(self.latched)
         else:
             values = tuple(next(self._told))
         self.heard.append(values)
@@ -66,7 +71,11 @@ class HeardMemory:
 
     def read_now(self, view: int, element: int = 0) -> Value:
         """Return an actual value."""
-        value: Value = self._memory.read_now(view, element) if self._told is None else next(self._told)
+        if self._told is None:
+            value: Value = self._memory.read_now(view, element)
+            self._tell((view,))
+        else:
+            value = next(self._told)
         self.heard.append(value)
         return value
 
@@ -86,6 +95,7 @@ class HeardMemory:
         """Write what the scan's blocks changed."""
         if self._told is None:
             self._memory.commit(changes, writer)
+            self._tell([view for view, _ in changes] if self._accesses else ())
 
     def write_now(
         self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
@@ -93,6 +103,15 @@ class HeardMemory:
         """Write an actual value."""
         if self._told is None:
             self._memory.write_now(view, value, writer, element, kind)
+            self._tell((view,))
+
+    def _tell(self, views: Sequence[int]) -> None:
+        """Tell those who watch it of an access to each of some views."""
+        if self._accesses:
+            for view in views:
+                told = self._accesses.get(view)
+                if told is not None:
+                    told()
 
 
 @dataclass(eq=False)

@@ -72,7 +72,8 @@ class Task:
         self.compiled = compiled.holding(frozenset())
         self.forces: dict[str, Value] = {}
         self._forces_wait = False
-        self.plan = self.memory.plan([self.memory.view(name) for name in compiled.latched])
+        latched = [self.memory.view(name) for name in compiled.latched]
+        self.plan, self._heard.latched = self.memory.plan(latched), latched
         self.written = tuple(self.memory.view(name) for name in compiled.written)
         self._state: StateValues = compiled.layout.fresh()
         self._arrays = [position for position, field in enumerate(compiled.layout.fields) if field.is_array]

@@ -126,6 +126,12 @@ def test_a_current_minor_loop_that_takes_more_than_half_of_a_sixth_is_warned_of(
     assert result.code == 0
     assert ("warning[AMX6774]: CML takes " in result.err) == warned
     assert ("more than half of a sixth of a line cycle (2778 us)" in result.err) == warned
+    checked = automax("check", tmp_path / "rack.yaml")
+    assert checked.code == 0
+    assert [line for line in checked.out.splitlines() if "AMX6774" in line] == [
+        line for line in result.err.splitlines() if "AMX6774" in line
+    ]
+    assert ("warning[AMX6774]: CML takes " in checked.out) == warned
 
 
 @pytest.mark.parametrize(("version", "warned"), [("3.3", True), ("3.4", False), ("4.2", False)])
@@ -180,3 +186,21 @@ def test_least_ticks_of_a_udc(a_us, b_us, ticks, code):
     assert load.least_ticks == ticks
     config = RackConfig("PM1", "pm1", Path("rack.yaml"), "", operator=False, modules=(), variables=())
     assert [item.code for item in faults(config, [load])] == ([code] if code else [])
+
+
+def test_what_latching_registers_of_a_57c406_costs_it_is_told(automax, tmp_path):
+    """52.7: a control-block task reads them at each scan; the estimate is 5 us each."""
+    example = Path(__file__).parents[2] / "config" / "dc_drive"
+    for file in example.glob("*.B*"):
+        (tmp_path / file.name).write_text(file.read_text())
+    (tmp_path / "rack.yaml").write_text((example / "rack.yaml").read_text())
+    assert "accesses_57c406" not in automax("load", tmp_path, "--json").out
+    point = next(
+        line.split(":")[0].strip() for line in (tmp_path / "rack.yaml").read_text().splitlines() if "4146" in line
+    )
+    cml = (tmp_path / "CML.BLK").read_text().replace("COMMON CUR_REF%", f"COMMON {point}, CUR_REF%")
+    (tmp_path / "CML.BLK").write_text(cml)
+    tasks = [task for module in json.loads(automax("load", tmp_path, "--json").out) for task in module["tasks"]]
+    assert [task["accesses_57c406"] for task in tasks if "accesses_57c406" in task] == [{"7": 1}]
+    told = "CML latches 1 register of the 57C406 in slot 7 each scan: 0.18 % of the time of its microprocessor (52.7)"
+    assert told in automax("load", tmp_path).out

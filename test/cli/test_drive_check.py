@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from automax_ros.drive.limits import boundary_amps
+from automax_ros.drive.motor import Motor
+from automax_ros.drive.nameplate import EXAMPLES, derive
 
 from .drive_racks import loop_task, rack_file, write_rack
 
@@ -34,7 +36,7 @@ def test_a_sound_drive_is_fine_and_every_formula_is_printed_with_its_numbers(aut
     for text in (
         "UNWIND: 57C406 in slot 7", "task LOOP", "500 V, 245.8 A, 1750 rpm",
         "180 - ARCOS[(0.75 x 500) / (1.35 x 460)] = 127.1 deg",
-        "(35 lb ft2 x 1750 rpm) / (308 x 675.3 lb ft) = 0.294 s",
+        "(35 lb ft2 x 1750 rpm) / (308 x 708.7 lb ft) = 0.280 s",
         "2346.575 mH A / 245.8 A = 9.545 mH at 460 V",
         "225 < 1.8 x 150 = 270",
     ):  # fmt: skip
@@ -64,11 +66,15 @@ def test_bounds_of_the_example_motors(judged, motor, bound, largest):
     assert found["fast bridge change"]["verdict"] == "fine"
 
 
-@pytest.mark.parametrize(("inertia", "verdict"), [(1, "attention"), (1.03, "attention"), (1.1, "fine"), (10, "fine")])
+@pytest.mark.parametrize(("inertia", "verdict"), [(1, "attention"), (1.12, "attention"), (1.15, "fine"), (10, "fine")])
 def test_jbar_of_the_10_hp_motor_needs_some_more_inertia(judged, inertia, verdict):
+    """T is the torque of the armature, 1.205 N m an ampere, which is 7 % more than the plate's at the shaft."""
     found = judged(rack_file(f"motor: dc_10hp_240v, inertia: {inertia}"))["JBAR"]
-    assert found["values"]["jbar_s"] == pytest.approx(1.5 * inertia * 1750 / (308 * 30.0 * 1.5), rel=2e-3)
+    pounds = 1.2048 * 36.14 * 1.5 / 1.3558
+    assert found["values"]["torque_n_m"] == pytest.approx(pounds * 1.3558, rel=1e-3)
+    assert found["values"]["jbar_s"] == pytest.approx(1.5 * inertia * 1750 / (308 * pounds), abs=2e-3)
     assert found["verdict"] == verdict
+    assert "of this plant's armature at LIM_BAR, JBAR is rounded down" in found["result"]
     assert ("leave register 4136 at 109" in found["result"]) == (verdict == "attention")
 
 
@@ -97,6 +103,34 @@ def test_a_raised_threshold_needs_its_jbar(automax, judged):
     found = threshold(automax, judged, "TLD% = 110", "motor: dc_10hp_240v", code=1)
     assert found["verdict"] == "wrong"
     assert "only with a JBAR of 0.2 s" in found["result"]
+
+
+def test_jbar_is_no_longer_than_the_plant_takes_to_base_speed(judged, tmp_path):
+    """The least time in which LIM_BAR brings the unloaded shaft from rest to base speed, by the plant itself."""
+    found = judged(rack_file("motor: dc_150hp_500v"))["JBAR"]["values"]["jbar_s"]
+    motor = Motor(derive(EXAMPLES["150hp"]).motor)
+    took_s = 0.0
+    while motor.speed_rad_s < 1750 * pi / 30:
+        motor.advance(1e-3, 1.5 * 245.83 * 1e-3, 0.0)
+        took_s += 1e-3
+    assert 0.95 * took_s < found <= took_s
+
+
+@pytest.mark.parametrize(
+    ("statements", "values", "verdict", "code"),
+    [
+        (("REF% = 0",), (4, 2), "fine", 0), (("IOWRITE 7, 4137, 80", "IOWRITE 7, 4138, 40"), (80, 40), "fine", 0),
+        (("IOWRITE 7, 4137, 80",), (80, 2), "attention", 0), (("IOWRITE 7, 4138, 0",), (4, 0), "wrong", 1),
+        (("IOWRITE 7, 4138, REF%",), (4, None), "attention", 0),
+    ],
+)  # fmt: skip
+def test_4137_is_twice_4138(judged, statements, values, verdict, code):
+    rack = rack_file(tasks=", B_INIT: {priority: 9, file: B_INIT.BAS}")
+    body = "".join(f"{number} {text}\n" for number, text in enumerate(statements, 20))
+    found = judged(rack, code=code, B_INIT=f"10 COMMON REF%\n{body}90 END\n")["line synchronization"]
+    assert (found["values"]["register_4137"], found["values"]["register_4138"]) == values
+    assert found["verdict"] == verdict
+    assert ("used as they are" in found["result"]) == (verdict == "attention" and None not in values)
 
 
 @pytest.mark.parametrize(

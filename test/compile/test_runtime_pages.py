@@ -12,7 +12,7 @@ from .support import TICK, basic_task_of, task_of
 
 SCANS = 20
 CODES = [code for code in PROBLEMS if code.startswith("AMX7")]
-DRIVE = {f"AMX{number}" for number in (7105, 7106, 7107, *range(7110, 7117), 7119)}
+DRIVE = {f"AMX{number}" for number in (7105, 7106, 7107, *range(7110, 7118), 7119)}
 """A drive has these: ``test_drive_faults`` of the rack and of its loop provoke them."""
 WITHOUT_EXAMPLE = {"AMX7042", "AMX7051", "AMX7052", "AMX7070", "AMX7071", "AMX7072"} | DRIVE
 """No task can provoke these by itself: the host does, or the rack."""

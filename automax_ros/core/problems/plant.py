@@ -10,6 +10,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX6771", "tasks of a UDC fit in no TICKS", hardware="14"),
     Problem("AMX6773", "PC3000 that is not alone"),
     Problem("AMX6774", "current minor loop that takes more than half of a sixth of a line cycle", Severity.WARNING),
+    Problem("AMX6788", "AC_LINE_FREQ above the frequency of the plant's line", Severity.WARNING),
     Problem("AMX6772", "Executive older than the tables of execution times", Severity.WARNING),
     # `automax import`: configuration tasks
     Problem("AMX6780", "statement that no configuration task has"),

@@ -42,6 +42,7 @@ PROBLEMS: tuple[Problem, ...] = (
     Problem("AMX7114", "drive fault: external instantaneous electronic trip (IET)"),
     Problem("AMX7115", "drive fault: incorrect phase rotation"),
     Problem("AMX7116", "drive fault: shorted SCR", hardware="87"),
+    Problem("AMX7117", "register 4137 of a 57C406 is not twice register 4138"),
     Problem("AMX7119", "drive fault: the hardware's overspeed circuit has tripped (OSV)"),
     Problem("AMX7042", "deadline missed on the wall clock"),
 )

@@ -28,6 +28,8 @@ BAD_DYNAMIC: Final = 7105
 BAD_FIXED: Final = 7106
 BAD_LEVEL: Final = 7107
 """Problems: a dynamic input out of range, a fixed one, IOC_THRESH of 1.8 LIM_BAR or more."""
+BAD_RATIO: Final = 7117
+"""Problem: the phase change of the PLL is not twice its period change (52.5.1)."""
 
 _LIMITED: Final = (
     "ac_line_freq",
@@ -41,6 +43,10 @@ _LIMITED: Final = (
 )
 _SWITCHES: Final = ("digital_tach", "tach_loss_stop", "auto_phrot")
 _DYNAMIC: Final = ("cc_thresh", "ref_rate", "kp", "test_alpha")
+_SEEN: Final = 1 << len(_DYNAMIC)
+_TOLD: Final = _SEEN << 1
+"""Bits next to those of the dynamic inputs: registers of another ratio were seen at the last tick, and were logged."""
+_INPUTS: Final = _SEEN - 1
 
 
 @lru_cache(maxsize=64)
@@ -116,22 +122,37 @@ class Latched(Stateful):
             period_ns: the measured period of the line, ns: the limits of REF_RATE follow it.
         """
         self.cml_coast_stop = inputs.cml_coast_stop
-        problems = self._read("kp", inputs.kp, 0.0) if inputs.kp != self.kp or self._bad else []
+        problems = self._read("kp", inputs.kp, 0.0) if inputs.kp != self.kp or self._bad & _INPUTS else []
         rate = inputs.ref_rate
-        if self._bad or (rate and not (rate == self.ref_rate and _is_rate_at_any_line(rate))):
+        if self._bad & _INPUTS or (rate and not (rate == self.ref_rate and _is_rate_at_any_line(rate))):
             problems += self._read("ref_rate", rate, 1e9 / period_ns)
         elif not rate:
             self.ref_rate = 0.0
-        if self.cml_test and (inputs.test_alpha != self.test_alpha or self._bad):
+        if self.cml_test and (inputs.test_alpha != self.test_alpha or self._bad & _INPUTS):
             problems += self._read("test_alpha", inputs.test_alpha, 0.0)
         return problems
 
     def always(self, inputs: Inputs) -> list[int]:
         """Read at a tick what is read in run and in standby; return the problems to log."""
         self.cml_run = inputs.cml_run
-        if inputs.cc_thresh == self.cc_thresh and not self._bad:
+        if inputs.cc_thresh == self.cc_thresh and not self._bad & _INPUTS:
             return []
         return self._read("cc_thresh", inputs.cc_thresh, 0.0)
+
+    def ratio(self, phase_step: int, period_step: int) -> list[int]:
+        """See registers 4137 and 4138 at a tick; return the problem to log where they have another ratio than 2 to 1.
+
+        It is logged once from task initialisation on, if two ticks in a row show it: a task that changes them writes
+        one after the other. They are used as they are (decision).
+        """
+        if phase_step == 2 * period_step or min(phase_step, period_step) <= 0 or self._bad & _TOLD:
+            self._bad &= ~_SEEN
+            return []
+        if self._bad & _SEEN:
+            self._bad ^= _SEEN | _TOLD
+            return [BAD_RATIO]
+        self._bad |= _SEEN
+        return []
 
     def _read(self, name: str, value: int | float, line_hz: float) -> list[int]:
         """Read a dynamic value; return the problem to log as it goes bad."""

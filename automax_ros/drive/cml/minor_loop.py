@@ -144,7 +144,7 @@ class CurrentMinorLoop(Stateful):
 
     def _read(self, measured: Measured, inputs: Inputs) -> list[int]:
         """Read the inputs of a tick; return the problems to log."""
-        problems = self.latched.always(inputs)
+        problems = self.latched.always(inputs) + self.latched.ratio(measured.phase_step, measured.period_step)
         if self.sequence.running:
             return problems + self.latched.run(inputs, self.pll.period_ns)
         self.latched.standby(inputs, measured.options)

@@ -8,14 +8,21 @@ relays are off. The plant goes on in any case, whether the rack runs, is stopped
 Its registers are outputs: the task's initialisation gives them their defaults, STOP ALL and a loss of power 0 (2.4.5).
 The contactor follows what the task commands; a force on the point of a relay only changes what the point shows
 (decision).
+
+Each access to it delays the microprocessor on it (52.7). Its firing circuit goes on by itself meanwhile, so what is
+late is what the microprocessor has to do: to take the loop's command. In modeled execution a command takes effect later
+by ``ACCESS_NS`` for each common on its registers that a scan of any task has latched, read or written since the
+interrupt, at most until the next one; what comes after the command delays nothing. The loop's own dealings with it, and
+what comes from outside, count not, nor do accesses that a distributed rack makes in another process (decision).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.drive.cml.signals import VOLTAGE, VOLTS, Command, Measured
+from automax_ros.drive.cml.signals import VOLTAGE, VOLTS, Command, Measured, Pulse
 from automax_ros.drive.controller import DriveController
 from automax_ros.drive.plant import DrivePlant
 from automax_ros.rack.modules.drive_digital import DriveDigital
@@ -31,6 +38,8 @@ DEFAULTS = {TACH_THRESHOLD: 109, PHASE_STEP: 4, PERIOD_STEP: 2, OPTIONS: 0}
 """What initialisation of the CML task writes to them (52.4.1, 52.5.1, 52.6.2, 52.7)."""
 _new = tuple.__new__
 """Makes a named tuple as tuples are made: its own way takes twice the time, and there is one at each interrupt."""
+ACCESS_NS = 5_000
+"""By how much an access of the application delays the microprocessor, ns (52.7; decision: no manual tells how much)."""
 REST_NS = 5_500_000
 """How often a plant whose drive rests is looked at, ns: the system clock tick (decision)."""
 
@@ -60,7 +69,11 @@ class DriveControllerModule:
         self._measured = Measured(0)
         self._rest_key = EventKey(EventClass.IO, config.slot, "rest")
         self._rest: ScheduledEvent | None = None
+        self._accesses = 0
+        self._command_key = EventKey(EventClass.IO, config.slot, "command")
+        self._delayed: tuple[Command, ScheduledEvent] | None = None
         parts.drives.attach(config.slot, self)
+        parts.memory.watch_accesses(bank.view, self._accessed)
 
     @property
     def timing(self) -> InterruptTiming:
@@ -93,6 +106,8 @@ class DriveControllerModule:
             "firing": self._controller.state(),
             "digital": self._digital.slot,
             "rest_ns": rest_ns,
+            "accesses": self._accesses,
+            "delayed": self._delayed_state(),
         }
 
     def load(self, state: ModuleState) -> None:
@@ -105,6 +120,11 @@ class DriveControllerModule:
         self._end_rest()
         if state["rest_ns"] is not None:
             self._rest_from(state["rest_ns"])
+        self._forget_accesses()
+        self._accesses = state["accesses"]
+        if state["delayed"] is not None:
+            due_ns, (next_ns, relays, pulses, level, block, ok) = state["delayed"]
+            self._delay(Command(next_ns, relays, tuple(Pulse(*pulse) for pulse in pulses), level, block, ok), due_ns)
 
     # As something that a person operates
 
@@ -145,6 +165,7 @@ class DriveControllerModule:
         if not self._interrupts.armed:
             return
         self._interrupts.disarm()
+        self._forget_accesses()
         self._controller.off(self._scheduler.now_ns)
         self._digital.show(0, ok=False)
         self._rest_from(self._scheduler.now_ns + REST_NS)
@@ -171,13 +192,45 @@ class DriveControllerModule:
 
     def command(self, command: Command) -> None:
         """Carry out what shall happen up to the next interrupt; its times count from the last one."""
-        self._controller.command(command, self._interrupts.at_ns, self._scheduler.now_ns)
+        at_ns, now_ns = self._interrupts.at_ns, self._scheduler.now_ns
+        due_ns = min(now_ns + self._accesses * ACCESS_NS, at_ns + command.next_ns - 1)
+        if due_ns > now_ns:
+            self._delay(command, due_ns)
+        else:
+            self._controller.command(command, at_ns, now_ns)
         tripped = self._controller.overspeed.tripped
         self._digital.show(0 if tripped else command.relays, ok=command.ok and not tripped)
         self._interrupts.follow(command.next_ns)
 
+    def _accessed(self) -> None:
+        self._accesses += 1
+
+    def _delay(self, command: Command, due_ns: int) -> None:
+        """Let a command take effect at an instant."""
+        self._delayed = command, self._scheduler.at(due_ns, self._command_key, self._carry_out)
+
+    def _carry_out(self, now_ns: int) -> None:
+        """Carry out the command that was delayed."""
+        delayed, self._delayed = self._delayed, None
+        if delayed is not None:
+            self._controller.command(delayed[0], self._interrupts.at_ns, now_ns)
+
+    def _forget_accesses(self) -> None:
+        """Nothing is delayed any more."""
+        delayed, self._delayed, self._accesses = self._delayed, None, 0
+        if delayed is not None:
+            delayed[1].cancel()
+
+    def _delayed_state(self) -> list[Any] | None:
+        """Return when a command takes effect that is delayed, and the command; None without one."""
+        if self._delayed is None:
+            return None
+        command, event = self._delayed
+        return [self._scheduler.due_ns(event), [*command[:2], [list(pulse) for pulse in command.pulses], *command[3:]]]
+
     def _measure(self, now_ns: int) -> None:
         """Measure at an interrupt; a 57C405 that is wired to the armature shows its voltage."""
+        self._accesses = 0
         feedback = self._parts.drives.voltage(self.config.slot)
         self._measured = self._controller.measure(now_ns, VOLTAGE if feedback is not None else 0)
         if self._controller.overspeed.tripped:

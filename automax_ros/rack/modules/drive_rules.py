@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import floor
 
 from automax_ros.core.diagnostics import Diagnostic
-from automax_ros.language.program import BoundCall, Program
+from automax_ros.language.program import BoundCall, Program, Symbol
 from automax_ros.language.syntax.tree import Scope
-from automax_ros.rack.config import RackConfig
+from automax_ros.rack.config import Point, RackConfig
 from automax_ros.rack.modules.digital_io import DRIVE_MODEL
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER, DriveConfig
 from automax_ros.rack.modules.kind import ModuleConfig
@@ -28,7 +29,11 @@ def drive_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[
     """Return what is wrong with the current minor loop tasks, and with others that touch their 57C406, by task."""
     found: dict[str, list[Diagnostic]] = {}
     loops = _Loops(config, programs)
-    for rule in (loops.slots, loops.own_modules, loops.counts, loops.lines, loops.priorities, loops.registers):
+    rules = (
+        *(loops.slots, loops.own_modules, loops.counts, loops.lines),
+        *(loops.frequencies, loops.priorities, loops.registers),
+    )
+    for rule in rules:
         for name, diagnostic in rule():
             found.setdefault(name, []).append(diagnostic)
     return found
@@ -119,6 +124,18 @@ class _Loops:
             hint = f"it has {LINES} interrupt lines: one for the events of a Processor, one for a loop"
             yield loop.found("AMX6491", f"no interrupt line is left for this task: {message}", hint)
 
+    def frequencies(self) -> Iterator[_Found]:
+        """AC_LINE_FREQ is the lowest frequency that the line has (52.1.1): not above that of the plant."""
+        for loop in self.all:
+            module = self.modules.get(loop.slot("IO_CNTL_SLOT"))
+            plant = module.plants.get("") if isinstance(module, DriveConfig) else None
+            line_hz, given = plant.line_hz if plant is not None else None, int(loop.bound.facts["ac_line_freq"])
+            if plant is not None and line_hz is not None and given > line_hz:
+                place = f"({self.config.path.name}:{plant.line})"
+                message = f"AC_LINE_FREQ is {given} Hz, but the line of plant {plant.name} {place} has {line_hz:g} Hz"
+                hint = f"AC_LINE_FREQ is the lowest frequency that is expected: write {max(48, floor(line_hz))} or less"
+                yield loop.found("AMX6788", message, hint, "AC_LINE_FREQ")
+
     def priorities(self) -> Iterator[_Found]:
         """Nothing goes before the loop on its Processor (52.4.1: it normally has the highest priority)."""
         for loop in self.all:
@@ -133,16 +150,21 @@ class _Loops:
 
     def registers(self) -> Iterator[_Found]:
         """A control-block task latches all the commons that it declares, and so slows the 57C406 each scan (52.7)."""
-        slots = {module.slot for module in self.config.modules if isinstance(module, DriveConfig)}
-        points = {item.name: item for item in self.config.declared if item.point is not None}
         for name, program in self.programs.items():
-            if program.is_basic:
-                continue
-            for symbol in program.symbols.values():
-                variable = points.get(symbol.name) if symbol.scope is Scope.COMMON else None
-                if variable is not None and variable.point is not None and variable.point.slot in slots:
-                    place = f"({self.config.path.name}:{variable.line})"
-                    message = f"{symbol.name} is register {variable.point.register} of the {CONTROLLER} {place}"
-                    message += f": task {name} reads it at each scan, which delays that module"
-                    hint = "declare it only in a BASIC task (.BAS), and write it there once"
-                    yield name, Diagnostic("AMX6493", message, symbol.span, hint=hint)
+            for symbol, point, line in latched_registers(self.config, program):
+                message = (
+                    f"{symbol.name} is register {point.register} of the {CONTROLLER} ({self.config.path.name}:{line})"
+                )
+                message += f": task {name} reads it at each scan, which delays that module"
+                hint = "declare it only in a BASIC task (.BAS), and write it there once"
+                yield name, Diagnostic("AMX6493", message, symbol.span, hint=hint)
+
+
+def latched_registers(config: RackConfig, program: Program) -> Iterator[tuple[Symbol, Point, int]]:
+    """Yield what a control-block task latches of the registers of any 57C406: its variable, point, line of the file."""
+    slots = {module.slot for module in config.modules if isinstance(module, DriveConfig)}
+    points = {item.name: item for item in config.declared if item.point is not None and item.point.slot in slots}
+    for symbol in () if program.is_basic else program.symbols.values():
+        variable = points.get(symbol.name) if symbol.scope is Scope.COMMON else None
+        if variable is not None and variable.point is not None:
+            yield symbol, variable.point, variable.line

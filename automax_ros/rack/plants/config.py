@@ -105,6 +105,12 @@ class PlantConfig:
         return self.joint or self.name
 
     @property
+    def line_hz(self) -> float | None:
+        """Frequency of its AC line, Hz; None without a motor."""
+        plate = self.plate
+        return self.supply.hz if self.supply.hz is not None or plate is None else plate.line_hz
+
+    @property
     def plate(self) -> NamePlate | None:
         """The motor's plate, None without a motor."""
         if self.motor is None:

@@ -15,7 +15,7 @@ INPUTS = Inputs(
 )  # fmt: skip
 LOCKED_S = 0.5
 """Long enough for the line sync to lock."""
-CLOSED_S = 0.1
+CLOSED_S = 0.06
 """Long enough from the edge of CML_RUN to the run, without a test of the SCRs."""
 
 

@@ -208,6 +208,29 @@ def test_the_ioc_level_must_be_less_than_1_8_lim_bar(lim_bar, ioc, codes):
 LOOP = ("DC_TIME", "BRIDGE_POL", "REF_RATE_OUT", "REF_LAG_OUT", "FDBK_GAIN", "I_FDBK", "INTEGRAL_GAIN", "DELTA")
 
 
+@pytest.mark.parametrize("state", sorted(EVERY))
+def test_registers_of_another_ratio_are_told_once_and_used_as_they_are(state):
+    """52.5.1: 4137 must be twice 4138."""
+    drive = drive_in(state)
+    drive.registers = (109, 80, 40, 0)
+    drive.run(0.1)
+    assert drive.codes == []
+    for phase_step in (80, 20, 80):
+        drive.registers = (109, phase_step, 30, 0)
+        drive.run(0.1)
+        assert drive.codes == ["AMX7117"]
+    assert drive.loop.pll.locked
+    assert drive["DC_CML_STATE"] is (state != STANDBY)
+
+
+def test_a_ratio_that_is_wrong_between_two_writes_is_not_told():
+    drive = drive_in(RUN)
+    for registers in ((109, 80, 2, 0), (109, 80, 40, 0)) * 3:
+        drive.registers = registers
+        until_a_tick(drive)
+    assert drive.codes == []
+
+
 def test_outputs_are_written_at_the_first_scan_of_each_tick():
     drive = Drive()
     drive.run(1.0)

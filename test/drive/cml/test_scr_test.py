@@ -15,7 +15,7 @@ from .protected import LOCKED_S, Drive
 SUSPECTS = {1: {1, 14}, 2: {2, 15}, 3: {3, 16}, 4: {4, 11}, 5: {5, 12}, 6: {6, 13}}
 """The manual's table."""
 PAIR = {scr: pair for pair, scrs in SUSPECTS.items() for scr in scrs}
-LONGEST_S = {0: 0.1 + 0.15, 2: 0.1 + 0.3}
+LONGEST_S = {0: 0.04 + 0.15, 2: 0.04 + 0.3}
 """From the edge to the run, by register 4146: the contactor, and 9 or 18 cycles at 60 Hz."""
 
 
@@ -153,8 +153,8 @@ def test_it_delays_the_run_by_its_cycles(options, cycles):
 
     added_us = (ran_ns(tests_scrs=True) - ran_ns(tests_scrs=False)) / 1000
     assert added_us == pytest.approx(cycles * 16666.667, abs=1)
-    if options == 0:
-        assert ran_ns(tests_scrs=True) / 1e9 == pytest.approx(0.23, abs=0.01)
+    if options == 0:  # 52.3.1: approximately 180 ms
+        assert ran_ns(tests_scrs=True) / 1e9 == pytest.approx(0.18, abs=0.01)
 
 
 def test_it_ends_at_the_first_failure():

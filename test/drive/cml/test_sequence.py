@@ -27,7 +27,7 @@ def test_it_runs_within_half_a_second_of_the_edge():
     edge_ns = drive.now_ns
     drive.run(0.5, cml_run=True)
     ran_ns = next(now for now, row in drive.rows if row["DC_CML_STATE"])
-    assert 0.06 < (ran_ns - edge_ns) / 1e9 < 0.5
+    assert 0.025 < (ran_ns - edge_ns) / 1e9 < 0.5
     assert (drive.relay, closed(drive), drive["I_FDBK"] > 0) == (True, True, True)
 
 
@@ -84,7 +84,9 @@ def test_an_edge_that_comes_too_early_is_forgotten(hinder):
 def test_a_start_that_is_taken_back_opens_the_contactor():
     drive = Drive(reference=1000)
     drive.run(LOCKED_S)
-    drive.run(0.07, cml_run=True)
+    drive.inputs = drive.inputs._replace(cml_run=True)
+    while not closed(drive):
+        drive.scan()
     assert (drive.relay, closed(drive), drive["DC_CML_STATE"]) == (True, True, False)
     drive.run(0.01, cml_run=False)
     assert not drive.relay

@@ -46,6 +46,23 @@ def test_equal_priority_is_not_before(tmp_path):
     assert "SPEED of the same Processor" in text
 
 
+@pytest.mark.parametrize(
+    ("hertz", "given", "told"), [(50, 60, True), (50, 50, False), (50, 48, False), (60, 60, False), (59.5, 60, True)]
+)
+def test_ac_line_freq_is_not_above_the_line_of_the_plant(tmp_path, hertz, given, told):
+    """52.1.1: the lowest frequency that is expected; a warning, since the drive runs."""
+    yaml = edited(
+        YAML,
+        ("{motor: dc_150hp_500v, inertia: 100.0}", f"{{motor: dc_10hp_240v, line: {{hz: {hertz}}}}}"),
+    )
+    tasks = found(tmp_path, yaml=yaml, cml=edited(CML, ("IO_CNTL_SLOT=7", f"IO_CNTL_SLOT=7, AC_LINE_FREQ={given}")))
+    assert [(code, task) for code, task, *_ in tasks] == [("AMX6788", "CML")] * told
+    for _, _, line, message, hint in tasks:
+        assert line == 3
+        assert f"AC_LINE_FREQ is {given} Hz, but the line of plant UNWIND (rack.yaml:" in message
+        assert hint.endswith(f"write {50 if hertz == 50 else 59} or less")
+
+
 def test_tick_of_the_processor_must_be_the_default(tmp_path):
     """52.0: set to the default tick rate (5.5 ms)."""
     tasks = found(tmp_path, yaml=edited(YAML, ("module: 57C435, tasks", "module: 57C435, tick_ms: 5, tasks")))
