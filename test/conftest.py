@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from ros_domains import free_domain
 
 from automax_ros.nodes.environment import put_prefix_first
@@ -16,6 +17,10 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 for inherited in ("ROS_STATIC_PEERS", "ROS_NAMESPACE", "RMW_IMPLEMENTATION", "FASTRTPS_DEFAULT_PROFILES_FILE"):
     os.environ.pop(inherited, None)
 put_prefix_first()
+
+# An example may take as long as a busy host lets it, and the same ones are tried each time.
+settings.register_profile("tests", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("tests")
 
 # A shell that starts the tests in the background lets them ignore Ctrl-C; programs that they start would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:

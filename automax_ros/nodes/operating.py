@@ -138,7 +138,7 @@ class RackClient:
             raise NotOperable(f"rack {self._space} does not answer on {name}", hint)
         try:
             self._executor.spin_once(timeout_sec=_LOOK_S)
-        except Exception as error:  # whatever rclpy makes of bytes that are no answer
+        except Exception as error:  # whatever rclpy makes of malformed bytes
             if not self._context.ok():
                 raise
             hint = "look who else serves its operator's services in this ROS domain"

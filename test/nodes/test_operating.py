@@ -62,7 +62,7 @@ def test_a_service_that_does_not_answer_is_an_error_and_not_a_wait(ros_domain_id
 
 
 def test_an_answer_that_cannot_be_read_is_an_error_and_no_traceback(ros_domain_id, monkeypatch):
-    """A stranger may serve the operator's service; of bytes that are no answer rcl's own error leaves the executor."""
+    """A stranger may serve the operator's service; malformed bytes let rcl's own error leave the executor."""
     from rclpy.impl.implementation_singleton import rclpy_implementation
     from std_srvs.srv import Trigger
 
