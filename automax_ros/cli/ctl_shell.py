@@ -61,11 +61,12 @@ class _Shell:
         return failed
 
     def completions(self, text: str) -> list[str]:
-        """Return the words that begin with a text: actions, names of commons, tasks."""
+        """Return the words that begin with a text: actions, commons, tasks; in any case where none begins with it."""
         if self._names is None:
             self._names = self._known()
         words = [*ACTIONS, _HELP, _QUIT[0], *self._names]
-        return [word for word in words if word.lower().startswith(text.lower())]
+        exact = [word for word in words if word.startswith(text)]
+        return exact or [word for word in words if word.lower().startswith(text.lower())]
 
     def _words(self, line: str) -> list[str] | None:
         try:
