@@ -204,9 +204,9 @@ def test_the_tour_replays_and_an_edited_speed_loop_differs_where_it_acts(tmp_pat
     edited.write_text(text.replace("CURRENT=5.6", "CURRENT=5.7"))
     capsys.readouterr()
     assert main(["replay", str(bag), "--task", f"SPEED={edited}"]) == 1
-    # The loop begins to run at 1.244 s; the first error of speed after it is multiplied by another gain.
+    # The loop begins to run at 1.194 s; the first error of speed after it is multiplied by another gain.
     told = capsys.readouterr().out
-    assert "First difference: task SPEED, scan 115 at 1.254 s" in told
+    assert "First difference: task SPEED, scan 110 at 1.199 s" in told
     assert "CUR_REF%: recorded 62, replayed 63" in told
 
 
