@@ -6,13 +6,17 @@ import argparse
 import importlib
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from automax_ros.cli.ctl_ask import Action, Ask, Means
 from automax_ros.cli.ctl_press import press
 from automax_ros.cli.ctl_text import ALREADY
 from automax_ros.cli.ctl_watch import values_of, watch
+from automax_ros.cli.rack_space import space_of
+from automax_ros.cli.ros import prepare_ros, ros_arguments
+from automax_ros.cli.usage import UsageError
 from automax_ros.core.text import printable
 
 if TYPE_CHECKING:
@@ -91,6 +95,24 @@ class Session:
             _complain("watch", ask, str(refusal))
             return 1
         return 0
+
+
+@contextmanager
+def connected(arguments: argparse.Namespace, should_stop: Callable[[], bool]) -> Iterator[Session]:
+    """Join the graph, and speak with the rack while the block lasts.
+
+    Raises:
+        UsageError: there is no such rack, several have the name, or it cannot be operated.
+    """
+    domain = prepare_ros(arguments)
+    from automax_ros.nodes import operating
+
+    ros = ros_arguments(arguments)
+    try:
+        with operating.RackClient(space_of(arguments.rack, ros), ros, should_stop) as client:
+            yield Session(client, should_stop)
+    except operating.NotOperable as fault:
+        raise UsageError(f"{fault.message} (ROS domain {domain})", fault.hint) from fault
 
 
 def _ok(answer: Any) -> bool:

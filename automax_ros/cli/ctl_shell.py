@@ -7,10 +7,10 @@ import shlex
 import sys
 from collections.abc import Iterable
 
-from automax_ros.cli.ctl import add_actions, connected
 from automax_ros.cli.ctl_actions import ACTIONS
+from automax_ros.cli.ctl_arguments import add_actions
 from automax_ros.cli.ctl_ask import Ask
-from automax_ros.cli.ctl_session import Session
+from automax_ros.cli.ctl_session import Session, connected
 from automax_ros.cli.prompt import Interrupt, edit_lines, typed_lines
 from automax_ros.core.faults import Fault
 

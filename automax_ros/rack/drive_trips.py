@@ -42,13 +42,13 @@ class DriveTrips:
                 self._times[task.name, code] = record.time_ns
 
     def written(self, writes: list[WriteGroup]) -> None:
-        """Writes from outside are no drive faults."""
+        """Writes from outside are not drive faults."""
 
     def tuned(self, task: Task, now_ns: int) -> None:
-        """A tunable that is set is no drive fault."""
+        """A tunable that is set is not a drive fault."""
 
     def operated(self, operation: Operation) -> None:
-        """An operation is no drive fault."""
+        """An operation is not a drive fault."""
 
     def _time(self, task: str, problem: int) -> str:
         at_ns = self._times.get((task, problem))

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from automax_ros.cli import ctl
+from automax_ros.cli.ctl_actions import ACTIONS
+from automax_ros.cli.ctl_arguments import add_actions
 from automax_ros.cli.ctl_session import Session
 from automax_ros.cli.ctl_shell import run_shell
 from automax_ros.cli.usage import UsageError
@@ -71,9 +72,9 @@ class Rack:
 
 def do(rack: Rack, *words: str) -> int:
     parser = argparse.ArgumentParser()
-    ctl.add_actions(parser)
+    add_actions(parser)
     arguments = parser.parse_args(words)
-    return Session(rack, lambda: False).do(ctl.ACTIONS[arguments.action], arguments)
+    return Session(rack, lambda: False).do(ACTIONS[arguments.action], arguments)
 
 
 def test_a_value_that_was_there_already_is_told(capsys):
