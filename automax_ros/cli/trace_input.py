@@ -116,7 +116,8 @@ class InputTable(CsvTable):
                     columns[name] = None
                     continue
                 code = "AMX6911" if isinstance(fault, UnknownName) else "AMX6913"
-                hint = f"{fault.hint}; take the column out where the task has no such variable"
+                out = "take the column out where the task has no such variable"
+                hint = f"{fault.hint}; {out}" if fault.hint else out
                 raise self.fault(code, fault.message, _header_hint(name) or hint) from fault
             if variable.label in columns:
                 raise self.fault("AMX6912", f"there are two columns for {variable.label}")
