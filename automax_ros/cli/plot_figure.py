@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -90,9 +91,25 @@ def save(figure: Any, path: Path) -> None:
     Raises:
         UsageError: the file cannot be written.
     """
+    with _writing(path) as place:
+        _draw_into(figure, place, path.suffix.lower().lstrip("."))
+
+
+def save_picture(picture: bytes, path: Path) -> None:
+    """Write a figure that is drawn already.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
+    with _writing(path) as place:
+        place.write_bytes(picture)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[Path]:
     try:
         with written_whole(path) as place:
-            _draw_into(figure, place, path.suffix.lower().lstrip("."))
+            yield place
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror or error}") from error
 

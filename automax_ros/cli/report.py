@@ -16,7 +16,7 @@ from pathlib import Path
 from automax_ros.bags.columns import require_another_file
 from automax_ros.bags.traces import MAX_LINES, Traces
 from automax_ros.cli.output_files import require_different_files, require_writable, write_text
-from automax_ros.cli.plot_figure import Layout, figure_of, picture_of, save
+from automax_ros.cli.plot_figure import Layout, figure_of, picture_of, save_picture
 from automax_ros.cli.progress import share_shown
 from automax_ros.cli.report_page import page, rack_page
 from automax_ros.cli.signals import ended_by_signals
@@ -24,7 +24,7 @@ from automax_ros.cli.terminal import print_diagnostics
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import add_window_arguments, window_of
 from automax_ros.replay.drive_report import DriveReport, drive_report
-from automax_ros.replay.rack_report import RackReport, rack_report
+from automax_ros.replay.rack_report import rack_report
 from automax_ros.replay.stored_rack import SourceRefused
 
 _WIDTH_PX = 1400
@@ -65,11 +65,17 @@ def run(arguments: argparse.Namespace) -> int:
             print_diagnostics(diagnostics, source, sys.stderr)
         raise UsageError(f"{bag}: the rack file stored inside has errors") from error
     name = bag.resolve().name
-    title = f"{report.rack[:80]}: {name[:80]}"
+    shown = _together(report) if whole is None else whole.traces
+    picture = None
+    if shown.lines and (png is not None or len(report.drives) < 2):
+        picture = picture_of(figure_of(shown, Layout(f"{report.rack[:80]}: {name[:80]}", _WIDTH_PX)))
     if output is not None:
-        write_text(output, page(report, name, _pictures(report)) if whole is None else _rack_page(whole, name))
+        text = page(report, name, _pictures(report, picture)) if whole is None else rack_page(whole, name, picture)
+        write_text(output, text)
     if png is not None:
-        save(figure_of(_drawable(_together(report) if whole is None else whole.traces), Layout(title, _WIDTH_PX)), png)
+        if picture is None:
+            raise UsageError("the recording holds no course to draw", "--output alone writes the page")
+        save_picture(picture, png)
     if arguments.output is None and arguments.png is None and sys.stderr.isatty():
         print(f"{output}, {png}", file=sys.stderr)
     return 0
@@ -99,26 +105,16 @@ def _places(arguments: argparse.Namespace) -> tuple[Path | None, Path | None]:
     return output, png
 
 
-def _rack_page(report: RackReport, name: str) -> str:
-    shown = report.traces
-    picture = picture_of(figure_of(shown, Layout(shown.rack[:80], _WIDTH_PX))) if shown.lines or shown.errors else None
-    return rack_page(report, name, picture)
-
-
-def _pictures(report: DriveReport) -> dict[str, bytes]:
-    """Return the picture of each drive that has a course, as a PNG file."""
+def _pictures(report: DriveReport, together: bytes | None) -> dict[str, bytes]:
+    """Return the picture of each drive that has a course, as a PNG file; that of one alone is drawn already."""
     found: dict[str, bytes] = {}
+    if len(report.drives) == 1:
+        return {} if together is None else {report.drives[0][0].drive.name: together}
     for run, marks in report.drives:
         traces = report.traces(run, marks)
         if traces.lines:
             found[run.drive.name] = picture_of(figure_of(traces, Layout(run.drive.name, _WIDTH_PX)))
     return found
-
-
-def _drawable(traces: Traces) -> Traces:
-    if not traces.lines:
-        raise UsageError("the recording holds no course to draw", "--output alone writes the page")
-    return traces
 
 
 def _together(report: DriveReport) -> Traces:

@@ -21,7 +21,7 @@ from automax_ros.rack.scale import Scale
 from automax_ros.replay.stored_rack import StoredRack
 
 SPEED_REF = "SPEED_REF"
-"""The keyword of the speed reference, which is no parameter of the block: the rack file or a person names it."""
+"""The keyword of the speed reference: the block has no such input, so the rack file or a person names it."""
 SECOND_DRIVE = 1000
 """What is added to a register of drive A for that of drive B."""
 PMI_REGISTERS = range(100, 300)
