@@ -46,7 +46,10 @@ def sanitizing_compiler(folder: Path) -> Path:
 @pytest.mark.timeout(3600)
 def test_no_report_of_a_sanitizer(tmp_path):
     script = sanitizing_compiler(tmp_path)
-    named = (subprocess.check_output([script, f"-print-file-name={name}"], text=True) for name in ("libasan.so", "libstdc++.so"))
+    named = (
+        subprocess.check_output([script, f"-print-file-name={name}"], text=True)
+        for name in ("libasan.so", "libstdc++.so")
+    )
     environment = {
         **os.environ,
         "CC": str(script),
