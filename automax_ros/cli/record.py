@@ -25,6 +25,7 @@ from automax_ros.cli.recording_watch import DiskSync
 from automax_ros.cli.ros import add_ros_arguments, prepare_ros, ros_arguments
 from automax_ros.cli.signals import StopRequest, stop_signals
 from automax_ros.cli.status_line import StatusLine
+from automax_ros.cli.status_parts import recorded_size
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.window import seconds_above_0
 from automax_ros.core.kinds import WriterKind
@@ -278,8 +279,7 @@ class _Session:
         if recording.failure is not None:
             print(recording.failure, file=sys.stderr)
             return 1
-        size = sum(item.stat().st_size for item in folder.iterdir())
-        self._line.message(f"recorded {folder}: {size / 1e6:.2f} MB")
+        self._line.message(f"recorded {folder}: {recorded_size(folder)}")
         empty = self._expects_scans and not recording.scans
         if empty and recording.first_stamp is not None:
             self._line.message("  it holds no scan: nothing of it can be replayed; do the tasks run?")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from automax_ros.cli.status_line import StatusLine
-from automax_ros.cli.status_parts import Progress, Summary
+from automax_ros.cli.status_parts import Progress, Summary, recorded_size
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
@@ -109,9 +109,8 @@ class StatusDisplay:
             Summary(rack.now_ns / NS_PER_S, self._live, tuple(self._rows()), tuple(self._notes()), self._values(), took)
         )
         if bag is not None:
-            size = sum(item.stat().st_size for item in bag.iterdir())
             rest = "" if complete else f", not to the end of the run; to complete the file: automax bag repair {bag}"
-            self.message(f"recorded {bag}: {size / 1e6:.2f} MB{rest}")
+            self.message(f"recorded {bag}: {recorded_size(bag)}{rest}")
 
     def _rows(self) -> Iterator[str]:
         """Return the summary's line of each task."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from automax_ros.core.text import count_of
 from automax_ros.core.ticks import NS_PER_S
@@ -91,3 +92,11 @@ def merged_summary(parts: Sequence[Summary]) -> Summary:
     """Return what a rack's run came to of which each process has told its part, that of common memory first."""
     rows = tuple(row for part in parts for row in part.rows)
     return Summary(parts[0].seconds, True, rows, tuple(note for part in parts for note in part.notes), parts[0].values)
+
+
+def recorded_size(folder: Path) -> str:
+    """Return how much a recording's folder holds, in MB; its disk may have gone while the rack ran."""
+    try:
+        return f"{sum(item.stat().st_size for item in folder.iterdir()) / 1e6:.2f} MB"
+    except OSError:
+        return "cannot be read any more"

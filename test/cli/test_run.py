@@ -1,7 +1,10 @@
 """`automax run` in simulated time: arguments, exit codes, summary, status lines."""
 
+import errno
 import itertools
+import os
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -309,6 +312,25 @@ def test_recording_that_breaks_off_is_told_and_the_run_goes_on(run, automax, mon
     assert "No space left" in result.err
     assert "recording ended, the rack goes on" in result.out
     assert "not to the end of the run; to complete the file: automax bag repair bag" in result.out
+
+
+def test_a_disk_that_vanishes_is_told_once(run, automax, monkeypatch):
+    from automax_ros.bags import writer
+
+    def vanished(self, data):
+        if self._size > 20_000:
+            shutil.rmtree(automax.folder / "bag", ignore_errors=True)
+            raise OSError(errno.ENOENT, os.strerror(errno.ENOENT))
+        return original(self, data)
+
+    original = writer.DataFile.write
+    monkeypatch.setattr(writer.DataFile, "write", vanished)
+    result = run("--duration", "100", "--record", "bag")
+    assert result.code == 1
+    assert "ran 100.000 s" in result.out
+    assert "recorded bag: cannot be read any more, not to the end of the run" in result.out
+    assert result.err.count("rror") == 1
+    assert "AMX6801" in result.err
 
 
 def test_recording_options(run, automax):
