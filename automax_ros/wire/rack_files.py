@@ -12,9 +12,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from automax_ros.rack.rack import Rack
+if TYPE_CHECKING:  # what reads a recording needs no rack, which takes a second to load
+    from automax_ros.rack.rack import Rack
 
 RACK_FILE = "rack.yaml"
 MAX_TEXT = 16 << 20

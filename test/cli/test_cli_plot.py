@@ -1,5 +1,6 @@
 """`automax plot`: what is handed to matplotlib, and files that are pictures."""
 
+import subprocess
 import sys
 from itertools import pairwise
 
@@ -35,6 +36,12 @@ def lines_of(figure):
 
 def corners(line):
     return list(zip(*(np.asarray(part).tolist() for part in line.get_data()), strict=True))
+
+
+def test_a_recording_is_read_without_loading_what_runs_a_rack():
+    """It would take as long as the picture itself."""
+    program = "import sys, automax_ros.bags.traces; print('automax_ros.rack.rack' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", program], text=True) == "False\n"
 
 
 def test_lines_are_the_write_log_and_hold_to_the_end():
