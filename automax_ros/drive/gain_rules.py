@@ -28,7 +28,7 @@ NEAR = 2.0
 """A factor between programmed and proposed up to which all is well."""
 MOST_DELAY = 0.7
 """Part of a sixth of a line cycle up to which the proposed gains keep their damping, whenever in it the scan's DELTA
-takes effect (decision; test/rack/modules/test_drive_modeled_time.py)."""
+takes effect (decision)."""
 
 
 def _kp(circuit: Circuit) -> tuple[float, str]:

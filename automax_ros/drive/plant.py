@@ -24,7 +24,7 @@ from automax_ros.drive.sync_signal import SyncSignal
 
 PICK_UP_NS: Final = 25_000_000
 DROP_OUT_NS: Final = 20_000_000
-"""From the relay to closed and to open contacts of the M-contactor, ns (decision; of the 180 ms from a start to the run
+"""From the relay to closed and to open contacts of the M-contactor, ns (decision: of the 180 ms from a start to the run
 that 52.3.1 tells of, the shorted SCR test leaves it 30)."""
 SCR_DROP_V: Final = 1.5
 """Voltage over a conducting SCR, V (decision: 1.2 to 1.6 V are usual)."""

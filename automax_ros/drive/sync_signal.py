@@ -6,7 +6,7 @@ phases rises through zero. Per unit of its peak, theta counted from that instant
     sin theta + sum p_k sin(k theta + phi_k) - d sign(sin theta) in each notch
 
 The first rise through zero counts; after it the comparator is deaf for three quarters of a cycle. Noise moves each
-instant by its ratio to the slope (all decisions: of the transformer and its comparator nothing is published).
+instant by its ratio to the slope (decision: of the transformer and its comparator nothing is published).
 
 What the bridge sees of it: a notch takes as much of its voltage as it takes of the area, so the bridge gives less than
 the firing angle promises (52.4); its wave stays a sinusoid, or the circuit had no closed solution. Harmonics and noise

@@ -3,9 +3,9 @@
 A code of a STOP ALL is shown by the Processor whose task has caused it; where no Processor's task has (a UDC's has, a
 module was lost, two drive the common clock) by all of them, since the tasks of all have stopped, until the rack runs
 again (decision). A code that stands in the error log of a task, which 87 for a shorted SCR does without a STOP ALL
-(52.3.1), is shown until that log is cleared (decision: J2-3106-1 p. 12-4 names both in one step). A Processor that
-has nothing to tell, and one without power, shows nothing (decision). d0 and E0 are of an installation, which takes no
-time here and is refused with the errors' own words: no rack that answers shows them (decision).
+(52.3.1), is shown until that log is cleared (decision: J2-3106-1 names both in one step). A Processor that has
+nothing to tell, and one without power, shows nothing (decision). The codes d0 and E0 are of an installation, which
+takes no time here and is refused with the errors' own words: no rack that answers shows them (decision).
 """
 
 from __future__ import annotations

@@ -251,8 +251,7 @@ class LiveRecording(Recording):
         self._values_now[topic] = payload
         # A value carries no stamp: it belongs to the instant of the message before, or came so much later.
         later = max(0, sent_ns - self._last_sent) if self._last_sent else 0
-        stamp = self.last_stamp + (later if later > NS_PER_S // 1000 else 0)
-        self._write(topic, 0, min(stamp, MAX_STAMP), payload)
+        self._write(topic, 0, min(self.last_stamp + (later if later > NS_PER_S // 1000 else 0), MAX_STAMP), payload)
 
     def _keep(self, topic: str, sent_ns: int, payload: bytes) -> None:
         """Let a message wait for the next write, which says whether one is missing before it."""

@@ -39,7 +39,7 @@ DEFAULTS = {TACH_THRESHOLD: 109, PHASE_STEP: 4, PERIOD_STEP: 2, OPTIONS: 0}
 _new = tuple.__new__
 """Makes a named tuple as tuples are made: its own way takes twice the time, and there is one at each interrupt."""
 ACCESS_NS = 5_000
-"""By how much an access of the application delays the microprocessor, ns (52.7; decision: no manual tells how much)."""
+"""By how much an access of the application delays the microprocessor, ns (52.7, decision: no manual says how much)."""
 REST_NS = 5_500_000
 """How often a plant whose drive rests is looked at, ns: the system clock tick (decision)."""
 

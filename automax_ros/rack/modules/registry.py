@@ -47,7 +47,7 @@ REFUSED = {
     ),
     "57C565": (
         "AMX6211",
-        "the 57C565 is the Serial module of a PC3000: it is no Processor and runs no tasks",
+        "the 57C565 is the Serial module of a PC3000: it is not a Processor and runs no tasks",
         "the Processor of a PC3000 is the 57C560, which a 57C570 has in it; a rack file names no Serial module",
     ),
 }

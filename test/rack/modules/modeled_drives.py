@@ -34,7 +34,7 @@ execution: EXECUTION
 slots:
   0: {module: 57C413}
   1: {module: MODEL, tasks: {CML: {priority: 4}}}
-  2: {module: 57C435, tasks: {BESIDE}}
+  2: {module: 57C435, tasks: {OTHERS}}
   7: {module: 57C406, plant: MOTOR}
   8: {module: 57C408}
   9: {module: 57C405, drive: 7}
@@ -88,16 +88,16 @@ def held(
     fast: bool = False,
     alpha: int | None = None,
     latched: int = 0,
-    beside: str = "",
+    others: str = "",
 ) -> Rack:
     """Return a rack whose drive runs without a reference, its shaft held at a speed; ``alpha``: in test mode.
 
     It has the gains that ``drive-check`` proposes for it. ``latched``: how many commons more its task latches, which
-    lets its scans compute longer. ``beside`` are tasks of another Processor.
+    lets its scans compute longer. ``others`` are tasks of another Processor.
     """
     more = [f"X{number}%" for number in range(latched)]
     text = YAML.replace("EXECUTION", execution).replace("MODEL", model).replace("HERTZ", str(hertz))
-    text = text.replace("MOTOR_NAME", motor).replace("RPM", f"{rpm:g}").replace("BESIDE", beside)
+    text = text.replace("MOTOR_NAME", motor).replace("RPM", f"{rpm:g}").replace("OTHERS", others)
     (folder / "rack.yaml").write_text(text + "".join(f"  {name}: {{}}\n" for name in (*COMMONS, *more)))
     declared = "".join(f"{20 + place} COMMON {', '.join(more[place : place + 9])}\n" for place in range(0, latched, 9))
     source = TASK.replace("HERTZ", str(hertz)).replace("100 CALL", f"{declared}100 CALL")

@@ -31,7 +31,7 @@ WRITES = READS.replace("V% = TLD%", "TLD% = 109")
 def late(folder: Path, task: str, kind: str = "BLK", execution: str = "modeled", scans: int = 300) -> list[float]:
     """How late the commands of some scans took effect while a task runs on another Processor, us."""
     (folder / f"OTHER.{kind}").write_text(task)
-    rack = held(folder, "57C435", rpm=0, execution=execution, beside=f"OTHER: {{priority: 5, file: OTHER.{kind}}}")
+    rack = held(folder, "57C435", rpm=0, execution=execution, others=f"OTHER: {{priority: 5, file: OTHER.{kind}}}")
     found = []
     for _ in range(scans):
         rack.run(1 / 360)
@@ -69,7 +69,7 @@ def test_a_delay_ends_before_the_next_interrupt_and_the_current_stands(tmp_path,
     """The gates go on by the DELTA before: however late commands are, none is lost."""
     monkeypatch.setattr("automax_ros.rack.modules.drive_controller.ACCESS_NS", 100_000)
     (tmp_path / "OTHER.BAS").write_text(READS)
-    rack = held(tmp_path, "57C435", rpm=600, beside="OTHER: {priority: 5, file: OTHER.BAS}")
+    rack = held(tmp_path, "57C435", rpm=600, others="OTHER: {priority: 5, file: OTHER.BAS}")
     for reference in (800, 2730, -2730):
         got = follow(rack, reference)
         assert got.mean == pytest.approx(reference, rel=0.03)
@@ -78,7 +78,7 @@ def test_a_delay_ends_before_the_next_interrupt_and_the_current_stands(tmp_path,
 
 def test_a_state_with_a_delayed_command_goes_on_bit_for_bit(tmp_path):
     (tmp_path / "OTHER.BAS").write_text(READS)
-    rack = held(tmp_path, "57C435", rpm=600, beside="OTHER: {priority: 5, file: OTHER.BAS}")
+    rack = held(tmp_path, "57C435", rpm=600, others="OTHER: {priority: 5, file: OTHER.BAS}")
     rack.write("REF%", 2000)
     rack.run(0.2)
     port = rack.drives.port(7)
