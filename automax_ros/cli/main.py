@@ -79,17 +79,18 @@ def entry() -> NoReturn:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `automax` with the arguments (the process's own by default) and return its exit code."""
+    words = sys.argv[1:] if argv is None else list(argv)
     try:
         _open_closed_streams()
         _accept_every_character()
         output = _make_output_visible()
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return _interrupted(words)
     try:
-        code = _run(sys.argv[1:] if argv is None else list(argv))
+        code = _run(words)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return _interrupted(words)
     except BrokenPipeError:
         _discard_output()
         return BROKEN_PIPE
@@ -136,6 +137,11 @@ def _run(argv: list[str]) -> int:
 def _name(words: Sequence[str]) -> str | None:
     """Return the subcommand: the options before it take no values, so it is the first word."""
     return next((word for word in words if not word.startswith("-")), None)
+
+
+def _interrupted(words: Sequence[str]) -> int:
+    """Return the exit code after Ctrl-C that came before the command takes signals itself, as ``early`` has it."""
+    return 0 if _until_stopped(words) else INTERRUPTED
 
 
 def _until_stopped(words: Sequence[str]) -> bool:

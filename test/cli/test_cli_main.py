@@ -11,7 +11,7 @@ import pytest
 import automax_ros
 import automax_ros.cli.blocks
 import automax_ros.cli.check
-from automax_ros.cli.main import BROKEN_PIPE, INTERRUPTED, SUBCOMMANDS, main
+from automax_ros.cli.main import BROKEN_PIPE, INTERRUPTED, SUBCOMMANDS, main, module_of
 
 from .support import TASK
 
@@ -86,6 +86,16 @@ def test_interrupt_ends_silently(automax, monkeypatch):
 
     monkeypatch.setattr(automax_ros.cli.blocks, "run", interrupted)
     assert automax("blocks") == (INTERRUPTED, "", "")
+
+
+@pytest.mark.parametrize("name", ["run", "node", "record", "play"])
+def test_ctrl_c_before_a_command_takes_signals_is_the_end_of_what_runs_until_it_is_stopped(automax, monkeypatch, name):
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module_of(name), "run", interrupted)
+    words = {"node": ["rack.yaml", "--module", "1"]}.get(name, ["rack.yaml"])
+    assert automax(name, *words) == (0, "", "")
 
 
 def test_arguments_of_the_process_are_the_default(automax, monkeypatch):
