@@ -18,13 +18,18 @@ for inherited in ("ROS_STATIC_PEERS", "ROS_NAMESPACE", "RMW_IMPLEMENTATION", "FA
     os.environ.pop(inherited, None)
 put_prefix_first()
 
-# An example may take as long as a busy host lets it, and the same ones are tried each time.
-settings.register_profile("tests", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("tests")
+# An example may take as long as a busy host lets it. `make test` tries the same ones each time, `make soak` new ones.
+settings.register_profile("soak", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("tests", settings.get_profile("soak"), derandomize=True)
 
 # A shell that starts the tests in the background lets them ignore Ctrl-C; programs that they start would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose how examples are drawn."""
+    settings.load_profile("soak" if config.option.markexpr == "soak" else "tests")
 
 
 @pytest.hookimpl(trylast=True)  # after those that leave tests out
