@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fnmatch import translate
 
 from automax_ros.compile.layout import Role
 from automax_ros.core.names import NameFault, element_name
@@ -20,7 +21,7 @@ MAX_NAME = 100
 """Longest name that is looked at, in characters (decision: a bound on what strangers send)."""
 MAX_NAMES = 1000
 """Most names in one request, and most values that its patterns mean (decision: likewise)."""
-_WILD = {"*": ".*", "?": "."}
+_WILD = "*?"
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,8 @@ class Readings:
 
     def _matching(self, pattern: str, names: Iterable[str], absent: str) -> list[str]:
         known = list(names)
-        matches = re.compile("".join(_WILD.get(char) or re.escape(char) for char in pattern)).fullmatch
+        # fnmatch's own form: however many stars a stranger writes, it does not try again what cannot match.
+        matches = re.compile(translate(pattern.replace("[", "[[]"))).match
         found = [name for name in known if matches(name)]
         if not found:
             near = near_or_listed("".join(char for char in pattern if char not in _WILD), known)

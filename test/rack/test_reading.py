@@ -80,3 +80,10 @@ def test_a_reload_says_which_tuned_values_it_takes(orders):
     lost = orders.install(orders.prepare(name, source))
     assert lost == "KP was tuned to 1.5 and is 0.5 again"
     assert orders.install(orders.prepare(name, source)) == "", "nothing was tuned since"
+
+
+@pytest.mark.parametrize("pattern", ["*" * 99 + "X", "*A" * 45 + "!", "?*" * 40 + "!", "[*", "*]"])
+def test_no_pattern_takes_long(orders, pattern):
+    """Tried one after the other, ways to spread the stars over a name would be more than 10**15."""
+    with pytest.raises(OperationRefused, match="no common variable like"):
+        orders.get([pattern])
