@@ -100,7 +100,8 @@ def run(arguments: argparse.Namespace) -> int:
         table = files.enter_context(InputTable(arguments.input, lone)) if arguments.input is not None else None
         if table is not None and not stimuli and (unset := table.unset(lone)):
             names = f"{', '.join(unset[:_NAMED])}{' ...' if len(unset) > _NAMED else ''}"
-            print(f"{lone.task.name}: {arguments.input} does not set {names}: they stay 0", file=sys.stderr)
+            rest = "it stays 0" if len(unset) == 1 else "they stay 0"
+            print(f"{lone.task.name}: {arguments.input} does not set {names}: {rest}", file=sys.stderr)
         scans = StimulatedScans(lone, stimuli, table, arguments.duration)
         output = files.enter_context(opened_for_writing(arguments.output))
         errors = files.enter_context(opened_for_writing(arguments.errors)) if arguments.errors else None

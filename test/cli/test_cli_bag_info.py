@@ -18,9 +18,9 @@ def test_what_the_example_holds(automax):
     result = automax("bag", "info", GOLDEN)
     assert (result.code, result.err) == (0, "")
     lines = result.out.splitlines()
-    assert lines[0] == f"{GOLDEN}: rack PM1, run 27cca8ce5bf905ce"
+    assert lines[0] == f"{GOLDEN}: rack PM1, run 52ae3d5aa9353aeb"
     assert lines[1].strip() == "10 s; from 0 to 10 s of the run, rack time from 0 (simulated)"
-    assert lines[2].strip().startswith("13357 messages, 2916 scans, 499.8 KiB, chunks compressed 6.4 : 1, 176 bytes")
+    assert lines[2].strip().startswith("13357 messages, 2916 scans, 510.2 KiB, chunks compressed 6.3 : 1, 179 bytes")
     words = [line.split() for line in lines]
     assert ["SPEED", "2", "57C431", "automax", "2", "11", "ms", "911", "0", "910", "0", "0"] in words
     assert ["30:", "13", "integers,", "16", "booleans,", "1", "double", "integer"] in words

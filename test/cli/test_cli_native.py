@@ -91,7 +91,7 @@ def test_traces_are_the_same(automax):
 
 def test_without_a_compiler_everything_runs_in_python_and_says_so(automax, monkeypatch):
     automax.write("TASK.BLK", TASK)
-    automax.write("IN.csv", "REF%\n5\n")
+    automax.write("IN.csv", "REF%,RUN@\n5,0\n")
     monkeypatch.setenv("CC", "no-such-compiler")
     result = automax("trace", "TASK.BLK", "--input", "IN.csv", "--native", "on", "--verbose")
     assert result.code == 0
@@ -100,7 +100,7 @@ def test_without_a_compiler_everything_runs_in_python_and_says_so(automax, monke
 
 def test_a_short_run_gains_nothing(automax):
     automax.write("TASK.BLK", TASK)
-    automax.write("IN.csv", "REF%\n5\n")
+    automax.write("IN.csv", "REF%,RUN@\n5,0\n")
     result = automax("trace", "TASK.BLK", "--input", "IN.csv", "--verbose")
     assert result.err == "TASK: in Python: a run this short gains nothing by it (--native on)\n"
 

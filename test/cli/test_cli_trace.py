@@ -230,7 +230,7 @@ def test_watch_of_nothing_is_wrong_usage(automax, watch, message):
 
 def test_missing_files(automax):
     automax.write("TASK.BLK", TASK)
-    automax.write("IN.csv", "REF%\n1\n")
+    automax.write("IN.csv", "REF%,RUN@\n1,0\n")
     assert automax("trace", "NONE.BLK", "--input", "IN.csv").code == 2
     missing = automax("trace", "TASK.BLK", "--input", "NONE.csv")
     assert missing == (2, "", "automax trace: error: NONE.csv cannot be read: No such file or directory\n")

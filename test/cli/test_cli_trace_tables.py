@@ -47,7 +47,7 @@ def test_times_that_are_none_are_refused(automax, rows):
 def test_inputs_that_the_table_lacks_are_named(automax):
     automax.write("HOLD.BLK", HOLD)
     automax.write("IN.csv", "time_s\n0\n0.1\n")
-    assert automax("trace", "HOLD.BLK", "--input", "IN.csv").err == "HOLD: IN.csv does not set REF%: they stay 0\n"
+    assert automax("trace", "HOLD.BLK", "--input", "IN.csv").err == "HOLD: IN.csv does not set REF%: it stays 0\n"
     automax.write("IN.csv", "REF%\n1\n")
     assert automax("trace", "HOLD.BLK", "--input", "IN.csv").err == "", "it writes the other one itself"
 

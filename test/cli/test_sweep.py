@@ -139,8 +139,8 @@ def test_a_recorded_run_has_its_tables_too(sweep, tmp_path):
 def test_ctrl_c_ends_a_run_that_is_recorded(sweep, automax, monkeypatch: pytest.MonkeyPatch):
     start = Rack.start
 
-    def interrupted(self: Rack, settings=()) -> None:
-        start(self, settings)
+    def interrupted(self: Rack, *given) -> None:
+        start(self, *given)
         os.kill(os.getpid(), signal.SIGINT)
 
     with monkeypatch.context() as patch:
@@ -233,11 +233,11 @@ def test_a_rack_with_errors_is_not_run(sweep, automax):
 def test_ctrl_c_keeps_the_runs_that_are_done(sweep, tmp_path, monkeypatch: pytest.MonkeyPatch):
     start, begun = Rack.start, []
 
-    def interrupted(self: Rack, settings=()) -> None:
+    def interrupted(self: Rack, *given) -> None:
         begun.append(1)
         if len(begun) == 4:
             os.kill(os.getpid(), signal.SIGINT)
-        start(self, settings)
+        start(self, *given)
 
     monkeypatch.setattr(Rack, "start", interrupted)
     result = sweep("--vary", "REF%=100:900:9", "--output", "out")

@@ -153,12 +153,24 @@ def test_the_module_decides_how_many_registers_there_are(tmp_path):
 def test_every_documented_key_is_tried():
     """Some do nothing yet, and the page says so.
 
-    Those of operation are tried in ``test_executive.py``, a UDC's and a network module's with it, a plant's in
-    ``plants``.
+    What to watch is tried in ``test_settings.py``, those of operation in ``test_executive.py``, a UDC's and a network
+    module's with it, a plant's in ``plants``.
     """
     text = PAGE.read_text(encoding="utf-8")
     tables = re.findall(r"^\| (?:key|option) \| value .*\n\| --- .*\n((?:\|.*\n)+)", text, re.M)
     rows = [re.match(r"\| `(\w+)` \|", row) for table in tables for row in table.splitlines()]
     keys = {match[1] for match in rows if match}
-    assert keys == {*CHANGES, *OPERATION, *UDC, *NETWORK, *PLANT, "module", "operator", "slot", "register", "bit"}
+    assert keys == {
+        *CHANGES,
+        *OPERATION,
+        *UDC,
+        *NETWORK,
+        *PLANT,
+        "module",
+        "operator",
+        "watch",
+        "slot",
+        "register",
+        "bit",
+    }
     assert "`on_module_loss` | `stop_all` or `hold` | `stop_all` | What a rack that is [distributed]" in text

@@ -132,7 +132,7 @@ def test_means_and_energies_are_those_of_the_plant(tmp_path: Path) -> None:
     assert last.shaft_j == pytest.approx(motor.shaft_j)
     assert any(state.bridge == 1 for state in states)
     closed = [state.stamp for state in states if state.contactor]
-    assert closed[0] == 60 * NS_PER_MS
+    assert closed[0] == 30 * NS_PER_MS, "the sample after 25 ms, which the contactor takes"
 
 
 @pytest.mark.parametrize("only", ["", "joint_states"])

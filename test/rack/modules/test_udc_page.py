@@ -15,7 +15,12 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks_check import check_tasks
 
 PAGE = (Path(__file__).parents[3] / "docs" / "udc.md").read_text(encoding="utf-8")
-WHO = {"the process": "input", "tasks": "output", "the module": "input"}
+WHO = {
+    "the process": "input",
+    "tasks": "output",
+    "tasks, never `ros: in` (AMX6494)": "output",
+    "the module": "input",
+}
 
 
 def rows() -> dict[int, tuple[str, bool]]:
