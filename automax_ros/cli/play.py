@@ -60,10 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Play the recording; 0 at its end or after Ctrl-C."""
-    rate = _rate(arguments.rate)
-    window_of(arguments)
-    target = _namespace(arguments.namespace)
     with stop_signals() as stop:
+        rate = _rate(arguments.rate)
+        window_of(arguments)
+        target = _namespace(arguments.namespace)
         domain = prepare_ros(arguments)
         ros = ros_arguments(arguments)
         found = _survey(arguments.bag, arguments.start, arguments.end, stop)
