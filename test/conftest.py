@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, settings
 from ros_domains import free_domain
 
 from automax_ros.nodes.environment import put_prefix_first
+from automax_ros.nodes.transports import announce_soon
 
 # No test talks to, or hears, the plant's network.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -68,6 +69,7 @@ def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """A ROS domain of the test's own, set as ROS_DOMAIN_ID; child processes inherit it."""
     with free_domain() as domain:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        announce_soon()
         yield domain
 
 

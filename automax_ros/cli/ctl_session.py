@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from automax_ros.cli.ctl_ask import Action, Ask, Means
+from automax_ros.cli.ctl_lifecycle import STATE
 from automax_ros.cli.ctl_press import press
 from automax_ros.cli.ctl_text import ALREADY
 from automax_ros.cli.ctl_watch import values_of, watch
@@ -42,6 +43,8 @@ class Session:
         asks = action.asks(arguments)
         if action.by_operator:
             self._find(arguments.timeout, alone=not action.reads)
+        elif arguments.transition != STATE:
+            self._client.refuse_twins(arguments.node)
         if action.means is Means.WATCH:
             return self._watch(asks[0], arguments)
         if action.means is Means.PRESS:
@@ -69,7 +72,7 @@ class Session:
 
         self._client.find(wait_ns)
         if alone:
-            known = self._answer(Ask("status", "automax_msgs/ReadStatus"), wait_ns).racks
+            known = self._answer(Ask("status", "automax_msgs/ReadStatus", {"home_only": True}), wait_ns).racks
             self._client.refuse_several(known)
             self._client.find(wait_ns, 0 if known == 1 and is_this_host_alone() else ALONE_NS)
 

@@ -37,7 +37,7 @@ def run_shell(arguments: argparse.Namespace) -> int:
     return int(failed and not interactive)
 
 
-_STATUS = Ask("status", "automax_msgs/ReadStatus")
+_STATUS = Ask("status", "automax_msgs/ReadStatus", {"home_only": True})
 
 
 class _Shell:

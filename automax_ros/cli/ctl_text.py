@@ -75,6 +75,8 @@ def status_lines(data: Any) -> Iterable[str]:
         yield f"display of {module}: {code or 'blank'}, {meaning}"
     if data["forced"]:
         yield f"forced: {data['forced']}"
+    if data["absent"]:
+        yield f"did not answer, and is missing above: {', '.join(data['absent'])}"
 
 
 def message_told(_: Ask, answer: Any) -> str:

@@ -27,6 +27,7 @@ from pathlib import Path
 
 from automax_ros.core.faults import Fault
 from automax_ros.nodes.discovery_range import choose_range
+from automax_ros.nodes.transports import announce_soon
 from automax_ros.wire.definitions import message_types
 
 SETUP_COMMAND = "make setup"
@@ -56,6 +57,7 @@ def prepare(*, may_restart: bool = True, discovery: str | None = None) -> None:
     restarted = os.environ.pop(_RESTARTED, None) is not None
     put_prefix_first()
     choose_range(discovery)
+    announce_soon()
     if not os.environ.get("HOME") and not os.environ.get("ROS_LOG_DIR"):
         # ROS wants a place for log files even where none are written; services often run without a home.
         os.environ["ROS_LOG_DIR"] = tempfile.gettempdir()

@@ -100,6 +100,20 @@ class RackClient:
             self._go_on()
             time.sleep(_LOOK_S)
 
+    def refuse_twins(self, node: str) -> None:
+        """Look for ``ALONE_NS`` whether a node of the rack, which may have no operator, is there more than once.
+
+        Raises:
+            NotOperable: there are several racks of the name.
+        """
+        until = time.monotonic_ns() + ALONE_NS
+        while True:
+            self.refuse_several(max(self._racks(), self._nodes(node)))
+            if time.monotonic_ns() > until:
+                return
+            self._go_on()
+            time.sleep(_LOOK_S)
+
     def refuse_several(self, racks: int) -> None:
         """Do nothing where at most one rack of the name is known.
 

@@ -22,6 +22,8 @@ from automax_ros.rack.bus.part_name import part_name
 
 ANSWER_S = 2.0
 """How long another process is waited for."""
+FIND_S = 0.02
+"""How often a service that is not known yet is looked for."""
 RELOAD_ANSWER_S = 60.0
 """The same where it has to compile."""
 HERE = -1
@@ -67,9 +69,7 @@ class Forwarding:
     def answer(self, service: str, kind: Any, request: Any, response: Any, local: Local) -> Any:
         """Answer a request: at once where it concerns this process alone, else when all concerned have answered."""
         if service in _NOT_TOGETHER:
-            return _refused(
-                response, "a rack of several processes keeps the wall clock: it cannot be halted or stepped"
-            )
+            return _refused(response, NOT_TOGETHER)
         shares = _SHARING.get(service, _mine)(self, request, kind)
         if [share.seat for share in shares] == [HERE]:
             return local(shares[0].request, response)
@@ -85,7 +85,8 @@ class Forwarding:
             _Round(self, service, kind, shares, answers, lambda: respond(end()))
 
         def end() -> Any:
-            found = _merged(response, request, shares, answers)
+            silent = [self._name(share.seat) for share in shares if answers[share.seat] is None]
+            found = _merged(response, request, shares, answers, silent)
             if service == "reload" and _is_ok(found):
                 self._note_source(request)
             return found
@@ -142,7 +143,10 @@ class Forwarding:
 
 
 class _Round:
-    """One request on its way: waits for all answers, at most a time."""
+    """One request on its way: waits for all answers, at most a time.
+
+    A process is asked once its service is known here: DDS drops a request that is sent before.
+    """
 
     def __init__(
         self,
@@ -156,14 +160,27 @@ class _Round:
         self._answers, self._done, self._node = answers, done, forwarding.node
         asked = [share for share in shares if share.seat != HERE and forwarding.is_there(share.seat)]
         self._open = {share.seat for share in asked}
+        self._unasked = [(share, forwarding.client(share.seat, service, kind)) for share in asked]
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         wait_s = RELOAD_ANSWER_S if service == "reload" else ANSWER_S
-        self._timer = self._node.create_timer(wait_s, self._end, clock=steady)
-        for share in asked:
-            future = forwarding.client(share.seat, service, kind).call_async(share.request)
-            future.add_done_callback(lambda found, seat=share.seat: self._answered(seat, found))
-        if not asked:
+        self._timers = [
+            self._node.create_timer(wait_s, self._end, clock=steady),
+            self._node.create_timer(FIND_S, self._ask, clock=steady),
+        ]
+        if asked:
+            self._ask()
+        else:
             self._end()
+
+    def _ask(self) -> None:
+        """Ask the processes whose service is known by now."""
+        waiting, self._unasked = self._unasked, []
+        for share, client in waiting:
+            if client.service_is_ready():
+                future = client.call_async(share.request)
+                future.add_done_callback(lambda found, seat=share.seat: self._answered(seat, found))
+            else:
+                self._unasked.append((share, client))
 
     def _answered(self, seat: int, future: Any) -> None:
         with self._node.site.present():
@@ -175,25 +192,28 @@ class _Round:
 
     def _end(self) -> None:
         """Answer with what has come."""
-        if self._timer is not None:
-            self._node.destroy_timer(self._timer)
-            self._timer = None
+        timers, self._timers = self._timers, []
+        if timers:
+            for timer in timers:
+                self._node.destroy_timer(timer)
             self._open.clear()
             self._done()
 
 
-def _merged(response: Any, request: Any, shares: Sequence[Share], answers: dict[int, Any]) -> Any:
+def _merged(
+    response: Any, request: Any, shares: Sequence[Share], answers: dict[int, Any], silent: Sequence[str]
+) -> Any:
     """Return one response: all lists one after the other, numbers of tasks added up, OK if all are.
 
-    A common that is forced is so in every process, and told once.
+    A common that is forced is so in every process, and told once. Where processes are ``silent``, a response that can
+    name them (``absent``) holds what has come; any other is refused.
     """
     found = [answer for answer in answers.values() if answer is not None]
-    silent = sum(answer is None for answer in answers.values())
     if len(shares) == 1 and found:
         return found[0]
     reasons = [reason for answer in found if (reason := _reason_of(answer)) and not _is_ok(answer)]
     if silent:
-        reasons.append("a process did not answer" if silent == 1 else f"{silent} processes did not answer")
+        reasons.append(f"{', '.join(silent)} did not answer")
     first = found[0] if found else response
     for name in first.get_fields_and_field_types():
         values = [getattr(answer, name) for answer in found]
@@ -206,7 +226,10 @@ def _merged(response: Any, request: Any, shares: Sequence[Share], answers: dict[
             setattr(response, name, values[0])
     if hasattr(response, "found"):
         _in_order(response, list(request.names))
-    ok = not silent and all(map(_is_ok, found))
+    can_name = bool(found) and hasattr(response, "absent")
+    if can_name:
+        response.absent = list(silent)
+    ok = (can_name or not silent) and all(map(_is_ok, found))
     return _concluded(response, ok=ok, reason="; ".join(dict.fromkeys(reasons)))
 
 
@@ -275,6 +298,10 @@ def _everybody(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
     return forwarding.everybody(request)
 
 
+def _status(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+    return [Share(HERE, request)] if request.home_only else forwarding.everybody(request)
+
+
 _ADDED = ("tasks", "running", "ended")
 """Numbers of a status that are those of one process each."""
 _NOT_TOGETHER = ("pause", "resume", "step")
@@ -296,6 +323,6 @@ _SHARING: dict[str, Callable[[Forwarding, Any, Any], list[Share]]] = {
     "module": _by_slot,
     "plant": _by_plant,
     "tasks": _everybody,
-    "status": _everybody,
+    "status": _status,
 }
 """Whom the requests of each service concern; the others are for common memory alone."""

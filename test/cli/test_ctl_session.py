@@ -26,7 +26,7 @@ STATUS = {
     "rack": "DRIVE1", "time_s": 200.0, "powered": True, "halted": False, "stopped": False, "stopped_at_s": 0.0,
     "stopped_code": "", "stopped_task": "", "stopped_reason": "", "tasks": 5, "running": 4, "ended": 1, "forced": 0,
     "display_modules": ["processor_1"], "display_codes": ["87"], "display_meanings": ["shorted SCR"],
-    "drive_faults": ["CML: tach loss at 188.9 s, not cleared"], "racks": 1,
+    "drive_faults": ["CML: tach loss at 188.9 s, not cleared"], "racks": 1, "absent": ["udc_10"],
 }  # fmt: skip
 
 
@@ -114,6 +114,7 @@ def test_status_says_what_tripped_what_ended_and_what_is_displayed(capsys):
         "rack DRIVE1: 200.000 s, 4 run, 1 ended",
         "CML: tach loss at 188.9 s, not cleared",
         "display of processor_1: 87, shorted SCR",
+        "did not answer, and is missing above: udc_10",
     ]
 
 

@@ -23,8 +23,8 @@ RACKS = {
     "section_drive": ROOT / "config" / "section_drive",
     "dc_drive": ROOT / "config" / "dc_drive",
 }
-ENDLESS = ("watch", "record")
-"""What goes on until Ctrl-C, which comes when something was printed."""
+ENDLESS = {"watch": "", "record": "scans/s"}
+"""What goes on until Ctrl-C, which comes when a line with this text was printed."""
 
 
 @pytest.fixture
@@ -99,10 +99,14 @@ def carried_out(words: list[str], folder: Path, environment: dict[str, str]) -> 
         env={**environment, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
     )
     assert process.stdout is not None
-    first = process.stdout.readline() if set(ENDLESS) & set(words) else ""
-    if first:
-        process.send_signal(signal.SIGINT)
-    text = first + process.stdout.read()
+    text = ""
+    for wanted in (ENDLESS[word] for word in words if word in ENDLESS):
+        for line in process.stdout:
+            text += line
+            if wanted in line:
+                process.send_signal(signal.SIGINT)
+                break
+    text += process.stdout.read()
     assert process.wait(60) == 0, (words, text)
 
 

@@ -161,6 +161,19 @@ def test_requests_reach_the_process_that_has_what_they_are_about(ask, racks):
     assert one.forces() == two.forces() == home.forces() == []
 
 
+def test_a_status_names_the_processes_that_do_not_answer(ask, racks):
+    """It says what has come; an operation that needs all of them is refused by the same names."""
+    racks["parts"][2].close()
+    status = ask("ReadStatus", "status")
+    assert status.ok
+    assert (status.tasks, status.absent) == (1, ["processor_2"])
+    home = ask("ReadStatus", "status", home_only=True)
+    assert (home.tasks, home.absent) == (0, [])
+    tasks = ask("ReadTasks", "tasks")
+    assert not tasks.ok
+    assert "did not answer" in tasks.reason
+
+
 def test_a_stop_all_and_a_run_all_concern_every_process(ask, racks):
     home, one, two = (part.rack for part in racks["parts"])
     assert ask("Trigger", "stop_all").success

@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.nodes.discovery_range import choose_range, range_text
-from automax_ros.nodes.transports import avoid_shared_memory
+from automax_ros.nodes.transports import announce_soon, avoid_shared_memory
 
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 PROFILES, TRANSPORTS = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS"
@@ -33,6 +33,28 @@ def profile() -> dict[str, str]:
     """Return the texts of the profile that was chosen, by their elements."""
     root = ElementTree.fromstring(Path(os.environ[PROFILES]).read_text(encoding="utf-8").encode())
     return {item.tag.rpartition("}")[2]: (item.text or "").strip() for item in root.iter()}
+
+
+def periods() -> dict[str, int]:
+    """Return the periods of the profile that was chosen, ns."""
+    found = {}
+    for item in ElementTree.fromstring(Path(os.environ[PROFILES]).read_text(encoding="utf-8").encode()).iter():
+        parts = {part.tag.rpartition("}")[2]: int(part.text or "0") for part in item if part.tag.endswith("sec")}
+        if parts:
+            found[item.tag.rpartition("}")[2]] = parts["sec"] * NS_PER_S + parts["nanosec"]
+    return found
+
+
+@pytest.mark.parametrize("avoided", [False, True])
+def test_programs_that_begin_at_one_time_soon_announce_themselves_again(monkeypatch, avoided):
+    surroundings(monkeypatch)
+    choose_range("localhost")
+    announce_soon()
+    if avoided:
+        avoid_shared_memory()
+    assert periods()["leaseAnnouncement"] == 250 * NS_PER_MS
+    assert range_text() == "this host"
+    assert (PEERS in found()) == avoided
 
 
 def test_on_one_host_only_the_loopback_is_used(monkeypatch):
@@ -65,7 +87,7 @@ def test_what_udp_has_dropped_is_sent_again_soon(monkeypatch, chosen):
     choose_range(chosen)
     avoid_shared_memory()
     texts = profile()
-    assert (int(texts["sec"]), int(texts["nanosec"])) == (0, 100 * NS_PER_MS)
+    assert periods() == {"leaseAnnouncement": 250 * NS_PER_MS, "heartbeatPeriod": 100 * NS_PER_MS}
     assert int(texts["receiveBufferSize"]) == 4 << 20
 
 
@@ -82,5 +104,9 @@ def test_what_udp_has_dropped_is_sent_again_soon(monkeypatch, chosen):
 def test_what_the_environment_says_goes_first(monkeypatch, given):
     surroundings(monkeypatch, **given)
     before, told = found(), range_text()
+    announce_soon()
     avoid_shared_memory()
-    assert (found(), range_text()) == (before, told)
+    after = found()
+    if PROFILES not in given and "RMW_IMPLEMENTATION" not in given:
+        assert after.pop(PROFILES).endswith("announced_soon.xml")
+    assert (after, range_text()) == (before, told)

@@ -202,9 +202,10 @@ def test_two_racks_of_one_name_are_operated_by_nobody(ros_domain_id, tmp_path):
         first.wait_for_line(READY)
         with Automax("run", OPERATED, environment=os.environ | {"TMPDIR": str(tmp_path / "other")}) as second:
             second.wait_for_line(READY)
-            refused = ctl("stop-all")
-            assert refused.code == 2
-            assert "2 racks are called /operated" in refused.err
+            for words in (("stop-all",), ("lifecycle", "deactivate")):
+                refused = ctl(*words)
+                assert refused.code == 2
+                assert "2 racks are called /operated" in refused.err
             assert second.end(signal.SIGINT).code == 0
         assert first.end(signal.SIGINT).code == 0
     assert "STOP ALL" not in "".join((*first.out, *second.out))
@@ -214,10 +215,11 @@ def test_a_prompt_stays_connected_and_a_press_is_seen_by_the_tasks(ros_domain_id
     with Automax("run", RACKS / "line4" / "rack.yaml", "--distributed") as rack:
         rack.wait_for_line(READY)
         wait_until(lambda: ctl_of("LINE4", "status").code == 0)  # all processes have met
-        lines = "get START_PB@\npress START_PB@ --for 0.05\nget 'START*' NIL@\nget 'RING_9.*'\nget START_PB@\n"
+        lines = "get START_PB@\npress START_PB@ --for 0.05\nget 'START*' NIL@\nget 'RING_9.*'\nstatus\n"
         command = [*COMMAND, "ctl", "LINE4", "shell"]
         shell = subprocess.run(command, input=lines, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         assert shell.returncode == 1
-        assert shell.stdout == "START_PB@ = FALSE\npress START_PB@: done\nSTART_PB@ = FALSE\n"
+        assert "START_PB@ = FALSE\npress START_PB@: done\nrack LINE4:" in shell.stdout
+        assert "display of processor_4: blank, no fault" in shell.stdout
         assert shell.stderr.count("refused") == 2
         assert rack.end(signal.SIGINT).code == 0
