@@ -27,7 +27,7 @@ from automax_ros.nodes.process import RosProcess
 from automax_ros.nodes.rack_node import RackNode
 from automax_ros.nodes.ros_arguments import NO_ARGUMENTS, RosArguments
 from automax_ros.rack.installation import RackError
-from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.running.health import Health
 
 _LOOK_S = 0.05

@@ -14,7 +14,7 @@ from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.core.values import value_text
 from automax_ros.rack.config import CommonElement
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.running.health import Health

@@ -23,7 +23,7 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.text import printable
 from automax_ros.rack.config import Timing
 from automax_ros.rack.installation import RackError
-from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.stepping.stepper import Stepper
 
 PROMPT = "step> "

@@ -21,6 +21,8 @@ MOST_SECONDS = 1_000_000_000
 """Longest time in a file (decision: 31 years, far from the 63 bits of a count of ns)."""
 UDC_TICK_NS = NS_PER_MS // 2
 """Tick of a UDC module (2.3)."""
+CLOCK_PERIOD_NS = UDC_TICK_NS
+"""One interval of the common clock of a backplane: 500 us (S-3056 p. 4-4; J2-3106-1 p. 2-5 prints ms)."""
 UDC_MAX_TICKS = 20
 MAX_TICKS = 32767
 

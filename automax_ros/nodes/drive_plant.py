@@ -20,9 +20,9 @@ from automax_ros.nodes.inlet import Inlet
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.rack.controls import Controls
 from automax_ros.rack.modules.timed import Timed
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.plants.driven import DrivenPlant
 from automax_ros.rack.ros_names import load_topic
+from automax_ros.rack.standing import OperationRefused
 
 
 class DrivePlantNode(ModuleNode):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.rack import Rack
 
 Facts = dict[str, tuple[bool | int | float | str, str]]

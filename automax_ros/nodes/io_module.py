@@ -9,7 +9,7 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from automax_ros.nodes.module_node import ModuleNode, Site
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 
 
 class IoModuleNode(ModuleNode):

@@ -17,10 +17,10 @@ from automax_ros.nodes.managed import ACTIVE, INACTIVE, UNCONFIGURED, Managed, P
 from automax_ros.nodes.module_node import ModuleNode, Site
 from automax_ros.rack.installation import Prepared
 from automax_ros.rack.module_tasks import ModuleTasks
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.observers import Operation
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.orders import Orders, ReloadRefused
+from automax_ros.rack.standing import OperationRefused
 
 NOT_OPERATED = "the rack's YAML file does not say `operator: true`"
 """Why nobody outside may ask for a transition that stops or runs tasks."""

@@ -22,10 +22,10 @@ from automax_ros.nodes.rcl import library
 from automax_ros.nodes.taking import taker_of
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.topics import message_class, ros_qos
-from automax_ros.rack.modules.kind import Module
 from automax_ros.rack.modules.network import CYCLE_NS
 from automax_ros.rack.modules.network_port import Frame, NetworkStatus, Sender, Station
 from automax_ros.rack.modules.network_registers import HALF
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.names import is_rack_name
 from automax_ros.rack.ros_names import network_topic
 from automax_ros.running.scheduler import EventClass, EventKey

@@ -36,9 +36,9 @@ from automax_ros.nodes.tables import status_of_task, task_fields
 from automax_ros.rack.display import displays_of
 from automax_ros.rack.drive_trips import DriveTrips
 from automax_ros.rack.halting import Halting
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.orders import Orders
 from automax_ros.rack.reading import Reading
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.running.task import Status
 
 PLACES = ("first", "second", "last")

@@ -24,7 +24,7 @@ from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.throttle import Throttle
 from automax_ros.nodes.tunable_parameters import TunableParameters
 from automax_ros.rack.display import displays_of
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.observers import Operation
 from automax_ros.running.error_log import LogEntry
 from automax_ros.running.task import ScanRecord, Status, Task

@@ -6,8 +6,8 @@ from typing import Protocol
 
 from automax_ros.nodes.managed import ACTIVATE, DEACTIVATE, Pending, TransitionRefused
 from automax_ros.nodes.managed_module import NOT_OPERATED
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 
 
 class Held(Protocol):

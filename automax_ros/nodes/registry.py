@@ -23,13 +23,14 @@ from automax_ros.rack.modules.common_memory import COMMON_MEMORY
 from automax_ros.rack.modules.digital_io import DIGITAL_IO
 from automax_ros.rack.modules.drive_analog import DRIVE_ANALOG
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
-from automax_ros.rack.modules.kind import Module, ModuleKind
+from automax_ros.rack.modules.kind import ModuleKind
 from automax_ros.rack.modules.network_config import NETWORK
 from automax_ros.rack.modules.pc3000 import PC3000
 from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.modules.pulsetach import PULSETACH
 from automax_ros.rack.modules.registry import SUPPORTED
 from automax_ros.rack.modules.resolver import RESOLVER
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.modules.udc_config import UDC
 
 NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {

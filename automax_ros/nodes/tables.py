@@ -20,7 +20,7 @@ from automax_ros.nodes.module_node import ModuleNode
 from automax_ros.nodes.topics import ros_qos
 from automax_ros.rack.executive import most_forces
 from automax_ros.rack.halting import is_halted
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.observers import Operation
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.scheduled_task import ScheduledTask

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from automax_ros.nodes.module_node import Site
 from automax_ros.nodes.processor import ProcessorNode
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.modules.udc_registers import ISCR, SCAN_COUNTER, SCANS_PER_INTERRUPT
 
 _SHOWN = {"iscr": ISCR, "scans_per_interrupt": SCANS_PER_INTERRUPT, "scans_since_interrupt": SCAN_COUNTER}

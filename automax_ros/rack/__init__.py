@@ -26,12 +26,14 @@ if TYPE_CHECKING:
     from automax_ros.rack.drafting import Draft, draft
     from automax_ros.rack.installation import RackError
     from automax_ros.rack.loader import LoadResult, load
-    from automax_ros.rack.modules.kind import Module, ModuleConfig, ModuleKind
+    from automax_ros.rack.modules.configured import ModuleConfig
+    from automax_ros.rack.modules.kind import ModuleKind
+    from automax_ros.rack.modules.running import Module
     from automax_ros.rack.observers import Operation, RackObserver
-    from automax_ros.rack.operations import OperationRefused
     from automax_ros.rack.rack import Rack
     from automax_ros.rack.rack_state import RackState
     from automax_ros.rack.report import report_of
+    from automax_ros.rack.standing import OperationRefused
     from automax_ros.rack.stepping.stepper import Halt, Stepper, Why
     from automax_ros.rack.stimuli.player import Stimulation
     from automax_ros.rack.stimuli.reader import read_for_rack

@@ -16,8 +16,9 @@ from automax_ros.core.values import source_text
 from automax_ros.rack.config import CommonElement, RackConfig
 from automax_ros.rack.forcing import Forcing
 from automax_ros.rack.observers import Observers, Operation
-from automax_ros.rack.operations import OperationRefused, Operations
+from automax_ros.rack.operations import Operations
 from automax_ros.rack.settings import common_named
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.writers import OPERATOR_WRITER
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.process_inputs import ProcessInputs

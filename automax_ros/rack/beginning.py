@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from automax_ros.core.names import AUTO_RUN
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.writers import PRESET_WRITER
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.process_inputs import ProcessInputs

@@ -26,7 +26,7 @@ from automax_ros.core.types import DataType, bare_name
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.config import DEFAULT_OUT_LIMIT, CommonVariable
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.names import COMMON_NAME, DeclarationFault, VariableName, variable_name
 from automax_ros.rack.points import KEYS, PointReader
 from automax_ros.rack.presets import preset_value

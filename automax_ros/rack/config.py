@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from automax_ros.core.kinds import Direction
 from automax_ros.core.names import Element
 from automax_ros.core.types import DataType, Value
 from automax_ros.rack.executive import NEWEST
-from automax_ros.rack.modules.kind import ModuleConfig, Registers
+from automax_ros.rack.modules.configured import ModuleConfig, Registers
 from automax_ros.rack.plants.config import FeedConfig, JointCommand, PlantConfig
 from automax_ros.rack.scale import Scale
 from automax_ros.rack.task_config import TaskConfig
@@ -174,3 +174,19 @@ class RackConfig:
     def home_slot(self) -> int:
         """The slot of the module that holds the common variables: the first that can."""
         return next((module.slot for module in self.modules if module.common_registers), 0)
+
+
+def bank_variables(modules: Iterable[ModuleConfig]) -> list[CommonVariable]:
+    """Return a variable for the registers of each module that has some; ROS never sees it."""
+    return [
+        CommonVariable(
+            f"SLOT:{module.slot}%",
+            DataType.INTEGER,
+            (module.registers.count,),
+            direction=Direction.CLOSED,
+            line=module.line,
+            bank=module.slot,
+        )
+        for module in modules
+        if module.registers.count
+    ]

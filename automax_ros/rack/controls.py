@@ -11,10 +11,10 @@ from typing import NoReturn
 from automax_ros.core.text import near_or_listed, printable, quoted
 from automax_ros.drive.errors import ParameterError
 from automax_ros.drive.plant_faults import values_of, work_on
-from automax_ros.rack.modules.kind import Operable
+from automax_ros.rack.modules.running import Operable
 from automax_ros.rack.observers import Operation
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 
 MOST_CHARACTERS = 100
 """Longest text of a value that is looked at (decision: a bound on what strangers send)."""

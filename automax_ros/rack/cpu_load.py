@@ -13,9 +13,9 @@ from automax_ros.core.ticks import NS_PER_US
 from automax_ros.language.program import Program
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.executive import version_text
-from automax_ros.rack.modules.drive_controller import ACCESS_NS
+from automax_ros.rack.modules.configured import ModuleConfig, cost_model
+from automax_ros.rack.modules.drive_config import ACCESS_NS
 from automax_ros.rack.modules.drive_rules import latched_registers
-from automax_ros.rack.modules.kind import ModuleConfig, cost_model
 from automax_ros.rack.modules.registry import SUPPORTED
 from automax_ros.rack.tasks_check import CheckedTask
 

@@ -16,7 +16,7 @@ from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.rack.config import Point, RackConfig, Timing
 from automax_ros.rack.drives import RackDrive, given_inputs, rack_drives, written_constants
-from automax_ros.rack.modules.drive_controller import DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
+from automax_ros.rack.modules.drive_config import DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
 from automax_ros.rack.modules.processor import PROCESSOR
 from automax_ros.rack.register_writes import numbered_writes
 

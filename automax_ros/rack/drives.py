@@ -17,7 +17,7 @@ from automax_ros.language.syntax.tree import Assignment, Expression, FunctionCal
 from automax_ros.language.syntax.walk import statements_in_order
 from automax_ros.language.written import places_that_write
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.plants.building import plant_data
 from automax_ros.rack.plants.config import PlantConfig
 from automax_ros.rack.plants.driven import Driving

@@ -14,8 +14,8 @@ from typing import NoReturn, Protocol, runtime_checkable
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.rack.observers import HALT, RESUME, STEP, Operation
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.running.task import Status
 
 LONGEST_STEP_NS = NS_PER_S

@@ -13,7 +13,7 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText, has_errors
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.task_kind import TaskKind
 from automax_ros.rack.config import RackConfig, Timing
-from automax_ros.rack.modules.kind import ModuleConfig, cost_model
+from automax_ros.rack.modules.configured import ModuleConfig, cost_model
 from automax_ros.rack.seating import seats_of
 from automax_ros.rack.task_rules import findings_by_task
 from automax_ros.rack.tasks_check import check_source, check_tasks, commons_of, with_findings

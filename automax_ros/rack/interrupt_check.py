@@ -12,13 +12,12 @@ from typing import NamedTuple
 
 from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.core.kinds import Direction
-from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.core.ticks import CLOCK_PERIOD_NS, NS_PER_MS
 from automax_ros.language.program import Program
 from automax_ros.language.syntax.tree import Event
 from automax_ros.rack.config import CommonVariable, RackConfig
-from automax_ros.rack.modules.kind import Interrupt, ModuleConfig
+from automax_ros.rack.modules.configured import Interrupt, ModuleConfig
 from automax_ros.rack.register_writes import constant_writes
-from automax_ros.running.common_clock import CLOCK_PERIOD_NS
 
 MAX_EVENTS = 4
 """Hardware events of one Processor: what its interrupt line serves (J-3675 p. C-1)."""

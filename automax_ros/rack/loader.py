@@ -13,11 +13,11 @@ from automax_ros.core.text import did_you_mean, quoted
 from automax_ros.core.yaml_text import Node, read_yaml
 from automax_ros.rack.commons import SCHEMA as COMMON_SCHEMA
 from automax_ros.rack.commons import CommonReader
-from automax_ros.rack.config import CommonVariable, ModuleLoss, RackConfig, Timing
+from automax_ros.rack.config import CommonVariable, ModuleLoss, RackConfig, Timing, bank_variables
 from automax_ros.rack.executive import NEWEST, OLDEST, executive_value
 from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.names import RACK_NAME, is_rack_name
 from automax_ros.rack.plants.feeds import read_feeds
 from automax_ros.rack.plants.joints import read_commands
@@ -29,7 +29,6 @@ from automax_ros.rack.sections import Section, entries_of
 from automax_ros.rack.slots import SCHEMA as SLOTS_SCHEMA
 from automax_ros.rack.slots import SlotReader
 from automax_ros.rack.tasks import TaskReader
-from automax_ros.rack.views import bank_variables
 from automax_ros.rack.watching import SCHEMA as WATCH_SCHEMA
 from automax_ros.rack.watching import read_watch
 

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.text import printable
 from automax_ros.rack.files import FileFault, lies_next_to
-from automax_ros.rack.modules.kind import Module
-from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.scheduled_task import ScheduledTask
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.task_source import read_task_source
 from automax_ros.running.task import Status
 

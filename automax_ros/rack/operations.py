@@ -15,7 +15,7 @@ from automax_ros.rack.beginning import write_status
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.forcing import Forcing
 from automax_ros.rack.installation import Installation, Prepared, RackError
-from automax_ros.rack.modules.kind import Module
+from automax_ros.rack.modules.running import Module
 from automax_ros.rack.observers import Observers, Operation
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.standing import KEEP_STATE, OperationRefused, OperationsState, PowerReturn, StopCause

@@ -21,10 +21,10 @@ from automax_ros.rack.controls import Controls
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.installation import Prepared, RackError
 from automax_ros.rack.observers import Operation
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.reading import MAX_NAME, MAX_NAMES, Reading, Readings
 from automax_ros.rack.settings import common_named
+from automax_ros.rack.standing import OperationRefused
 
 MAX_VALUE = 1000
 """Longest text of a value that is looked at, in characters (decision: likewise)."""

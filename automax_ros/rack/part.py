@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.plants.config import PlantConfig
 from automax_ros.rack.plants.driven import DrivenPlant, driven_plants
 from automax_ros.running.backplane import Backplane

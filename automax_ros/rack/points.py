@@ -9,7 +9,7 @@ from automax_ros.core.json_schema import Keys, whole
 from automax_ros.core.types import DataType
 from automax_ros.rack.config import MAX_SLOT, Point
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.names import VariableName
 from automax_ros.rack.scalars import integer_value
 from automax_ros.rack.sections import Section

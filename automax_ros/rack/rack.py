@@ -23,7 +23,8 @@ from automax_ros.rack.digest import digest_of
 from automax_ros.rack.forcing import Force, Forcing
 from automax_ros.rack.installation import Finding, Installation
 from automax_ros.rack.installer import Installer
-from automax_ros.rack.modules.kind import Module, Parts
+from automax_ros.rack.modules.building import build_module
+from automax_ros.rack.modules.running import Module, Parts
 from automax_ros.rack.observers import Observers, RackObserver
 from automax_ros.rack.operations import Operations
 from automax_ros.rack.part import RackPart
@@ -122,7 +123,7 @@ class Rack:
             plants=self.plants,
             full_speeds=full_speeds(config.feeds),
         )
-        self.modules: list[Module] = [module.build(parts) for module in self.part.modules]
+        self.modules: list[Module] = [build_module(module, parts) for module in self.part.modules]
         self.operations = Operations(
             config,
             self.modules,

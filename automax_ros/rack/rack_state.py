@@ -8,7 +8,7 @@ from typing import Any
 
 from automax_ros.core.types import Value
 from automax_ros.drive.state import SavedState
-from automax_ros.rack.modules.kind import ModuleState
+from automax_ros.rack.modules.running import ModuleState
 from automax_ros.rack.standing import OperationsState
 
 

@@ -13,9 +13,9 @@ from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import Value
 from automax_ros.core.values import source_text
 from automax_ros.rack.config import CommonVariable
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.settings import common_named
+from automax_ros.rack.standing import OperationRefused
 
 MAX_NAME = 100
 """Longest name that is looked at, in characters (decision: a bound on what strangers send)."""

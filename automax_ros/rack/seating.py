@@ -25,7 +25,7 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.language.program import Program
 from automax_ros.rack.config import RackConfig
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.plants.driven import driven_plants
 from automax_ros.rack.tasks_check import check_tasks
 

@@ -10,7 +10,8 @@ from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.config import MAX_SLOT
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules.kind import Arrangement, FoundModule, ModuleConfig, Standing
+from automax_ros.rack.modules.configured import ModuleConfig
+from automax_ros.rack.modules.kind import Arrangement, FoundModule, Standing
 from automax_ros.rack.modules.registry import KINDS, NOT_YET, REFUSED, SUPPORTED, module_number, spellings
 from automax_ros.rack.plants.reading import Plants
 from automax_ros.rack.scalars import text_value, wrong_kind

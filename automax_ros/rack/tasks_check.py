@@ -15,7 +15,7 @@ from automax_ros.language.program import CommonSpec
 from automax_ros.rack.common_use import rack_warnings
 from automax_ros.rack.config import RackConfig
 from automax_ros.rack.files import FileFault
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.task_rules import findings_by_task
 from automax_ros.rack.task_source import read_task_source

@@ -4,28 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from automax_ros.core.kinds import Direction
-from automax_ros.core.types import DataType
 from automax_ros.rack.config import CommonVariable, RackConfig
-from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.running.backplane import Backplane, Bank
 from automax_ros.running.views import Place, ViewSpec
-
-
-def bank_variables(modules: Iterable[ModuleConfig]) -> list[CommonVariable]:
-    """Return a variable for the registers of each module that has some; ROS never sees it."""
-    return [
-        CommonVariable(
-            f"SLOT:{module.slot}%",
-            DataType.INTEGER,
-            (module.registers.count,),
-            direction=Direction.CLOSED,
-            line=module.line,
-            bank=module.slot,
-        )
-        for module in modules
-        if module.registers.count
-    ]
 
 
 def backplane_of(config: RackConfig) -> Backplane:

@@ -26,7 +26,7 @@ from automax_ros.language.written import lines_that_write
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.files import MAX_BYTES
 from automax_ros.rack.loader import load_stored
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.modules.processor import MAX_PROCESSORS
 from automax_ros.rack.modules.udc_config import DRIVES, MAX_UDCS
 from automax_ros.rack.task_config import MAX_TASKS

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from automax_ros.core.ticks import UDC_TICK_NS
+from automax_ros.core.ticks import CLOCK_PERIOD_NS
 from automax_ros.running.memory import CommonMemory
 from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 
-CLOCK_PERIOD_NS = UDC_TICK_NS
-"""One interval of the clock: 500 us (S-3056 p. 4-4; J2-3106-1 p. 2-5 prints ms)."""
 ENABLE_BIT = 6
 """The bit that drives the clock, in a UDC's register 2000 as in the ISCR of I/O modules (decision).
 

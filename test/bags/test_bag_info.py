@@ -21,7 +21,7 @@ from automax_ros.bags.reader import BagReader
 from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.bag_info import as_data
 from automax_ros.cli.bag_info_text import lines_of
-from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.wire.cdr import encode
 from automax_ros.wire.messages import Int16, Scan, ScanError
 from automax_ros.wire.stream import RackStream

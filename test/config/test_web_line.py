@@ -16,8 +16,8 @@ from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.main import main
 from automax_ros.rack.cpu_load import faults, loads_of
 from automax_ros.rack.loader import load
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.reader import read_for_rack
 from automax_ros.rack.tasks_check import check_tasks

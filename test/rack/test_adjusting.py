@@ -5,8 +5,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.rack.loader import load
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 
 YAML = """\
 rack: LINE1

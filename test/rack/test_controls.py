@@ -9,10 +9,10 @@ import pytest
 from bags.live_racks import build
 
 from automax_ros.rack.controls import Controls
-from automax_ros.rack.modules.kind import QuietModule
+from automax_ros.rack.modules.running import QuietModule
 from automax_ros.rack.observers import Operation
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 
 YAML = """\
 rack: LINE1

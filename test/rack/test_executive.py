@@ -4,8 +4,8 @@ import pytest
 
 from automax_ros.core.diagnostics import Severity
 from automax_ros.rack.config import ModuleLoss
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.running.views import MemoryValueError
 
 from .helpers import codes, good, loaded

@@ -10,8 +10,8 @@ from bags.live_racks import build
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.halting import DONE, STOPPED, TIME_OVER, Halting, Stepped
 from automax_ros.rack.observers import Operation
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.running.pacer import Pacer
 
 YAML = """\

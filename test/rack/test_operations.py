@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.installation import RackError
 from automax_ros.rack.loader import load
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.running.task import Status
 from automax_ros.running.views import MemoryValueError
 

@@ -9,9 +9,9 @@ import pytest
 from bags.live_racks import build
 
 from automax_ros.rack.observers import Operation
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.orders import MAX_NAME, MAX_NAMES, MAX_VALUE, Orders, ReloadRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 
 YAML = """\
 rack: LINE1

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.rack.loader import load
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.retention import Restored, Retention, RetentionFault, default_folder
+from automax_ros.rack.standing import OperationRefused
 
 RACK = """\
 rack: KEEP

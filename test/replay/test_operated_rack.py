@@ -13,8 +13,8 @@ from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.replay.engine import ReplayOptions, replay
 from automax_ros.running.task import OVERLAP
 from automax_ros.wire.messages import CommonWrite, Operation, Scan, VariableTable

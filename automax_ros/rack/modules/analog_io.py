@@ -8,8 +8,8 @@ module drives the common clock while bit 6 is set in one of the control register
 
 from __future__ import annotations
 
+from automax_ros.rack.modules.configured import Interrupt, Registers
 from automax_ros.rack.modules.io_config import IoKind, IoModel
-from automax_ros.rack.modules.kind import Interrupt, Registers
 
 _INPUTS = Registers(
     7,

@@ -12,7 +12,8 @@ from types import MappingProxyType
 
 from automax_ros.compile.cost import Model
 from automax_ros.core.json_schema import Keys
-from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule, Module, Parts, QuietModule, Registers
+from automax_ros.rack.modules.configured import NO_REGISTERS, Registers
+from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.task_config import TaskConfig
 
 COMMON_REGISTERS = {"57C413": 65536, "57C423": 131072}
@@ -54,10 +55,6 @@ class CommonMemoryConfig:
     def common_registers(self) -> int:
         """16-bit registers that common variables may take, in slot 0 alone."""
         return 0 if self.slot else COMMON_REGISTERS[self.model]
-
-    def build(self, _: Parts) -> Module:
-        """Return the module of a running rack."""
-        return QuietModule(self)
 
 
 class CommonMemoryKind:

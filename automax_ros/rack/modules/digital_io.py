@@ -9,8 +9,8 @@ and 1, which freeze at its interrupt (4.0), its interrupt status and control reg
 
 from __future__ import annotations
 
+from automax_ros.rack.modules.configured import Interrupt, Registers
 from automax_ros.rack.modules.io_config import IoKind, IoModel
-from automax_ros.rack.modules.kind import Interrupt, Registers
 
 DRIVE_MODEL = "57C408"
 """The drive digital I/O module."""

@@ -16,10 +16,10 @@ from types import MappingProxyType
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.json_schema import Keys, whole
 from automax_ros.rack.config import MAX_SLOT
+from automax_ros.rack.modules.configured import Registers
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER
-from automax_ros.rack.modules.drive_voltage import DriveAnalogModule
 from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
-from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
+from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.scalars import integer_value
 
 _REGISTERS = Registers(4, by_itself=True)
@@ -41,13 +41,6 @@ class DriveAnalogConfig(WithoutTasks):
     def name(self) -> str:
         """The module's name in the rack, as that of its node."""
         return f"drive_analog_{self.slot}"
-
-    def build(self, parts: Parts) -> Module:
-        """Return the module of a running rack."""
-        module = DriveAnalogModule(self, parts)
-        if self.drive is not None:
-            parts.drives.wire_voltage(self.drive, module.feel)
-        return module
 
 
 class DriveAnalogKind:

@@ -8,14 +8,20 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from automax_ros.core.json_schema import Keys
-from automax_ros.rack.modules.drive_controller import DEFAULTS, DriveControllerModule
+from automax_ros.rack.modules.configured import Registers
 from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
-from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
+from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.plants.config import plant_name
 
 if TYPE_CHECKING:
     from automax_ros.rack.plants.config import PlantConfig
 
+TACH_THRESHOLD, PHASE_STEP, PERIOD_STEP, OPTIONS = 4136, 4137, 4138, 4146
+"""The registers that an application may write (52.7)."""
+DEFAULTS = {TACH_THRESHOLD: 109, PHASE_STEP: 4, PERIOD_STEP: 2, OPTIONS: 0}
+"""What initialisation of the CML task writes to them (52.4.1, 52.5.1, 52.6.2, 52.7)."""
+ACCESS_NS = 5_000
+"""By how much an access of the application delays the microprocessor, ns (52.7, decision: no manual says how much)."""
 _COUNT = max(DEFAULTS) + 1
 _REGISTERS = Registers(
     _COUNT,
@@ -45,12 +51,6 @@ class DriveConfig(WithoutTasks):
     def plants(self) -> Mapping[str, PlantConfig]:
         """The plant of its one drive."""
         return {} if self.plant is None else {"": self.plant}
-
-    def build(self, parts: Parts) -> Module:
-        """Return the module of a running rack."""
-        plant = None if self.plant is None else parts.plants.get(self.plant.name)
-        full_rpm = None if self.plant is None else parts.full_speeds.get(self.plant.name)
-        return DriveControllerModule(self, parts, plant, full_rpm)
 
 
 class DriveControllerKind:

@@ -25,21 +25,17 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.drive.cml.signals import VOLTAGE, VOLTS, Command, Measured, Pulse
 from automax_ros.drive.controller import DriveController
 from automax_ros.drive.plant import DrivePlant
+from automax_ros.rack.modules.configured import ModuleConfig
+from automax_ros.rack.modules.drive_config import ACCESS_NS, DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
 from automax_ros.rack.modules.drive_digital import DriveDigital
 from automax_ros.rack.modules.drive_interrupts import DriveInterrupts, InterruptTiming
 from automax_ros.rack.modules.drive_switches import CONTROLS, FrontSwitches
-from automax_ros.rack.modules.kind import ModuleConfig, ModuleState, Parts
+from automax_ros.rack.modules.running import ModuleState, Parts
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.running.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent
 
-TACH_THRESHOLD, PHASE_STEP, PERIOD_STEP, OPTIONS = 4136, 4137, 4138, 4146
-"""The registers that an application may write (52.7)."""
-DEFAULTS = {TACH_THRESHOLD: 109, PHASE_STEP: 4, PERIOD_STEP: 2, OPTIONS: 0}
-"""What initialisation of the CML task writes to them (52.4.1, 52.5.1, 52.6.2, 52.7)."""
 _new = tuple.__new__
 """Makes a named tuple as tuples are made: its own way takes twice the time, and there is one at each interrupt."""
-ACCESS_NS = 5_000
-"""By how much an access of the application delays the microprocessor, ns (52.7, decision: no manual says how much)."""
 REST_NS = 5_500_000
 """How often a plant whose drive rests is looked at, ns: the system clock tick (decision)."""
 

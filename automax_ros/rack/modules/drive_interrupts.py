@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from automax_ros.core.text import count_of
-from automax_ros.rack.modules.kind import ModuleState
+from automax_ros.rack.modules.running import ModuleState
 from automax_ros.running.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
 
 USUAL_NS = 2_777_778

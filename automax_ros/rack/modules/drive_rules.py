@@ -11,9 +11,9 @@ from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.language.program import BoundCall, Program, Symbol
 from automax_ros.language.syntax.tree import Scope
 from automax_ros.rack.config import Point, RackConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.modules.digital_io import DRIVE_MODEL
 from automax_ros.rack.modules.drive_config import DRIVE_CONTROLLER, DriveConfig
-from automax_ros.rack.modules.kind import ModuleConfig
 from automax_ros.rack.task_config import TaskConfig
 
 MAX_LOOPS = 2

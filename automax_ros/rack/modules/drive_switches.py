@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from automax_ros.drive.cml.signals import RESET_SWITCH, SWITCH_A, SWITCH_B
-from automax_ros.rack.modules.kind import ModuleState
+from automax_ros.rack.modules.running import ModuleState
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
 
 PRESSED_NS = 500_000_000

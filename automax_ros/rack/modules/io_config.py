@@ -9,8 +9,8 @@ from typing import Protocol, runtime_checkable
 
 from automax_ros.compile.cost import Model
 from automax_ros.core.json_schema import Keys
-from automax_ros.rack.modules.io_module import IoModule
-from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
+from automax_ros.rack.modules.configured import Registers
+from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.task_config import TaskConfig
 
 
@@ -43,10 +43,6 @@ class IoConfig(WithoutTasks):
     def name(self) -> str:
         """The module's name in the rack, as that of its node."""
         return f"{self.node}_{self.slot}"
-
-    def build(self, parts: Parts) -> Module:
-        """Return the module of a running rack."""
-        return IoModule(self, parts)
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,11 @@ from collections.abc import Sequence
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
+from automax_ros.core.ticks import CLOCK_PERIOD_NS
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.modules.kind import Interrupt, ModuleConfig, ModuleState, Parts
+from automax_ros.rack.modules.configured import Interrupt, ModuleConfig
+from automax_ros.rack.modules.running import ModuleState, Parts
 from automax_ros.rack.scheduled_task import ScheduledTask
-from automax_ros.running.common_clock import CLOCK_PERIOD_NS
 from automax_ros.running.process_inputs import Freezer
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
 

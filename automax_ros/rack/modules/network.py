@@ -25,7 +25,7 @@ from functools import partial
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
-from automax_ros.rack.modules.kind import ModuleConfig, ModuleState, Parts
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.modules.network_hearing import Hearing
 from automax_ros.rack.modules.network_port import Frame, NetworkStatus, Send, Sender
 from automax_ros.rack.modules.network_registers import (
@@ -48,6 +48,7 @@ from automax_ros.rack.modules.network_registers import (
     from_slave,
     greatest_depth,
 )
+from automax_ros.rack.modules.running import ModuleState, Parts
 from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
 

@@ -21,9 +21,9 @@ from automax_ros.core.json_schema import Keys, named, whole
 from automax_ros.core.text import quoted
 from automax_ros.core.yaml_text import Node
 from automax_ros.rack.findings import Findings
+from automax_ros.rack.modules.configured import Registers
 from automax_ros.rack.modules.io_config import WithoutTasks
-from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
-from automax_ros.rack.modules.network import NetworkModule
+from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.modules.network_registers import LAST_DROP, MASTER, greatest_depth, registers_of
 from automax_ros.rack.names import RACK_NAME, is_rack_name
 from automax_ros.rack.scalars import integer_value, text_value
@@ -55,10 +55,6 @@ class NetworkConfig(WithoutTasks):
     def drops(self) -> range:
         """The drops that it may represent."""
         return range(self.drop, self.drop + self.depth)
-
-    def build(self, parts: Parts) -> Module:
-        """Return the module of a running rack."""
-        return NetworkModule(self, self.network, self.drop, parts)
 
 
 class NetworkKind:

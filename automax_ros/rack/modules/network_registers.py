@@ -9,7 +9,7 @@ of its drops.
 
 from __future__ import annotations
 
-from automax_ros.rack.modules.kind import Registers
+from automax_ros.rack.modules.configured import Registers
 
 AREA = 64
 """Registers of the area of one drop."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -13,9 +12,9 @@ from automax_ros.core.ticks import DEFAULT_TICK_NS, MAX_TICK_NS, MIN_TICK_NS, NS
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.executive import OLDEST, tick_fault, version_text
 from automax_ros.rack.modules.common_memory import COMMON_MEMORY
-from automax_ros.rack.modules.kind import NO_REGISTERS, Arrangement, FoundModule, Module, ModuleState, Parts, Registers
+from automax_ros.rack.modules.configured import NO_REGISTERS, Registers
+from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.scalars import wrong_kind
-from automax_ros.rack.scheduled_task import ScheduledTask
 from automax_ros.rack.task_config import TaskConfig
 from automax_ros.rack.tasks import PRIORITIES, tasks_schema
 
@@ -55,43 +54,6 @@ class ProcessorConfig:
     def times(self) -> Model:
         """Whose execution times its tasks have."""
         return Model(self.model)
-
-    def build(self, parts: Parts) -> Module:
-        """Return the module of a running rack."""
-        in_order = sorted(self.tasks, key=lambda item: (item.priority, item.name))
-        execution = parts.execution(self.name)
-        return ProcessorModule(self, [parts.install(item, execution) for item in in_order])
-
-
-@dataclass
-class ProcessorModule:
-    """A Processor with its tasks."""
-
-    config: ProcessorConfig
-    tasks: Sequence[ScheduledTask]
-    kept: frozenset[tuple[int, int]] = frozenset()
-
-    def power_on(self) -> None:
-        """Nothing begins: tasks are put into RUN by the rack, in the order of all its Processors."""
-
-    def power_off(self) -> None:
-        """Stop the tasks; locals, tunables and error logs stay (2.4.5)."""
-        for task in self.tasks:
-            task.stop()
-
-    def stopped_all(self) -> None:
-        """Nothing follows: locals, tunables and error logs stay (2.4.5)."""
-
-    def state(self) -> ModuleState:
-        """Return the state of each task."""
-        return {item.task.name: item.state() for item in self.tasks}
-
-    def load(self, state: ModuleState) -> None:
-        """Take over the state of each task; those that ran go on with their next scan."""
-        if set(state) != {item.task.name for item in self.tasks}:
-            raise ValueError(f"{self.config.name} has the tasks {[item.task.name for item in self.tasks]}")
-        for item in self.tasks:
-            item.load(state[item.task.name])
 
 
 class ProcessorKind:

@@ -10,8 +10,8 @@ counter that runs over does (decision).
 
 from __future__ import annotations
 
+from automax_ros.rack.modules.configured import Interrupt, Registers
 from automax_ros.rack.modules.io_config import IoKind, IoModel
-from automax_ros.rack.modules.kind import Interrupt, Registers
 
 TIMER_ENABLE = 5
 """The bit of register 5 without which there is no timer interrupt."""

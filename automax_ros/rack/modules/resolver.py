@@ -8,8 +8,8 @@ stands in the registers 0 and 1 comes from outside, as the converter would give 
 
 from __future__ import annotations
 
+from automax_ros.rack.modules.configured import Interrupt, Registers
 from automax_ros.rack.modules.io_config import IoKind, IoModel
-from automax_ros.rack.modules.kind import Interrupt, Registers
 
 _REGISTERS = Registers(
     5,

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.rack.modules.kind import ModuleConfig, ModuleState, Parts
+from automax_ros.rack.modules.configured import ModuleConfig
+from automax_ros.rack.modules.running import ModuleState, Parts
 from automax_ros.rack.modules.udc_copies import Copied, Copies, copies_of
 from automax_ros.rack.modules.udc_pmi import UdcPmis
 from automax_ros.rack.modules.udc_registers import (

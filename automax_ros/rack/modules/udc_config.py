@@ -15,8 +15,8 @@ from automax_ros.core.ticks import UDC_TICK_NS
 from automax_ros.core.yaml_text import Node
 from automax_ros.drive.pmi_table import DRIVE_B, WRITTEN
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules.kind import Arrangement, FoundModule, Module, Parts, Registers
-from automax_ros.rack.modules.udc import UdcModule
+from automax_ros.rack.modules.configured import Registers
+from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.modules.udc_registers import UDC_REGISTERS
 from automax_ros.rack.plants.config import PlantConfig, plant_name
 from automax_ros.rack.scalars import text_value
@@ -57,10 +57,6 @@ class UdcConfig:
         bases = [DRIVE_B if drive == "B" else 0 for drive, plant in self.plants.items() if plant.motor is not None]
         shown = frozenset(base + number for base in bases for number in WRITTEN)
         return replace(UDC_REGISTERS, shown=shown) if shown else UDC_REGISTERS
-
-    def build(self, parts: Parts) -> Module:
-        """Return the module of a running rack."""
-        return UdcModule(self, parts)
 
 
 class _Drives:

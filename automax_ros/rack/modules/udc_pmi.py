@@ -14,7 +14,8 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.drive import pmi_table as table
 from automax_ros.drive.errors import DriveError
 from automax_ros.drive.pmi import Commands, Pmi
-from automax_ros.rack.modules.kind import ModuleConfig, ModuleState, Parts
+from automax_ros.rack.modules.configured import ModuleConfig
+from automax_ros.rack.modules.running import ModuleState, Parts
 from automax_ros.rack.modules.udc_registers import RAIL_COUNTERS
 from automax_ros.rack.plants.driven import Driving
 from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent

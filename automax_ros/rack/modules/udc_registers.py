@@ -7,7 +7,7 @@ that are not listed belong to the module's operating system (S-3006 p. 4-2).
 
 from __future__ import annotations
 
-from automax_ros.rack.modules.kind import Interrupt, Registers
+from automax_ros.rack.modules.configured import Interrupt, Registers
 
 COUNT = 2048
 RAIL = range(24)

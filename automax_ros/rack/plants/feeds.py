@@ -15,7 +15,7 @@ from automax_ros.language.program import Program
 from automax_ros.language.written import places_that_write
 from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules.kind import ModuleConfig
+from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.names import VariableName
 from automax_ros.rack.plants.config import FeedConfig
 from automax_ros.rack.plants.feed_keys import KEYS, LEAST_MS, MOST_MS, USUAL_MS

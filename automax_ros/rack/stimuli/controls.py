@@ -10,7 +10,7 @@ from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.yaml_text import Node, Scalar
 from automax_ros.rack.controls import Controls
 from automax_ros.rack.findings import Findings
-from automax_ros.rack.modules.kind import Operable
+from automax_ros.rack.modules.running import Operable
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.scalars import integer_value, kind_of
 from automax_ros.rack.sections import Entry, entries_of

@@ -10,8 +10,8 @@ from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.problems import Severity
 from automax_ros.core.types import Value
 from automax_ros.rack.installation import RackError
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.stimuli.stage import Stage
 
 

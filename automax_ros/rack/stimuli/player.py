@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.stimuli.stage import ENTRIES, Action, Happened, Stage, Stimulus, in_time
 from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
 

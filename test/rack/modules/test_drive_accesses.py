@@ -8,7 +8,7 @@ import pytest
 
 from automax_ros.drive.cml.signals import late_us
 from automax_ros.rack.loader import load
-from automax_ros.rack.modules.drive_controller import ACCESS_NS
+from automax_ros.rack.modules.drive_config import ACCESS_NS
 from automax_ros.rack.rack import Rack
 from rack.modules.modeled_drives import follow, held
 

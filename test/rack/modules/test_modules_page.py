@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from automax_ros.rack.loader import load
+from automax_ros.rack.modules.configured import Registers
 from automax_ros.rack.modules.io_config import HasTable
-from automax_ros.rack.modules.kind import Registers
 from automax_ros.rack.modules.registry import KINDS
 from automax_ros.rack.rack import Rack
 from automax_ros.rack.tasks_check import check_tasks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.rack.operations import OperationRefused
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.running.task import Status
 
 from .udc_racks import Seen, built

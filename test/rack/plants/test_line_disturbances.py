@@ -12,8 +12,8 @@ from replay.replays import edited, record, replayed
 
 from automax_ros.rack.controls import Controls
 from automax_ros.rack.loader import load
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.reader import read_for_rack
 

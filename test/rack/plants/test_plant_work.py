@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from automax_ros.rack.controls import MOST_CHARACTERS, Controls
-from automax_ros.rack.operations import OperationRefused
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.standing import OperationRefused
 from automax_ros.rack.stimuli.player import Stimulation
 from automax_ros.rack.stimuli.reader import read_for_rack
 

@@ -1,0 +1,63 @@
+"""The module of a running rack for each kind of configuration: the one table that joins the two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from automax_ros.rack.modules.common_memory import CommonMemoryConfig
+from automax_ros.rack.modules.configured import ModuleConfig
+from automax_ros.rack.modules.drive_analog import DriveAnalogConfig
+from automax_ros.rack.modules.drive_config import DriveConfig
+from automax_ros.rack.modules.drive_controller import DriveControllerModule
+from automax_ros.rack.modules.drive_voltage import DriveAnalogModule
+from automax_ros.rack.modules.io_config import IoConfig
+from automax_ros.rack.modules.io_module import IoModule
+from automax_ros.rack.modules.network import NetworkModule
+from automax_ros.rack.modules.network_config import NetworkConfig
+from automax_ros.rack.modules.pc3000 import Pc3000Config
+from automax_ros.rack.modules.processor import ProcessorConfig
+from automax_ros.rack.modules.processor_module import ProcessorModule
+from automax_ros.rack.modules.running import Module, Parts, QuietModule
+from automax_ros.rack.modules.udc import UdcModule
+from automax_ros.rack.modules.udc_config import UdcConfig
+
+
+def build_module(config: ModuleConfig, parts: Parts) -> Module:
+    """Return the module of a running rack that a configuration describes."""
+    return _BUILDERS[type(config)](config, parts)
+
+
+def _processor(config: ProcessorConfig, parts: Parts) -> Module:
+    in_order = sorted(config.tasks, key=lambda item: (item.priority, item.name))
+    execution = parts.execution(config.name)
+    return ProcessorModule(config, [parts.install(item, execution) for item in in_order])
+
+
+def _drive(config: DriveConfig, parts: Parts) -> Module:
+    plant = None if config.plant is None else parts.plants.get(config.plant.name)
+    full_rpm = None if config.plant is None else parts.full_speeds.get(config.plant.name)
+    return DriveControllerModule(config, parts, plant, full_rpm)
+
+
+def _drive_analog(config: DriveAnalogConfig, parts: Parts) -> Module:
+    module = DriveAnalogModule(config, parts)
+    if config.drive is not None:
+        parts.drives.wire_voltage(config.drive, module.feel)
+    return module
+
+
+def _network(config: NetworkConfig, parts: Parts) -> Module:
+    return NetworkModule(config, config.network, config.drop, parts)
+
+
+_BUILDERS: dict[type, Callable[[Any, Parts], Module]] = {
+    ProcessorConfig: _processor,
+    Pc3000Config: _processor,
+    CommonMemoryConfig: lambda config, _: QuietModule(config),
+    IoConfig: IoModule,
+    DriveConfig: _drive,
+    DriveAnalogConfig: _drive_analog,
+    NetworkConfig: _network,
+    UdcConfig: UdcModule,
+}

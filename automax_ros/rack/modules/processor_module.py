@@ -1,0 +1,41 @@
+"""A Processor of a running rack, with its tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from automax_ros.rack.modules.configured import ModuleConfig
+from automax_ros.rack.modules.running import ModuleState
+from automax_ros.rack.scheduled_task import ScheduledTask
+
+
+@dataclass
+class ProcessorModule:
+    """A Processor with its tasks."""
+
+    config: ModuleConfig
+    tasks: Sequence[ScheduledTask]
+    kept: frozenset[tuple[int, int]] = frozenset()
+
+    def power_on(self) -> None:
+        """Nothing begins: tasks are put into RUN by the rack, in the order of all its Processors."""
+
+    def power_off(self) -> None:
+        """Stop the tasks; locals, tunables and error logs stay (2.4.5)."""
+        for task in self.tasks:
+            task.stop()
+
+    def stopped_all(self) -> None:
+        """Nothing follows: locals, tunables and error logs stay (2.4.5)."""
+
+    def state(self) -> ModuleState:
+        """Return the state of each task."""
+        return {item.task.name: item.state() for item in self.tasks}
+
+    def load(self, state: ModuleState) -> None:
+        """Take over the state of each task; those that ran go on with their next scan."""
+        if set(state) != {item.task.name for item in self.tasks}:
+            raise ValueError(f"{self.config.name} has the tasks {[item.task.name for item in self.tasks]}")
+        for item in self.tasks:
+            item.load(state[item.task.name])
