@@ -31,7 +31,7 @@ def lower_minor_loop(emitter: Emitter, bound: BoundCall) -> None:
 
 
 def _lower(emitter: Emitter, bound: BoundCall) -> None:
-    inputs: list[ast.expr] = [_input(emitter, bound, item) for item in bound.block.inputs]
+    inputs: list[ast.expr] = [_loop_input(emitter, bound, item) for item in bound.block.inputs]
     values = [output for output in bound.block.outputs if not output.dimensions]
     places = [place for place in places_of(emitter, bound) if not place.output.dimensions]
     emitter.add_cost(emitter.cost_model.loop_ns)
@@ -47,7 +47,7 @@ def _lower(emitter: Emitter, bound: BoundCall) -> None:
     emitter.emit(build.when(build.name(RESULT), suite))
 
 
-def _input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:
+def _loop_input(emitter: Emitter, bound: BoundCall, item: Input) -> ast.expr:
     """Return what the loop gets for an input: as programmed, its default, or None where it does without it."""
     given = bound.arguments.get(item.name)
     if given is not None:

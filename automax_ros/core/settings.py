@@ -24,10 +24,10 @@ class Typed(Shaped, Protocol):
         """Characters of a STRING."""
 
 
-V = TypeVar("V", bound=Typed)
+W = TypeVar("W", bound=Typed)
 
 
-def setting(text: str, variables: Mapping[str, V], absent: str) -> tuple[Element[V], Value]:
+def setting(text: str, variables: Mapping[str, W], absent: str) -> tuple[Element[W], Value]:
     """Return the variable or array element that ``NAME=VALUE`` sets, and the value as it would hold it.
 
     Raises:

@@ -16,7 +16,8 @@ from automax_ros.nodes.topics import ros_qos
 from automax_ros.running.health import FROM_STRANGERS
 from automax_ros.wire.messages import NAMES
 from automax_ros.wire.qos import QosProfile
-from automax_ros.wire.task_table import TaskInfo, TaskTable
+from automax_ros.wire.task_table import TaskInfo as RemoteTask
+from automax_ros.wire.task_table import TaskTable as RemoteTable
 
 PARTS = "tasks/parts"
 """The topic of the parts, in the rack's namespace."""
@@ -39,17 +40,17 @@ class JoinedTasks:
             for module in rack.config.modules
             if module.slot not in rack.part.slots
         }
-        self._heard: dict[str, tuple[int, list[TaskInfo]]] = {}
-        BusWay(node, PARTS, NAMES[TaskTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
+        self._heard: dict[str, tuple[int, list[RemoteTask]]] = {}
+        BusWay(node, PARTS, NAMES[RemoteTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
 
-    def tasks(self, now_ns: int) -> Sequence[TaskInfo]:
+    def tasks(self, now_ns: int) -> Sequence[RemoteTask]:
         """Return the tasks of all modules that were heard of lately."""
         return [item for at_ns, items in self._heard.values() if now_ns - at_ns <= SILENT_NS for item in items]
 
-    def _take(self, table: TaskTable, _: bytes) -> None:
+    def _take(self, table: RemoteTable, _: bytes) -> None:
         if table.run_id != self._site.stream.run_id:
             return  # the run before, whose part still waits: the bus tells of other racks
-        modules: dict[str, list[TaskInfo]] = {}
+        modules: dict[str, list[RemoteTask]] = {}
         for item in table.tasks:
             if item.task not in self._tasks.get((item.module, item.slot), ()):
                 self._refuse(PARTS, "a task that is not another process's")

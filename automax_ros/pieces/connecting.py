@@ -52,14 +52,14 @@ def within(seconds: float, ask: Callable[[], _T]) -> _T:
         TimeoutError: there is no answer within the time.
     """
     answer: futures.Future[_T] = futures.Future()
-    threading.Thread(target=_answer, args=(ask, answer), daemon=True).start()
+    threading.Thread(target=_put_answer, args=(ask, answer), daemon=True).start()
     try:
         return answer.result(seconds)
     except futures.TimeoutError as error:
         raise TimeoutError from error
 
 
-def _answer(ask: Callable[[], _T], answer: futures.Future[_T]) -> None:
+def _put_answer(ask: Callable[[], _T], answer: futures.Future[_T]) -> None:
     try:
         answer.set_result(ask())
     except BaseException as error:

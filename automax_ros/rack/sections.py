@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
+from collections.abc import Mapping as AbstractMapping
 
 from automax_ros.core.diagnostics import Note, Span
 from automax_ros.core.text import did_you_mean, quoted
-from automax_ros.core.yaml_text import Mapping as Keyed
-from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.core.yaml_text import Mapping, Node, Scalar
 from automax_ros.rack.findings import Findings
 from automax_ros.rack.scalars import wrong_kind
 
@@ -16,7 +16,7 @@ Entry = tuple[Scalar, Node]
 
 def entries_of(node: Node, what: str, findings: Findings) -> tuple[Entry, ...] | None:
     """Return keys and values, () for a key without a value; None (reported) where something else stands."""
-    if isinstance(node, Keyed):
+    if isinstance(node, Mapping):
         return node.entries
     if isinstance(node, Scalar) and node.is_null:
         return ()
@@ -36,7 +36,7 @@ class Section:
         what: str,
         known: Collection[str],
         findings: Findings,
-        hints: Mapping[str, str] | None = None,
+        hints: AbstractMapping[str, str] | None = None,
     ) -> None:
         """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from automax_ros.core.settings import setting
+from automax_ros.core.settings import setting as named_setting
 from automax_ros.core.types import Value, bare_name
 from automax_ros.language.program import Program, Symbol
 
@@ -36,5 +36,5 @@ def tuning(programs: Mapping[str, Program], text: str) -> Tuning:
     tunables = tunables_of(programs[task])
     bare = {bare_name(full): full for full in tunables}
     full = name if name in tunables else bare.get(name, name)
-    meant, found = setting(f"{full}={value}", tunables, f"task {task} has no tunable")
+    meant, found = named_setting(f"{full}={value}", tunables, f"task {task} has no tunable")
     return Tuning(task, meant.label, found)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText
-from automax_ros.core.problems import Severity
+from automax_ros.core.problems.problem import Severity
 
 _WORD = re.compile(r"[A-Z_][A-Z0-9_]*[%!@$]?")
 _NUMBER = re.compile(r"\s*([0-9]{1,9})(?![0-9])")

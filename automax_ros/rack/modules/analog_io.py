@@ -11,7 +11,7 @@ from __future__ import annotations
 from automax_ros.rack.modules.configured import Interrupt, Registers
 from automax_ros.rack.modules.io_config import IoKind, IoModel
 
-_INPUTS = Registers(
+_ANALOG_INPUTS = Registers(
     7,
     outputs=frozenset({2, 3, 5, 6}),
     interrupts=(
@@ -25,7 +25,7 @@ ANALOG_IO = IoKind(
     "analog I/O",
     "analog_io",
     {
-        "57C409": IoModel("2-channel analog input module", _INPUTS),
+        "57C409": IoModel("2-channel analog input module", _ANALOG_INPUTS),
         "57C410": IoModel("analog output module", Registers(4, outputs=range(4))),
     },
 )

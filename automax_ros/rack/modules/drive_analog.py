@@ -22,7 +22,7 @@ from automax_ros.rack.modules.io_config import IoModel, WithoutTasks
 from automax_ros.rack.modules.kind import Arrangement, FoundModule
 from automax_ros.rack.scalars import integer_value
 
-_REGISTERS = Registers(4, by_itself=True)
+_ANALOG_REGISTERS = Registers(4, by_itself=True)
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class DriveAnalogConfig(WithoutTasks):
     line: int = 0
     drive_span: Span | None = field(default=None, compare=False)
 
-    registers: Registers = _REGISTERS
+    registers: Registers = _ANALOG_REGISTERS
 
     @property
     def name(self) -> str:
@@ -47,7 +47,7 @@ class DriveAnalogKind:
     """What a rack file may say of a 57C405."""
 
     word = "drive analog I/O"
-    table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _REGISTERS)})
+    table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _ANALOG_REGISTERS)})
     models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
     options: Keys = MappingProxyType(
         {"drive": whole("Slot of the 57C406 whose armature voltage is wired to it.", 0, MAX_SLOT)}

@@ -15,11 +15,11 @@ from automax_ros.rack.modules.io_config import IoKind, IoModel
 
 TIMER_ENABLE = 5
 """The bit of register 5 without which there is no timer interrupt."""
-_REGISTERS = Registers(
+_COUNTER_REGISTERS = Registers(
     8,
     outputs=range(2, 7),
     interrupts=(Interrupt(status=5, period=2, inputs=range(2), enable=TIMER_ENABLE),),
     counters=(0,),
 )
 
-PULSETACH = IoKind("pulsetach input", "pulsetach", {"57C421": IoModel("pulsetach input module", _REGISTERS)})
+PULSETACH = IoKind("pulsetach input", "pulsetach", {"57C421": IoModel("pulsetach input module", _COUNTER_REGISTERS)})

@@ -11,11 +11,11 @@ from __future__ import annotations
 from automax_ros.rack.modules.configured import Interrupt, Registers
 from automax_ros.rack.modules.io_config import IoKind, IoModel
 
-_REGISTERS = Registers(
+_RESOLVER_REGISTERS = Registers(
     5,
     outputs=range(3, 5),
     interrupts=(Interrupt(status=3, period=4, inputs=range(2)),),
     copies=((3, 2),),
 )
 
-RESOLVER = IoKind("resolver input", "resolver", {"57C411": IoModel("resolver input module", _REGISTERS)})
+RESOLVER = IoKind("resolver input", "resolver", {"57C411": IoModel("resolver input module", _RESOLVER_REGISTERS)})

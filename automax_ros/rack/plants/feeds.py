@@ -18,7 +18,7 @@ from automax_ros.rack.findings import Findings
 from automax_ros.rack.modules.configured import ModuleConfig
 from automax_ros.rack.names import VariableName
 from automax_ros.rack.plants.config import FeedConfig
-from automax_ros.rack.plants.feed_keys import KEYS, LEAST_MS, MOST_MS, USUAL_MS
+from automax_ros.rack.plants.feed_keys import FEED_KEYS, LEAST_MS, MOST_MS, USUAL_MS
 from automax_ros.rack.scalars import number_value, text_value
 from automax_ros.rack.scale import Scale, scale_of
 from automax_ros.rack.sections import Section, entries_of, report_twice
@@ -60,7 +60,7 @@ class _FeedReader:
         entries = entries_of(node, where, findings)
         if entries is None:
             return None
-        section = Section(entries, where, KEYS, findings)
+        section = Section(entries, where, FEED_KEYS, findings)
         signal = self._signal(section, where, key.span)
         every_ms = self._every_ms(section.get("every_ms"), where)
         target = self._target(key, where)

@@ -19,7 +19,7 @@ from automax_ros.rack.plants.building import plant_data
 from automax_ros.rack.plants.config import MOTORS, PLANT_NAME, LoadConfig, PlantConfig, SupplyConfig, plant_name
 from automax_ros.rack.plants.couples import SCHEMA as COUPLE_SCHEMA
 from automax_ros.rack.plants.couples import check_couples, read_couple
-from automax_ros.rack.plants.feed_keys import SCHEMA as FEEDS_SCHEMA
+from automax_ros.rack.plants.feed_keys import FEED_SCHEMA
 from automax_ros.rack.plants.joint_keys import SCHEMA as JOINT_SCHEMA
 from automax_ros.rack.plants.joint_keys import GivenJoint, check_joint_names, read_joint
 from automax_ros.rack.plants.keys import (
@@ -54,7 +54,7 @@ _SIMULATED: Keys = {
     "load": LOAD_SCHEMA,
     "inertia": INERTIA_SCHEMA,
     "couple": COUPLE_SCHEMA,
-    "feeds": FEEDS_SCHEMA,
+    "feeds": FEED_SCHEMA,
     "joint": JOINT_SCHEMA,
 }
 KEYS: Keys = {

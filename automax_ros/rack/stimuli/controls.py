@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping as AbstractMapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,7 +20,7 @@ from automax_ros.rack.stimuli.reading import Verb, named
 from automax_ros.rack.stimuli.stage import Action
 
 
-def control_verbs(rack: Rack) -> Mapping[str, Verb]:
+def control_verbs(rack: Rack) -> AbstractMapping[str, Verb]:
     """Return the verbs ``module`` and ``plant``."""
     return {"module": Verb(partial(_module, rack)), "plant": Verb(partial(read_plant_work, rack))}
 
@@ -54,7 +54,7 @@ class _Given:
     value: str
 
 
-def _controls(node: Node, what: str, known: Mapping[str, tuple[str, ...]], findings: Findings) -> list[_Given]:
+def _controls(node: Node, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: Findings) -> list[_Given]:
     entries = entries_of(node, what, findings)
     if entries == ():
         findings.add("AMX6008", f"{what}: no control is named", node.span)
@@ -62,7 +62,9 @@ def _controls(node: Node, what: str, known: Mapping[str, tuple[str, ...]], findi
     return [item for item in found if item is not None]
 
 
-def _control(entry: Entry, what: str, known: Mapping[str, tuple[str, ...]], findings: Findings) -> _Given | None:
+def _control(
+    entry: Entry, what: str, known: AbstractMapping[str, tuple[str, ...]], findings: Findings
+) -> _Given | None:
     key, node = entry
     if key.text not in known:
         message = f"{what} has no control {quoted(key.text)}"
