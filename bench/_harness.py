@@ -13,14 +13,14 @@ from subprocess import PIPE, Popen
 from typing import NamedTuple
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.language.checks.checker import check
-from automax_ros.language.syntax.tree import Scope
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
-from automax_ros.running.views import ViewSpec
+from automax_ros.language.tree.tree import Scope
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import ViewSpec
+from automax_ros.runtime.tasks.task import Task
 
 SECONDS = 1.0
 """How long a measurement of short runs takes, s: a host that changes its speed has its best at some time in it."""

@@ -10,16 +10,10 @@ from pathlib import Path
 
 from _harness import seconds_in_turn
 
-from automax_ros.bags.export import export_csv
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.storage import COMPRESSIONS, StorageOptions
-from automax_ros.bags.writer import BagWriter
 from automax_ros.core.types import DataType
-from automax_ros.rack.loader import load
-from automax_ros.rack.rack import Rack, scans_per_second
-from automax_ros.wire.cdr import Message, decoder, encoder
-from automax_ros.wire.messages import (
+from automax_ros.messages.cdr.cdr import Message, decoder, encoder
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import (
     NAMES,
     Bool,
     CommonWrite,
@@ -33,8 +27,14 @@ from automax_ros.wire.messages import (
     Variable,
     VariableTable,
 )
-from automax_ros.wire.qos import LATCHED, SCAN
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.types.topics import LATCHED, SCAN
+from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.write.data_file import COMPRESSIONS, StorageOptions
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
+from automax_ros.recordings.write.writer import BagWriter
 
 RACK = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
 SECONDS = 60

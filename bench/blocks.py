@@ -11,7 +11,7 @@ from __future__ import annotations
 from _harness import Loop, ns_in_turn, scan_ns, scans_of, task_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Block, Form, Input, Platform, Special, Time
+from automax_ros.blocks.declare.declaration import Access, Block, Form, Input, Platform, Special, Time
 from automax_ros.blocks.scan_loop import END_TIMES
 from automax_ros.core.types import DataType
 

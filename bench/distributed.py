@@ -17,8 +17,8 @@ from pathlib import Path
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 os.environ.setdefault("ROS_DOMAIN_ID", "88")
 
-from automax_ros.bags.reader import BagReader
-from automax_ros.wire.messages import NAMES, Scan
+from automax_ros.messages.types.messages import NAMES, Scan
+from automax_ros.recordings.read.reader import BagReader
 
 LINE = Path(__file__).parents[1] / "test" / "system" / "racks" / "line4"
 LATENCY_SECONDS = 20

@@ -18,22 +18,22 @@ from pathlib import Path
 
 from _harness import ANSWER, Other, answer, wall_s
 
-from automax_ros.bags.recorder import Recorder
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.cml import proposals
-from automax_ros.drive.cml.inputs import Inputs
-from automax_ros.drive.cml.minor_loop import CurrentMinorLoop
-from automax_ros.drive.cml.signals import PERMISSIVE
-from automax_ros.drive.controller import DriveController
-from automax_ros.drive.motor import Motor, MotorData
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
-from automax_ros.drive.scr import mask_of
-from automax_ros.rack.loader import load
+from automax_ros.drive.base.motor import Motor, MotorData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.circuit.bridge import Bridge
+from automax_ros.drive.circuit.circuit import Circuit
+from automax_ros.drive.circuit.scr import mask_of
+from automax_ros.drive.current_loop import proposals
+from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
+from automax_ros.drive.current_loop.signals import PERMISSIVE
+from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.plant.plant import DrivePlant, LoadData, PlantData
+from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.write.recorder import Recorder
 
 PARAMETERS = derive(EXAMPLES["150hp"])
 TORQUE = PARAMETERS.values["shaft_torque_n_m"].value

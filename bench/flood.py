@@ -18,7 +18,7 @@ from typing import Any
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 os.environ.setdefault("ROS_DOMAIN_ID", "88")
 
-from automax_ros.nodes.environment import prepare
+from automax_ros.ros.setup.environment import prepare
 
 SYSTEM = Path(__file__).parent.parent / "test" / "system"
 KINDS = ("large", "fast", "malformed", "requests")

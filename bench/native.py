@@ -16,9 +16,12 @@ import numpy as np
 from _harness import SECONDS, Loop, ns_in_turn, scans_of, task_of
 from blocks import PROGRAM, PROGRAM_BLOCKS
 
+from automax_ros.compile.base.native_source import NotNative
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native import NativeCache, NativeTask, NotNative, native_form, translate
-from automax_ros.compile.native.build import build, find_compiler, level_of
+from automax_ros.compile.native.run.build import build, find_compiler, level_of
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.task import NativeTask, native_form
+from automax_ros.compile.native.translate.translation import translate
 from automax_ros.core.types import DataType, type_of_name
 
 COLUMN = 20_000

@@ -119,9 +119,9 @@ def closed_form() -> float:
 
 def own_writer(folder: Path) -> float:
     """Return messages per second of the writer of recordings, with metadata.yaml and zstd."""
-    from automax_ros.bags.writer import BagWriter
-    from automax_ros.wire.messages import NAMES, String
-    from automax_ros.wire.qos import SCAN
+    from automax_ros.messages.types.messages import NAMES, String
+    from automax_ros.messages.types.topics import SCAN
+    from automax_ros.recordings.write.writer import BagWriter
 
     began = time.perf_counter()
     with BagWriter(folder) as writer:

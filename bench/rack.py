@@ -15,20 +15,19 @@ from pathlib import Path
 
 from _harness import ANSWER, Other, answer, seconds_in_turn, wall_s
 
-from automax_ros.bags.recorder import Recorder
-from automax_ros.compile.native import NativeForms, NativeMode
-from automax_ros.compile.native.forms import IN_PYTHON
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeMode
 from automax_ros.core.ticks import seconds_ns
-from automax_ros.pieces.piece import Where
-from automax_ros.rack.config import RackConfig, Timing
-from automax_ros.rack.loader import load
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.parallel.job import Where
 from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig, Timing
+from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.sweep.blueprint import Blueprint
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.points import Point, grid, read_varied
 from automax_ros.sweep.run import Plan, run_points
 from automax_ros.sweep.sweeping import run_sweep
-from automax_ros.wire.stream import RackStream
 
 CONFIG = Path(__file__).parent.parent / "config" / "section_drive" / "rack.yaml"
 SECONDS, LONG_SECONDS, HOUR_S = 60, 300, 3600

@@ -10,18 +10,18 @@ from pathlib import Path
 
 from _harness import seconds_in_turn, wall_s
 
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.compile.native.forms import NativeForms, NativeMode
+from automax_ros.compile.native.run.forms import NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.pieces import Where
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.parallel.job import Where
 from automax_ros.rack.rack import Rack, scans_per_second
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 from automax_ros.replay import side_by_side
 from automax_ros.replay.engine import Replay, ReplayOptions
 from automax_ros.replay.side_by_side import replay_side_by_side
-from automax_ros.wire.stream import RackStream
 
 EXAMPLE = Path(__file__).parent.parent / "config" / "section_drive"
 SECONDS = 60

@@ -19,7 +19,7 @@ from pathlib import Path
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 os.environ.setdefault("ROS_DOMAIN_ID", "87")
 
-from automax_ros.nodes.environment import prepare
+from automax_ros.ros.setup.environment import prepare
 
 LOOP_SECONDS = 5.0
 WRITES = 200
@@ -58,9 +58,9 @@ def loop_jitter(period_ns: int, form: str) -> tuple[list[float], int]:
     from rclpy.context import Context
     from rclpy.node import Node
 
-    from automax_ros.nodes.executor import make_executor
-    from automax_ros.running.pacer import Pacer
-    from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+    from automax_ros.ros.setup.process import make_executor
+    from automax_ros.runtime.time.pacer import Pacer
+    from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
     context = Context()
     context.init(args=["--ros-args", "--disable-stdout-logs"])

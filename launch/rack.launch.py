@@ -2,7 +2,7 @@
 
 Every option of `automax run` is a launch argument; `ros2 launch automax_ros rack.launch.py --show-args` lists them.
 PushRosNamespace, SetParameter and SetRemap of a launch file that includes this one hold for the rack's nodes. A
-STOP ALL is the event `RackStopped` (automax_ros/nodes/launch_events.py); the end of the rack ends the launch. With
+STOP ALL is the event `RackStopped` (automax_ros/ros/launch_events.py); the end of the rack ends the launch. With
 lifecycle:=true the rack is a LifecycleNode, which this file configures and activates unless autostart:=false, and which
 heeds ChangeState of others.
 """
@@ -24,9 +24,9 @@ from launch_ros.events.lifecycle import ChangeState
 from launch_ros.substitutions import FindPackageShare
 from lifecycle_msgs.msg import Transition
 
-from automax_ros.cli.arguments import Option, commands
-from automax_ros.nodes.launch_events import RackStopped, stops_of
-from automax_ros.rack.loader import load
+from automax_ros.cli.shell.arguments import Option, commands
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.launch_events import RackStopped, stops_of
 
 PACKAGE = "automax_ros"
 YES_NO = ["true", "false"]

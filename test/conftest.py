@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from ros_domains import free_domain
 
-from automax_ros.nodes.environment import put_prefix_first
-from automax_ros.nodes.transports import announce_soon
+from automax_ros.ros.setup.discovery import announce_soon
+from automax_ros.ros.setup.environment import put_prefix_first
 
 # No test talks to, or hears, the plant's network.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"

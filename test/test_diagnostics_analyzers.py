@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 import yaml
 
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
-from automax_ros.rack.plants.driven import driven_plants
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.driven import driven_plants
 
 ROOT = Path(__file__).parent.parent
 RACKS = sorted(

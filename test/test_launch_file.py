@@ -7,10 +7,10 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from automax_ros.cli.arguments import commands
-from automax_ros.nodes.ros_arguments import split_arguments
-from automax_ros.rack.loader import load
-from automax_ros.rack.standing import StopCause
+from automax_ros.cli.shell.arguments import commands
+from automax_ros.rack.base.stop_cause import StopCause
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.setup.arguments import split_arguments
 
 ROOT = Path(__file__).parent.parent
 FILE = ROOT / "launch" / "rack.launch.py"
@@ -26,7 +26,7 @@ NOT_OPTIONS = {
     "on_stop_all",
     "lifecycle",
 }
-EVENTS = "automax_ros.nodes.launch_events"
+EVENTS = "automax_ros.ros.launch_events"
 
 
 def kept(name: str):

@@ -18,8 +18,8 @@ from packaging.requirements import Requirement
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import automax_ros
-from automax_ros.nodes import environment
-from automax_ros.nodes.environment import RosUnavailable, wheels_installed
+from automax_ros.ros.setup import environment
+from automax_ros.ros.setup.environment import RosUnavailable, wheels_installed
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "automax_ros"
@@ -306,7 +306,7 @@ def test_serialized_message_is_the_cdr_that_rosbags_reads():
 PUBLISHER = """
 import sys, time
 sys.path[:0] = [sys.argv[1]]
-from automax_ros.nodes.environment import prepare
+from automax_ros.ros.setup.environment import prepare
 prepare()
 import rclpy
 from automax_msgs.msg import Scan
@@ -352,7 +352,7 @@ def test_message_crosses_to_another_process(ros_domain_id):
 
 RESTARTED_PROGRAM = """
 import sys
-from automax_ros.nodes.environment import prepare
+from automax_ros.ros.setup.environment import prepare
 prepare()
 import os, rclpy
 print(sys.argv[1:], sys.stdin.read(), os.getpid())

@@ -30,50 +30,45 @@ class Group:
         return sorted(path for path in left if path.name != "__init__.py")
 
 
-_COLD = ("steady", "drive_case", "drive_rules", "gain_rules", "nameplate", "limits", "assessment")
+_ASSESS = ("assessment", "drive_case", "drive_rules", "limits")
+_COLD = ("drive/base/nameplate.py", "drive/circuit/steady.py", *(f"drive/assess/{name}.py" for name in _ASSESS))
 """What a drive's tools ask once: compiling takes longer than it saves."""
 
 _SCANS = (
-    "running/processor_time.py",
-    "running/scan_record.py",
-    "running/scan_under_way.py",
-    "running/scheduler.py",
-    "running/task.py",
-    "running/task_io.py",
-    "running/views.py",
-    "rack/observers.py",
-    "rack/scan_end.py",
-    "rack/scheduled_task.py",
-    "rack/task_statistics.py",
+    "runtime/scan/processor_time.py",
+    "runtime/scan/scan_record.py",
+    "runtime/scan/scan_under_way.py",
+    "runtime/time/scheduler.py",
+    "runtime/tasks/task.py",
+    "runtime/scan/task_io.py",
+    "runtime/memory/views.py",
+    "rack/base/observers.py",
+    "rack/tasks/scheduled_task.py",
+    "rack/tasks/statistics.py",
 )
 """What each scan goes through."""
 _RECORDING = (
-    "wire/patterns.py",
-    "wire/prepared.py",
-    "wire/rack_messages.py",
-    "wire/stream.py",
-    "wire/task_messages.py",
-    "wire/unsigned.py",
-    "wire/write_messages.py",
-    "bags/chunk_builder.py",
-    "bags/mcap_output.py",
-    "bags/recorder.py",
-    "bags/recording.py",
-    "bags/writer.py",
+    "messages/stream/templates.py",
+    "messages/stream/rack_messages.py",
+    "messages/stream/stream.py",
+    "messages/stream/task_messages.py",
+    "messages/stream/write_messages.py",
+    "recordings/mcap/chunk_builder.py",
+    "recordings/mcap/mcap_output.py",
+    "recordings/write/recorder.py",
+    "recordings/write/recording.py",
+    "recordings/write/writer.py",
 )
 """What each message of a recording goes through."""
 _DRIVES = (
-    "running/cml_task.py",
-    "running/drive_record.py",
-    "running/drives.py",
-    "running/image.py",
-    "running/memory.py",
-    "running/process_inputs.py",
-    "rack/modules/drive_controller.py",
-    "rack/modules/drive_digital.py",
-    "rack/modules/drive_interrupts.py",
-    "rack/modules/drive_switches.py",
-    "rack/modules/drive_voltage.py",
+    "runtime/tasks/cml_task.py",
+    "runtime/scan/drive_record.py",
+    "runtime/scan/drives.py",
+    "runtime/memory/image.py",
+    "runtime/memory/memory.py",
+    "runtime/memory/process_inputs.py",
+    "rack/modules/drive.py",
+    "rack/modules/drive_io.py",
     "rack/modules/io_module.py",
     "rack/plants/feeding.py",
     "rack/plants/sampling.py",
@@ -81,7 +76,7 @@ _DRIVES = (
 """What each interrupt of a 57C406 goes through, to the registers, and the instruments that look at a plant."""
 
 GROUPS = (
-    Group("drive", folders=("drive",), without=tuple(f"drive/{name}.py" for name in _COLD)),
+    Group("drive", folders=("drive",), without=_COLD),
     Group("scans", files=(*_SCANS, *_RECORDING, *_DRIVES)),
 )
 """What runs as machine code. ``sum`` of floating-point numbers must not stand in it (decision): Python 3.12 and later

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from automax_ros.cli.arguments import Command, Option, commands
-from automax_ros.cli.schema import SCHEMAS
+from automax_ros.cli.racks.schema import SCHEMAS
+from automax_ros.cli.shell.arguments import Command, Option, commands
 from automax_ros.core.problems import PROBLEMS
 
 ROOT = Path(__file__).resolve().parent.parent

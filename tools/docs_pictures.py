@@ -13,12 +13,11 @@ from html import escape
 from pathlib import Path
 
 from automax_ros.cli.main import main
-from automax_ros.cli.status import StatusDisplay
-from automax_ros.cli.status_parts import Progress, Summary
+from automax_ros.cli.run.status import Progress, StatusDisplay, Summary
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import watched
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.value_names import watched
 
 ROOT = Path(__file__).resolve().parent.parent
 RACK = ROOT / "config" / "dc_drive"

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from automax_ros.blocks.declaration import Block, Input, Output, Platform
+from automax_ros.blocks.catalogue import FAMILIES, Family
+from automax_ros.blocks.declare.declaration import Block, Input, Output, Platform
 from automax_ros.blocks.describe import (
     UNKNOWN_TIME,
     input_rows,
@@ -18,7 +19,6 @@ from automax_ros.blocks.describe import (
     time_rows,
 )
 from automax_ros.blocks.examples import EXAMPLES, Example, table_of
-from automax_ros.blocks.families import FAMILIES, Family
 from automax_ros.core.problems import PROBLEMS
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "blocks"

@@ -4,16 +4,160 @@ The loop itself is ``drive/cml``: here stands what a CALL may say, in the order 
 
 The CALL latches the simple commons of its task as SCAN_LOOP does, and a scan goes from it to END (decision). KP is
 microseconds of DELTA per count of error (decision). No dynamic block stands in the task (decision).
+
+The limits of DC_DRIVE_CML's inputs (table 1 and 52.1): check compares literals, the loop what variables hold.
+
+Both ends are allowed. Where a limit follows the line's frequency it is a function of it.
+
+Rules over the parameters of DC_DRIVE_CML beyond those of each (52.1).
 """
 
 from __future__ import annotations
 
-from automax_ros.blocks.cml_limits import LIMITS, SCANS_PER_CYCLE
-from automax_ros.blocks.cml_rules import Advised, OvercurrentLevel, WithinAtLine
-from automax_ros.blocks.declaration import Block, Form, Input, LineScan, Output, Platform, Times
-from automax_ros.blocks.rules import Needs
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil, floor
+
+from automax_ros.blocks.declare.coefficients import is_within
+from automax_ros.blocks.declare.declaration import Block, Fault, Form, Given, Input, LineScan, Output, Platform, Times
+from automax_ros.blocks.declare.rules import Needs
 from automax_ros.core.ticks import DEFAULT_TICK_NS
 from automax_ros.core.types import DataType, Value
+
+LIMITS: dict[str, tuple[float, float]] = {
+    "IO_CNTL_SLOT": (0, 15),
+    "DIG_IO_SLOT": (0, 15),
+    "AC_LINE_FREQ": (48, 62),
+    "KP": (0.0, 4.0),
+    "PI_W_LEAD": (10.0, 500.0),
+    "AG_FACTOR": (1, 300),
+    "CC_THRESH": (0, 32767),
+    "MAX_M_DROPOUT": (0.1, 1.0),
+    "TEST_ALPHA": (0, 180),
+    "IOC_THRESH": (100, 400),
+    "LIM_BAR": (100, 400),
+    "OSV_THRESH": (0, 32767),
+}
+"""Lowest and highest value of each input with limits that do not depend on the line."""
+
+FULL_COUNTS = 4095
+"""Counts of LIM_BAR."""
+MOST_COUNTS = 32767
+"""Largest rate limit, counts per scan."""
+SCANS_PER_CYCLE = 6
+LOWEST_LAG = 1.0
+"""Lowest REF_LAG, rad/s."""
+LAG_AT_50_HZ, LAG_AT_60_HZ = 400.0, 500.0
+"""Highest REF_LAG on a 50 Hz line and on a 60 Hz line, rad/s."""
+BETWEEN_HZ = 55.0
+"""A line of this frequency or more counts as one of 60 Hz, else of 50 Hz, for REF_LAG (decision)."""
+
+
+def limits_at(name: str, line_hz: float) -> tuple[float, float]:
+    """Return the lowest and highest value of an input at a line frequency in Hz; of REF_RATE besides 0.0."""
+    if name == "REF_RATE":
+        return ref_rate_limits(line_hz)
+    return ref_lag_limits(line_hz) if name == "REF_LAG" else LIMITS[name]
+
+
+def is_good(name: str, value: float, line_hz: float) -> bool:
+    """Return whether an input may have a value at a line frequency in Hz, as closely as a REAL variable holds it."""
+    return (name == "REF_RATE" and value == 0.0) or is_within(value, *limits_at(name, line_hz))
+
+
+def ref_rate_limits(line_hz: float) -> tuple[float, float]:
+    """Return the lowest and highest REF_RATE in s at a line frequency, besides 0.0, which turns the limit off.
+
+    They are those of a rate of 32767 and of 1 count per scan, rounded inward as table 1 prints them: 0.00035 to 11.37 s
+    at 60 Hz, 0.00042 to 13.65 s at 50 Hz (decision: to five and two decimals at any frequency).
+    """
+    one_count_s = FULL_COUNTS / (SCANS_PER_CYCLE * line_hz)
+    return ceil(one_count_s / MOST_COUNTS * 1e5) / 1e5, floor(one_count_s * 100.0 + 1e-9) / 100.0
+
+
+def ref_lag_limits(line_hz: float) -> tuple[float, float]:
+    """Return the lowest and highest REF_LAG in rad/s at a line frequency (table 1)."""
+    return LOWEST_LAG, LAG_AT_60_HZ if line_hz >= BETWEEN_HZ else LAG_AT_50_HZ
+
+
+def ioc_is_possible(ioc_thresh: int, lim_bar: int) -> bool:
+    """Return whether an IOC level can be calculated: IOC_THRESH less than 1.8 LIM_BAR (52.1.5)."""
+    return 5 * ioc_thresh < 9 * lim_bar
+
+
+@dataclass(frozen=True)
+class Advised:
+    """The manual warns of a CALL without a parameter; ``without`` says what it does not have then."""
+
+    parameter: str
+    without: str
+    code: str
+
+    @property
+    def text(self) -> str:
+        """The rule as a sentence."""
+        return f"In a speed regulator {self.parameter} must be programmed: without it there is {self.without} (52.1.5)."
+
+    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
+        """Return the warning of a CALL without the parameter."""
+        if self.parameter in given:
+            return []
+        return [Fault(f"there is {self.without} without {self.parameter}", None, self.code)]
+
+
+@dataclass(frozen=True)
+class WithinAtLine:
+    """A literal's limits follow the line's frequency: the literal ``frequency`` or its default in Hz."""
+
+    parameter: str
+    frequency: str
+    default_hz: int
+
+    @property
+    def text(self) -> str:
+        """The rule as a sentence."""
+        at = " and ".join(f"{_range(self.parameter, hz)} at {hz} Hz" for hz in (60, 50))
+        return f"{self.parameter} must be {at}."
+
+    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
+        """Return the fault of a literal beyond its limits; none where the frequency is at fault itself."""
+        value = given[self.parameter].value if self.parameter in given else None
+        line_hz = given[self.frequency].value if self.frequency in given else self.default_hz
+        if not isinstance(value, (int, float)) or not isinstance(line_hz, int):
+            return []
+        if not is_good(self.frequency, line_hz, line_hz) or is_good(self.parameter, value, line_hz):
+            return []
+        message = f"{self.parameter} = {value:g} is out of range: {_range(self.parameter, line_hz)} at {line_hz} Hz"
+        return [Fault(message, self.parameter, "AMX4080")]
+
+
+@dataclass(frozen=True)
+class OvercurrentLevel:
+    """The overcurrent level must be less than 1.8 times the largest current, both in % of the rated one (52.1.5)."""
+
+    level: str
+    largest: str
+
+    @property
+    def text(self) -> str:
+        """The rule as a sentence."""
+        return f"{self.level} must be less than 1.8 x {self.largest}."
+
+    def faults(self, given: Mapping[str, Given]) -> list[Fault]:
+        """Return the fault of two literals that do not go together."""
+        level, largest = (given[name].value if name in given else None for name in (self.level, self.largest))
+        if not isinstance(level, int) or not isinstance(largest, int) or ioc_is_possible(level, largest):
+            return []
+        message = f"{self.level} = {level} is not less than {9 * largest / 5:g}, which is 1.8 x {self.largest}"
+        return [Fault(message, self.level, "AMX4185")]
+
+
+def _range(name: str, line_hz: float) -> str:
+    """Return the limits of an input at a line frequency as a sentence has them."""
+    low, high = limits_at(name, line_hz)
+    zero = "0 or " if is_good(name, 0.0, line_hz) and low > 0.0 else ""
+    return f"{zero}{low:g} to {high:g}"
+
 
 LINE_HZ = 60
 """AC_LINE_FREQ by default, Hz."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
-from automax_ros.blocks.declaration import Block, Form, Input, Output, Platform, Special, Time
+from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, Platform, Special, Time
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType, Value
 

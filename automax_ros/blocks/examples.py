@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access
-from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.declare.declaration import Access
+from automax_ros.blocks.declare.instance import Instance
 from automax_ros.core.ticks import DEFAULT_TICK_NS, UDC_TICK_NS
 from automax_ros.core.types import Value
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.blocks.declaration import Block, Form, Input, Platform, Special, Time, Times
+from automax_ros.blocks.declare.declaration import Block, Form, Input, Platform, Special, Time, Times
 from automax_ros.core.ticks import MAX_TICKS
 from automax_ros.core.types import DataType
 

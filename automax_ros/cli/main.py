@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
     from automax_ros.cli.visible import VisibleOutput
-    from automax_ros.nodes.ros_arguments import RosArguments
+    from automax_ros.ros.setup.arguments import RosArguments
 
 SUBCOMMANDS: dict[str, str] = {
     "check": "find everything that is wrong with tasks and rack files",
@@ -52,9 +52,16 @@ SUBCOMMANDS: dict[str, str] = {
     "completion": "what makes a shell complete this command line",
     "explain": "say what a problem code means and how to cure it",
 }
-"""Every subcommand and its line of help; the module of that name in this folder is imported when it is asked for.
-
-A dash in the name is an underscore in the module's; a word of Python has one at its end."""
+"""Every subcommand and its line of help; its module is imported when it is asked for."""
+_FOLDERS = {
+    "tasks": ("check", "trace", "compile", "tune-info", "response", "convert", "compare", "blocks", "explain"),
+    "racks": ("sweep", "load", "drive-check", "new", "import", "step", "bridge", "security-policy", "schema"),
+    "run": ("run", "node"),
+    "recordings": ("record", "replay", "play", "bag", "export", "plot", "report"),
+    "operate": ("ctl",),
+    "shell": ("completion",),
+}
+"""The folder of each subcommand's module."""
 
 ROS_ARGUMENTS = "--ros-args"
 """What the ROS arguments of a command line begin with."""
@@ -153,7 +160,7 @@ def _split(argv: list[str]) -> tuple[list[str], RosArguments | None]:
     """Return the command line without its ROS arguments, and these where there are any."""
     if ROS_ARGUMENTS not in argv:
         return argv, None
-    from automax_ros.nodes.ros_arguments import split_arguments
+    from automax_ros.ros.setup.arguments import split_arguments
 
     return split_arguments(argv)
 
@@ -224,12 +231,16 @@ def version_lines() -> list[str]:
 
 
 def module_of(name: str) -> ModuleType:
-    """Return the module of a subcommand; its ``add_arguments`` and ``run`` are all there is to it."""
+    """Return the module of a subcommand; its ``add_arguments`` and ``run`` are all there is to it.
+
+    A dash in the subcommand's name is an underscore in the module's; a word of Python has one at its end.
+    """
     import importlib
     import keyword
 
     word = f"{name}_" if keyword.iskeyword(name) else name.replace("-", "_")
-    return importlib.import_module(f"automax_ros.cli.{word}")
+    folder = next(folder for folder, names in _FOLDERS.items() if name in names)
+    return importlib.import_module(f"automax_ros.cli.{folder}.{word}")
 
 
 def _unknown(name: str) -> Exception:

@@ -30,19 +30,18 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Protocol, cast
 
-from automax_ros.compile import build
-from automax_ros.compile.assembly import Form, called, local_field, made, stores
-from automax_ros.compile.background import BackgroundCompilation
-from automax_ros.compile.calls import BlockInstance, instance_of
-from automax_ros.compile.cost import CostModel
-from automax_ros.compile.emitter import Emitter
-from automax_ros.compile.layout import Layout, StateField
-from automax_ros.compile.minor_loop import lower_minor_loop
-from automax_ros.compile.pynames import block_prefix, forced_name, latched_name, variable_name
-from automax_ros.compile.scan_io import BackgroundIo, LineForm, ScanIo, ScanLines, ScanTooLong, StateValues, Wish
-from automax_ros.compile.statements import STOPPED, StatementLowering
+from automax_ros.compile.base import build
+from automax_ros.compile.base.assembly import Form, called, local_field, made, stores
+from automax_ros.compile.base.cost import CostModel
+from automax_ros.compile.base.emitter import Emitter
+from automax_ros.compile.base.layout import Layout, StateField
+from automax_ros.compile.base.pynames import block_prefix, forced_name, latched_name, variable_name
+from automax_ros.compile.base.scan_io import BackgroundIo, LineForm, ScanIo, ScanLines, ScanTooLong, StateValues, Wish
+from automax_ros.compile.basic_compiler import BackgroundCompilation
+from automax_ros.compile.lowering.calls import BlockInstance, instance_of, lower_minor_loop
+from automax_ros.compile.lowering.statements import STOPPED, StatementLowering
 from automax_ros.language.program import Program
-from automax_ros.language.syntax.tree import Call, For, If, Reference, Scope, Statement
+from automax_ros.language.tree.tree import Call, For, If, Reference, Scope, Statement
 
 Startup = Callable[[StateValues, ScanIo], bool]
 Scans = Callable[[StateValues, ScanIo], Generator[bool, None, None]]

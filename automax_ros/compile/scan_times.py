@@ -12,13 +12,14 @@ import enum
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from automax_ros.compile.cost import CostModel
-from automax_ros.compile.loops import counts_alone
+from automax_ros.compile.base.cost import CostModel
+from automax_ros.compile.lowering.loops import counts_alone
+from automax_ros.compile.lowering.statements import GOSUB_DEPTH
 from automax_ros.compile.paths import NOTHING, Span, longest_turn, ways_out
-from automax_ros.compile.statements import GOSUB_DEPTH
-from automax_ros.language.checks.constant_values import constant_value
+from automax_ros.language.checks.rules.constant_values import constant_value
 from automax_ros.language.program import Program
-from automax_ros.language.syntax.tree import (
+from automax_ros.language.tree.basic_tree import StartEvery
+from automax_ros.language.tree.tree import (
     Call,
     End,
     For,
@@ -31,8 +32,7 @@ from automax_ros.language.syntax.tree import (
     Statement,
     Stop,
 )
-from automax_ros.language.syntax.waiting_tree import StartEvery
-from automax_ros.language.syntax.walk import jumps_of, statements_in_order
+from automax_ros.language.tree.walk import jumps_of, statements_in_order
 
 
 @dataclass(frozen=True)

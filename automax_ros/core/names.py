@@ -3,6 +3,8 @@
 ``REF%``, ``TABLE%(3)``, ``grid[1, 2]``: case and blanks do not matter, square brackets are round ones (decision).
 An array's elements are counted with the last subscript fastest, from 0 on. The registers of the module in slot 5 are
 the array ``SLOT:5%``, a name that no task can declare (decision).
+
+Texts ``NAME=VALUE`` against the variables of a task or of a rack.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from typing import Generic, Protocol, TypeVar
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.types import DataType, Value
+from automax_ros.core.values import value_of, wanted
 
 AUTO_RUN = "AUTORUNSTATUS@"
 """TRUE where AUTO RUN is enabled for the rack (2.4.6)."""
@@ -130,3 +134,36 @@ def _require_subscripts(variable: Shaped, given: tuple[int, ...], asked: str) ->
         if subscript >= size:
             message = f"subscript {subscript} of {quoted(asked, marks='')} is out of range"
             raise WrongSubscripts(message, f"the largest is {size - 1}")
+
+
+class Typed(Shaped, Protocol):
+    """A variable of a type; ``length`` is the most characters that a string holds."""
+
+    @property
+    def type(self) -> DataType:
+        """Its data type."""
+
+    @property
+    def length(self) -> int:
+        """Characters of a STRING."""
+
+
+W = TypeVar("W", bound=Typed)
+
+
+def setting(text: str, variables: Mapping[str, W], absent: str) -> tuple[Element[W], Value]:
+    """Return the variable or array element that ``NAME=VALUE`` sets, and the value as it would hold it.
+
+    Raises:
+        Fault: not of that form, no such variable or element (``element``), or the value is none of its type.
+    """
+    name, equals, given = text.partition("=")
+    if not equals:
+        raise Fault(f"{quoted(text)} is not NAME=VALUE")
+    meant = element(name, variables, absent)
+    kind, length = meant.variable.type, meant.variable.length
+    value = value_of(given.strip(), kind, length)
+    if value is None:
+        message = f"{quoted(given.strip())} is not a value for {meant.label}, type {kind.word}"
+        raise Fault(message, f"it takes {wanted(kind, length)}")
+    return meant, value

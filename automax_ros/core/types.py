@@ -1,8 +1,12 @@
-"""The five data types of the AutoMax languages (J-3676-5, 2.4.3)."""
+"""The five data types of the AutoMax languages (J-3676-5, 2.4.3).
+
+When two values are the same.
+"""
 
 from __future__ import annotations
 
 import enum
+import struct
 from collections.abc import Sequence
 
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, INT32_MAX, INT32_MIN, REAL_MAX
@@ -125,3 +129,13 @@ def declaration_text(name: str, dimensions: Sequence[int] = (), length: int = 0)
     maximum = f":{length}" if length not in (0, DEFAULT_STRING_LENGTH) else ""
     subscripts = f"({','.join(str(size - 1) for size in dimensions)})" if dimensions else ""
     return f"{name}{maximum}{subscripts}"
+
+
+_DOUBLE = struct.Struct("<d")
+
+
+def same_bits(one: Value, other: Value) -> bool:
+    """Whether two values are the same to the last bit: -0.0 is not 0.0, and NaN is NaN."""
+    if isinstance(one, float) and isinstance(other, float):
+        return (one == other and one != 0.0) or _DOUBLE.pack(one) == _DOUBLE.pack(other)
+    return one == other and type(one) is type(other)

@@ -11,53 +11,50 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 
-from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S, seconds_ns
 from automax_ros.core.types import Value
-from automax_ros.rack.adjusting import Adjustments
-from automax_ros.rack.beginning import begin_memory
-from automax_ros.rack.config import RackConfig, Timing
-from automax_ros.rack.digest import digest_of
-from automax_ros.rack.forcing import Force, Forcing
-from automax_ros.rack.installation import Finding, Installation
-from automax_ros.rack.installer import Installer
+from automax_ros.rack.base.observers import Observers, RackObserver
+from automax_ros.rack.base.part import RackPart
+from automax_ros.rack.base.views import backplane_of, view_specs
 from automax_ros.rack.modules.building import build_module
-from automax_ros.rack.modules.running import Module, Parts
-from automax_ros.rack.observers import Observers, RackObserver
-from automax_ros.rack.operations import Operations
-from automax_ros.rack.part import RackPart
-from automax_ros.rack.plants.config import full_speeds
+from automax_ros.rack.modules.module import Module, Parts
+from automax_ros.rack.operate.forces import Force, Forcing
+from automax_ros.rack.operate.operations import Operations, begin_memory
+from automax_ros.rack.operate.values import Adjustments
 from automax_ros.rack.plants.feeding import PlantFeeds
-from automax_ros.rack.plants.running import RackPlants
+from automax_ros.rack.plants.plants import RackPlants
 from automax_ros.rack.plants.sampling import PlantSampling
-from automax_ros.rack.rack_state import RackState
-from automax_ros.rack.scan_end import ScanEnd
-from automax_ros.rack.scheduled_task import ScheduledTask
-from automax_ros.rack.settings import common_named
-from automax_ros.rack.task_statistics import TaskStatistics
-from automax_ros.rack.views import backplane_of, view_specs
-from automax_ros.rack.writers import OPERATOR_WRITER, WriterSpec, writers_of
-from automax_ros.running.channels import Channels
-from automax_ros.running.common_clock import CommonClock
-from automax_ros.running.drives import Drives
-from automax_ros.running.events import Events
-from automax_ros.running.execution import IDEAL, Execution
-from automax_ros.running.interrupts import Interrupts
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.process_inputs import ProcessInputs
-from automax_ros.running.processor_time import ProcessorTime
-from automax_ros.running.scheduler import Scheduler
-from automax_ros.running.task import EVENT_TIMEOUT, Task
+from automax_ros.rack.state import RackState, digest_of
+from automax_ros.rack.tasks.installation import Finding, Installation
+from automax_ros.rack.tasks.installer import Installer
+from automax_ros.rack.tasks.scheduled_task import ScanEnd, ScheduledTask
+from automax_ros.rack.tasks.statistics import TaskStatistics
+from automax_ros.rackfile.model.config import RackConfig, Timing
+from automax_ros.rackfile.model.plants import full_speeds
+from automax_ros.rackfile.model.value_names import common_named
+from automax_ros.rackfile.model.writers import OPERATOR_WRITER, WriterSpec, writers_of
+from automax_ros.runtime.memory.common_clock import CommonClock
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.scan.channels import Channels
+from automax_ros.runtime.scan.drives import Drives
+from automax_ros.runtime.scan.events import Events
+from automax_ros.runtime.scan.execution import IDEAL, Execution
+from automax_ros.runtime.scan.processor_time import ProcessorTime
+from automax_ros.runtime.tasks.interrupts import Interrupts
+from automax_ros.runtime.tasks.task import EVENT_TIMEOUT, Task
+from automax_ros.runtime.time.scheduler import Scheduler
 
 
 class Rack:
     """A rack that runs. ``stopwatch`` (ns, the pacer's clock) measures execution times; without one they count as 0.
 
     ``execution`` executes the scans of all modules in place of what the configuration says (``rack/stepping``).
-    ``local`` are the slots whose modules are in this process (``rack/part``), all if None. ``installation`` are the
-    tasks where they are compiled already; ``native`` says which of them scan as machine code (``compile/native``).
+    ``local`` are the slots whose modules are in this process (``rack/base/part``), all if None. ``installation`` are
+    the tasks where they are compiled already; ``native`` says which of them scan as machine code (``compile/native``).
     """
 
     def __init__(

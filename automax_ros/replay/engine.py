@@ -13,27 +13,35 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from automax_ros.bags.blocks import MessageBlock, message_blocks
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.reader import BagMessage, BagReader
-from automax_ros.bags.run_facts import RunFacts, run_facts
-from automax_ros.bags.soundness import require_tasks
-from automax_ros.bags.span import require_scans
-from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.views import backplane_of
-from automax_ros.replay.columns import BlockReplay
+from automax_ros.messages.types.messages import (
+    NAMES,
+    CommonImage,
+    CommonWrite,
+    Operation,
+    Scan,
+    TaskState,
+    VariableTable,
+)
+from automax_ros.rack.base.views import backplane_of
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.blocks import MessageBlock, message_blocks
+from automax_ros.recordings.read.reader import BagMessage, BagReader
+from automax_ros.recordings.read.run_facts import RunFacts, run_facts
+from automax_ros.recordings.read.soundness import require_tasks
+from automax_ros.recordings.read.span import require_scans
 from automax_ros.replay.columns.forms import ColumnForms
-from automax_ros.replay.commons import RecordedCommons
-from automax_ros.replay.compare import Tallies
-from automax_ros.replay.joining import Beginning, Carried, digest
-from automax_ros.replay.report import ReplayReport
-from automax_ros.replay.stored_rack import ReplaySource, StoredRack, stored_rack
-from automax_ros.replay.task import TaskReplay
-from automax_ros.replay.totals import Totals
-from automax_ros.wire.messages import NAMES, CommonImage, CommonWrite, Operation, Scan, TaskState, VariableTable
+from automax_ros.replay.columns.segments import BlockReplay
+from automax_ros.replay.scans.carried_state import Beginning, Carried, digest
+from automax_ros.replay.scans.commons import RecordedCommons
+from automax_ros.replay.scans.compare import Tallies
+from automax_ros.replay.scans.report import ReplayReport
+from automax_ros.replay.scans.stored_rack import ReplaySource, StoredRack, stored_rack
+from automax_ros.replay.scans.task import TaskReplay
+from automax_ros.replay.scans.totals import Totals
 
 DEFAULT_MAX_DIFFERENCES = 50
 """Most differences that a replay's report tells in full, unless said otherwise (decision)."""

@@ -11,8 +11,8 @@ from weakref import WeakValueDictionary
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.replay.engine import Replay, ReplayOptions, Run
-from automax_ros.replay.joining import Carried
-from automax_ros.replay.totals import Totals
+from automax_ros.replay.scans.carried_state import Carried
+from automax_ros.replay.scans.totals import Totals
 
 _AT_HAND: WeakValueDictionary[bytes, Replay] = WeakValueDictionary()
 """Replays that were packed here: a copy of this process has them ready, with their tasks compiled."""

@@ -8,19 +8,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from automax_ros.bags.common_log import Key
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.whole_file import written_whole
 from automax_ros.core.names import element
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.config import CommonVariable
-from automax_ros.replay.commons import UnknownValue
+from automax_ros.messages.types.messages import Scan
+from automax_ros.rackfile.model.config import CommonVariable
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.read.common_log import Key
 from automax_ros.replay.engine import Replay
-from automax_ros.replay.report import Difference, Kind, ReplayReport
-from automax_ros.replay.task import TaskReplay
-from automax_ros.wire.messages import Scan
+from automax_ros.replay.scans.commons import UnknownValue
+from automax_ros.replay.scans.report import Difference, Kind, ReplayReport
+from automax_ros.replay.scans.task import TaskReplay
 
 MOST_LANES = 5
 """Most variables that one picture shows (decision): more cannot be told apart."""

@@ -10,14 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.opening import size_of
-from automax_ros.pieces import Done, Piece, Where, run_pieces
+from automax_ros.parallel.job import Done, Piece, Where
+from automax_ros.parallel.run import run_pieces
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.opening import size_of
 from automax_ros.replay.engine import LONGEST_WAIT_NS, Replay
-from automax_ros.replay.joining import Carried
 from automax_ros.replay.part import Part, PartResult, begun, is_unsure, packed, replay_part, scanning
-from automax_ros.replay.report import ReplayReport
-from automax_ros.replay.totals import Totals, added_up
+from automax_ros.replay.scans.carried_state import Carried
+from automax_ros.replay.scans.report import ReplayReport
+from automax_ros.replay.scans.totals import Totals, added_up
 
 LEAST_PART_BYTES = 16 << 20
 """Files are put together to parts of at least this size (decision: less is executed in a fraction of a second).

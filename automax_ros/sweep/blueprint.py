@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from automax_ros.compile.native.forms import IN_PYTHON, NativeForms
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.faults import Fault
 from automax_ros.core.problems import Severity
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.installation import Installation
-from automax_ros.rack.loader import load_stored
-from automax_ros.rack.plants.numbers import PlantNumber, with_numbers
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.installation import Installation
+from automax_ros.rackfile.loader import load_stored
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.plant_numbers import PlantNumber, with_numbers
 
 
 @dataclass(frozen=True)

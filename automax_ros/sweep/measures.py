@@ -15,8 +15,8 @@ from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.ticks import exact_ns, seconds_text
 from automax_ros.core.types import DataType
 from automax_ros.core.values import number
-from automax_ros.rack.config import CommonVariable, RackConfig
-from automax_ros.rack.settings import common_named
+from automax_ros.rackfile.model.config import CommonVariable, RackConfig
+from automax_ros.rackfile.model.value_names import common_named
 from automax_ros.sweep import functions
 from automax_ros.sweep.functions import Accumulator
 

@@ -11,10 +11,9 @@ from automax_ros.core.names import NameFault
 from automax_ros.core.text import near_or_listed, quoted
 from automax_ros.core.types import DataType, Value, bare_name
 from automax_ros.core.values import number, value_text, whole_number
-from automax_ros.rack.plants.numbers import PlantNumber, plant_number
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import common_named, setting
-from automax_ros.rack.tunings import Tuning, tunables_of, tuning
+from automax_ros.rackfile.model.value_names import Tuning, common_named, setting, tunables_of, tuning
+from automax_ros.rackfile.plant_numbers import PlantNumber, plant_number
 
 
 @dataclass

@@ -8,15 +8,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.bags.errors import BagError
 from automax_ros.core.faults import Fault
 from automax_ros.core.problems import Severity
 from automax_ros.core.text import printable
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.rack.files import FileFault, read_bytes
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import MOST_BYTES, read_for_rack
+from automax_ros.rackfile.reading.files import FileFault, read_bytes
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import MOST_BYTES, read_for_rack
 from automax_ros.sweep.blueprint import Blueprint
 from automax_ros.sweep.measures import FUNCTIONS, Measure, Subject
 from automax_ros.sweep.points import Point

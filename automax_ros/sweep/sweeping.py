@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from automax_ros.pieces.piece import Done, Piece, Where
-from automax_ros.pieces.run import run_pieces
+from automax_ros.parallel.job import Done, Piece, Where
+from automax_ros.parallel.run import run_pieces
 from automax_ros.sweep.points import Point
 from automax_ros.sweep.run import Outcome, Plan, run_points
 

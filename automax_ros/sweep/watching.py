@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from automax_ros.core.types import Value
-from automax_ros.rack.observers import Operation
+from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import common_named
-from automax_ros.running.scan_record import ScanRecord
-from automax_ros.running.task import Task
-from automax_ros.running.views import WriteGroup
+from automax_ros.rackfile.model.value_names import common_named
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.scan.scan_record import ScanRecord
+from automax_ros.runtime.tasks.task import Task
 from automax_ros.sweep.functions import Accumulator
 from automax_ros.sweep.measures import Measure
 

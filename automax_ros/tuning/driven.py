@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from contextlib import closing
 from itertools import repeat
 
-from automax_ros.blocks.declaration import Block, Form
-from automax_ros.blocks.dynamics import Integrator
-from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.declare.declaration import Block, Form
+from automax_ros.blocks.declare.dynamics import Integrator
+from automax_ros.blocks.declare.instance import Instance
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN
 from automax_ros.core.types import DataType, Value
 

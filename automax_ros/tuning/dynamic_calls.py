@@ -7,16 +7,16 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from automax_ros.blocks.declaration import Block
-from automax_ros.blocks.dynamics import Dynamics
+from automax_ros.blocks.declare.declaration import Block
+from automax_ros.blocks.declare.dynamics import Dynamics
 from automax_ros.core.faults import Fault
 from automax_ros.core.text import quoted
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType, Value
 from automax_ros.core.values import source_text
+from automax_ros.language.printer import print_expression
 from automax_ros.language.program import BoundCall, Program
-from automax_ros.language.syntax.statement_text import print_expression
-from automax_ros.language.syntax.tree import (
+from automax_ros.language.tree.tree import (
     BooleanLiteral,
     Call,
     Expression,
@@ -29,7 +29,7 @@ from automax_ros.language.syntax.tree import (
     Statement,
     Unary,
 )
-from automax_ros.language.syntax.walk import bodies, statements_in_order
+from automax_ros.language.tree.walk import bodies, statements_in_order
 from automax_ros.tuning.tuning import Tuning, tuning
 
 _LABEL = re.compile(r"0*([0-9]{1,6})(?:\.0*([1-9][0-9]{0,2}))?")

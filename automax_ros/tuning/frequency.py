@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, repeat
 
-from automax_ros.blocks.declaration import Block
-from automax_ros.blocks.dynamics import Integrator
-from automax_ros.blocks.transfer import Transfer
+from automax_ros.blocks.declare.declaration import Block
+from automax_ros.blocks.declare.dynamics import Integrator, Transfer
 from automax_ros.core.types import Value
 from automax_ros.tuning.driven import DrivenBlock
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from automax_ros.blocks.coefficients import TWO_TO_MINUS_18
+from automax_ros.blocks.declare.coefficients import TWO_TO_MINUS_18
 from automax_ros.core.faults import Fault
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, stored_real
 from automax_ros.core.ticks import MAX_TICK_NS, MAX_TICKS, MIN_TICK_NS, NS_PER_S

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from automax_ros.blocks.transfer import Transfer
+from automax_ros.blocks.declare.dynamics import Transfer
 from automax_ros.core.types import Value
 from automax_ros.tuning.dynamic_calls import DynamicCall
 from automax_ros.tuning.frequency import (

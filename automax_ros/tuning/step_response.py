@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from automax_ros.blocks.declaration import Block
-from automax_ros.blocks.transfer import Polynomial, Transfer
+from automax_ros.blocks.declare.declaration import Block
+from automax_ros.blocks.declare.dynamics import Polynomial, Transfer
 from automax_ros.core.types import Value
 from automax_ros.tuning.driven import DrivenBlock
 from automax_ros.tuning.frequency import NORMAL_AMPLITUDE, integral_gain, roots

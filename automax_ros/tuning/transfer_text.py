@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from automax_ros.blocks.transfer import Transfer
+from automax_ros.blocks.declare.dynamics import Transfer
 from automax_ros.tuning.frequency import decibels
 from automax_ros.tuning.tuning import Tuning
 

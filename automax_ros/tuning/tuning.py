@@ -7,11 +7,18 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from automax_ros.blocks.bounds import Ends, bound_now, loose_bounds, range_within
-from automax_ros.blocks.coefficients import evaluate, integrator_range, is_within, limited
-from automax_ros.blocks.declaration import Block, Coefficients, Relation
-from automax_ros.blocks.dynamics import Integrator
-from automax_ros.blocks.transfer import Transfer
+from automax_ros.blocks.declare.coefficients import (
+    Ends,
+    bound_now,
+    evaluate,
+    integrator_range,
+    is_within,
+    limited,
+    loose_bounds,
+    range_within,
+)
+from automax_ros.blocks.declare.declaration import Block, Coefficients, Relation
+from automax_ros.blocks.declare.dynamics import Integrator, Transfer
 
 NEAR = 0.1
 """A coefficient is close to a limit within this share of the limit, at most of the room between the two (decision)."""

@@ -14,7 +14,7 @@ Parameters: belt_ratio, loop_m, gain_per_s.
 
 from dataclasses import dataclass
 
-from automax_ros.nodes import prepare
+from automax_ros.ros.setup.environment import prepare
 
 prepare()  # only of use where ROS 2 is installed in a virtual environment
 

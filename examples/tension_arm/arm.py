@@ -15,7 +15,7 @@ Parameters: joint, tension_n, roll_radius_m, gear_ratio, stiffness_n_per_m, lag_
 
 from dataclasses import dataclass
 
-from automax_ros.nodes import prepare
+from automax_ros.ros.setup.environment import prepare
 
 prepare()  # only of use where ROS 2 is installed in a virtual environment
 

@@ -12,7 +12,7 @@ import struct
 import sys
 
 from automax_ros.cli.main import main
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.stream.stream import RackStream
 
 if __name__ == "__main__":
     descriptor = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT)

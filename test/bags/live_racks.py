@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 YAML = """\
 rack: LINE1

@@ -10,12 +10,11 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
-from automax_ros.bags.writer import BagWriter
 from automax_ros.core.kinds import Direction, WriteKind, WriterKind
 from automax_ros.core.types import DataType
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.definitions import TIME, Field, message_types
-from automax_ros.wire.messages import (
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.definitions import TIME, Field, message_types
+from automax_ros.messages.types.messages import (
     CLASSES,
     NAMES,
     CommonImage,
@@ -23,12 +22,13 @@ from automax_ros.wire.messages import (
     Int16,
     Scan,
     ScanError,
+    Values,
     Variable,
     VariableTable,
     Writer,
 )
-from automax_ros.wire.qos import LATCHED, SCAN, VALUE
-from automax_ros.wire.values import Values
+from automax_ros.messages.types.topics import LATCHED, SCAN, VALUE
+from automax_ros.recordings.write.writer import BagWriter
 
 MS = 1_000_000
 RUN = 77

@@ -9,17 +9,16 @@ from typing import NamedTuple
 
 from mcap.writer import Writer as McapWriter
 
-from automax_ros.bags.metadata import BagMetadata, FileSummary, yaml_text
-from automax_ros.bags.recorder import Recorder
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.definitions import schema_text
+from automax_ros.messages.types.messages import String
+from automax_ros.messages.types.rack_files import files_of, files_text
+from automax_ros.messages.types.topics import LATCHED, SCAN, Take, Topic
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.definitions import schema_text
-from automax_ros.wire.messages import String
-from automax_ros.wire.qos import LATCHED, SCAN
-from automax_ros.wire.rack_files import files_of, files_text
-from automax_ros.wire.stream import RackStream
-from automax_ros.wire.topics import Take, Topic
+from automax_ros.recordings.mcap.metadata import BagMetadata, FileSummary, yaml_text
+from automax_ros.recordings.write.recorder import Recorder
 
 EPOCH = 1_700_000_000 * NS_PER_S
 """The wall clock when the run begins."""

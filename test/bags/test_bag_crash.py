@@ -14,16 +14,16 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.live.recording import LiveRecording
-from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.repair.repairing import RepairReport, repair
-from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.recordings.live.recording import LiveRecording
+from automax_ros.recordings.live.topics import LiveTopics
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.repair.repairing import RepairReport, repair
+from automax_ros.recordings.write.data_file import StorageOptions
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 
 from .live_racks import build
 from .others import assert_mcap_reads, rosbags_messages

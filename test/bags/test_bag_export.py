@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import export_csv
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.ticks import seconds_text
 from automax_ros.core.types import DataType
-from automax_ros.wire.messages import Int16, Variable, VariableTable
-from automax_ros.wire.values import Values
+from automax_ros.messages.types.messages import Int16, Values, Variable, VariableTable
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.tables.export import export_csv
 
 from .recordings import MS, TABLE, image_of, record, sample_recording, write_of
 

@@ -14,17 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer as McapWriter
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.info import TaskInfo, bag_info
-from automax_ros.bags.info_tasks import task_facts
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder
-from automax_ros.cli.bag_info import as_data
-from automax_ros.cli.bag_info_text import lines_of
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import Int16, Scan, ScanError
-from automax_ros.wire.stream import RackStream
+from automax_ros.cli.recordings.bag_info import as_data
+from automax_ros.cli.recordings.bag_info_text import lines_of
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import Int16, Scan, ScanError
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.recordings.info.info import TaskInfo, bag_info, task_facts
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.recorder import Recorder
 
 from .independent import GOLDEN, decoded, summary
 from .live_racks import build

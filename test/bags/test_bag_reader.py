@@ -20,17 +20,17 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
-from automax_ros.bags import mcap_file
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.playback import survey
-from automax_ros.bags.reader import MAX_METADATA_BYTES, BagReader
-from automax_ros.bags.repair.repairing import repair
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.definitions import schema_text
-from automax_ros.wire.messages import CommonWrite, Int16, VariableTable
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.definitions import schema_text
+from automax_ros.messages.types.messages import CommonWrite, Int16, VariableTable
+from automax_ros.recordings.info.info import bag_info
+from automax_ros.recordings.mcap import mcap_file
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.playback import survey
+from automax_ros.recordings.read.reader import MAX_METADATA_BYTES, BagReader
+from automax_ros.recordings.repair.repairing import repair
 
 from .recordings import TABLE, sample_recording
 

@@ -12,20 +12,19 @@ import yaml
 from mcap.reader import make_reader
 from replay.reexecution import Reexecution
 
-from automax_ros.bags.errors import BagError, RecordingError
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import RecordingOptions
-from automax_ros.bags.repair.contents import SCAN, WRITE
-from automax_ros.bags.repair.repairing import repair
-from automax_ros.bags.repair.rewriting import Found, kept
-from automax_ros.bags.storage import COMPRESSIONS, StorageOptions
-from automax_ros.bags.writer import BagWriter
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import NAMES, CommonWrite, Int16, Scan, String
-from automax_ros.wire.qos import LATCHED, VALUE
-from automax_ros.wire.values import Values
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import NAMES, CommonWrite, Int16, Scan, String, Values
+from automax_ros.messages.types.topics import LATCHED, VALUE
+from automax_ros.recordings.info.info import bag_info
+from automax_ros.recordings.mcap.errors import BagError, RecordingError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.repair.contents import SCAN, WRITE
+from automax_ros.recordings.repair.repairing import repair
+from automax_ros.recordings.repair.rewriting import Found, kept
+from automax_ros.recordings.write.data_file import COMPRESSIONS, StorageOptions
+from automax_ros.recordings.write.recorder import RecordingOptions
+from automax_ros.recordings.write.writer import BagWriter
 
 from .others import assert_mcap_reads, rosbags_messages
 from .recordings import TABLE, image_of, record, write_of
@@ -404,8 +403,8 @@ def test_what_repair_leaves_alone_info_does_not_send_there(tmp_path: Path) -> No
 
 
 def test_a_repaired_bag_of_many_topics_can_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("reader", "repair.repairing"):  # the real limit takes 20,000 topics
-        monkeypatch.setattr(f"automax_ros.bags.{module}.MAX_METADATA_BYTES", 1 << 15)
+    for module in ("read.reader", "repair.repairing"):  # the real limit takes 20,000 topics
+        monkeypatch.setattr(f"automax_ros.recordings.{module}.MAX_METADATA_BYTES", 1 << 15)
     bag = tmp_path / "bag"
     with BagWriter(bag) as writer:
         for number in range(150):

@@ -11,16 +11,16 @@ import yaml
 from mcap.reader import make_reader
 from replay.reexecution import Reexecution
 
-from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.storage import COMPRESSIONS, MIN_SPLIT_BYTES, StorageOptions
-from automax_ros.bags.writer import BagWriter
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import Int16, String
-from automax_ros.wire.qos import LATCHED, SCAN
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import Int16, String
+from automax_ros.messages.types.topics import LATCHED, SCAN
+from automax_ros.recordings.mcap.errors import RecordingError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.data_file import COMPRESSIONS, MIN_SPLIT_BYTES, StorageOptions
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
+from automax_ros.recordings.write.writer import BagWriter
 
 from .live_racks import build
 from .others import assert_mcap_reads, rosbags_messages

@@ -21,15 +21,15 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from automax_ros.bags import data_file
-from automax_ros.bags import writer as writer_module
-from automax_ros.bags.errors import BagError, RecordingError
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.writer import BagWriter
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.definitions import message_types
-from automax_ros.wire.messages import Int16, String
-from automax_ros.wire.qos import LATCHED, SCAN, VALUE
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.definitions import message_types
+from automax_ros.messages.types.messages import Int16, String
+from automax_ros.messages.types.topics import LATCHED, SCAN, VALUE
+from automax_ros.recordings.mcap.errors import BagError, RecordingError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write import data_file
+from automax_ros.recordings.write import writer as writer_module
+from automax_ros.recordings.write.writer import BagWriter
 
 from .recordings import sample_recording
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.blocks import MessageBlock, message_blocks
-from automax_ros.bags.chunk_builder import ChunkBuilder
-from automax_ros.bags.chunk_table import WholeChunk
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.reader import BagMessage, BagReader
+from automax_ros.recordings.mcap.chunk_builder import ChunkBuilder
+from automax_ros.recordings.mcap.chunk_table import WholeChunk
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.blocks import MessageBlock, message_blocks
+from automax_ros.recordings.read.reader import BagMessage, BagReader
 
 from .mutations import CHANGES
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.chunk_thread import ChunkThread
-from automax_ros.bags.data_file import DataFile
-from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.mcap_output import McapOutput
-from automax_ros.bags.writer import AT_ONCE_BYTES, BagWriter
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import Int16, String
-from automax_ros.wire.qos import VALUE
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import Int16, String
+from automax_ros.messages.types.topics import VALUE
+from automax_ros.recordings.mcap.errors import RecordingError
+from automax_ros.recordings.mcap.mcap_output import McapOutput
+from automax_ros.recordings.write.chunk_thread import ChunkThread
+from automax_ros.recordings.write.data_file import DataFile
+from automax_ros.recordings.write.writer import AT_ONCE_BYTES, BagWriter
 
 INT16 = "std_msgs/msg/Int16"
 HALF = 500_000_000

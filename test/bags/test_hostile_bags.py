@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.recordings.write.data_file import StorageOptions
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 
 from .live_racks import build
 

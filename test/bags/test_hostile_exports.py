@@ -12,18 +12,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags import series
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import CommonTable, write_csv
-from automax_ros.bags.export_npz import write_npz
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.info_tasks import task_facts
-from automax_ros.bags.scan_table import ScanTable
-from automax_ros.bags.series import Window
-from automax_ros.bags.traces import traces
-from automax_ros.cli.bag_info import as_data
-from automax_ros.cli.bag_info_text import lines_of
-from automax_ros.cli.plot_figure import Layout, figure_of
+from automax_ros.cli.output.figure import Layout, figure_of
+from automax_ros.cli.recordings.bag_info import as_data
+from automax_ros.cli.recordings.bag_info_text import lines_of
+from automax_ros.recordings.info.info import bag_info, task_facts
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.tables import series
+from automax_ros.recordings.tables.export import CommonTable, write_csv
+from automax_ros.recordings.tables.export_npz import write_npz
+from automax_ros.recordings.tables.scan_table import ScanTable
+from automax_ros.recordings.tables.series import Window
+from automax_ros.recordings.tables.traces import traces
 
 from .recordings import sample_recording, without_checksums
 

@@ -10,17 +10,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags.live.arrival import ArrivalOrder
-from automax_ros.bags.live.topics import MAX_VALUE_TOPICS, LiveTopics
-from automax_ros.bags.recorded_qos import MAX_DEPTH, MAX_QOS_BYTES, STREAM, recorded_qos
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.wire.cdr import CdrError, encode
-from automax_ros.wire.heads import image_head, scan_head, write_head
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, Variable
-from automax_ros.wire.qos import LATCHED
-from automax_ros.wire.rack_files import MAX_TEXT, RackFilesError, files_from_text, files_of, files_text, fingerprint
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.cdr.cdr import CdrError, encode
+from automax_ros.messages.cdr.message_headers import image_head, scan_head, write_head
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import CommonImage, CommonWrite, Scan, Variable
+from automax_ros.messages.types.rack_files import (
+    MAX_TEXT,
+    RackFilesError,
+    files_from_text,
+    files_of,
+    files_text,
+    fingerprint,
+)
+from automax_ros.messages.types.topics import LATCHED
+from automax_ros.recordings.live.arrival import ArrivalOrder
+from automax_ros.recordings.live.topics import MAX_VALUE_TOPICS, LiveTopics
+from automax_ros.recordings.mcap.channels import MAX_DEPTH, MAX_QOS_BYTES, STREAM, recorded_qos
 
 from .live_racks import build
 from .recordings import TABLE, messages

@@ -17,17 +17,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from replay.reexecution import Reexecution
 
-from automax_ros.bags.live.recording import MAX_PENDING, LiveRecording
-from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder
-from automax_ros.bags.storage import StorageOptions
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.messages.cdr.cdr import decode, encode
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.rack_files import RackFile, files_of
 from automax_ros.rack.rack import Rack
+from automax_ros.recordings.live.recording import MAX_PENDING, LiveRecording
+from automax_ros.recordings.live.topics import LiveTopics
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.data_file import StorageOptions
+from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
-from automax_ros.wire.cdr import decode, encode
-from automax_ros.wire.rack_files import RackFile, files_of
-from automax_ros.wire.stream import RackStream
 
 from .live_racks import YAML, build
 
@@ -525,7 +525,7 @@ def test_chosen_tasks_only(wire, tmp_path):
 
 
 def test_full_disk_ends_the_recording(wire, tmp_path, monkeypatch):
-    from automax_ros.bags import writer
+    from automax_ros.recordings.write import writer
 
     wire.run(0.5)
     recording = recording_of(wire, tmp_path / "bag")

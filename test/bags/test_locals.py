@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import export_csv
-from automax_ros.bags.series import Window
-from automax_ros.bags.traces import traces
-from automax_ros.wire.messages import TaskState
+from automax_ros.messages.types.messages import TaskState
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.tables.series import Window
+from automax_ros.recordings.tables.traces import traces
 
 from .independent import GOLDEN, decoded, nanoseconds
 from .recordings import MS, TABLE, image_of, record, write_of

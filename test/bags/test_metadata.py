@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from automax_ros.bags.metadata import BagMetadata, FileSummary, TopicSummary, yaml_text
-from automax_ros.wire.qos import LATCHED, SCAN
+from automax_ros.messages.types.topics import LATCHED, SCAN
+from automax_ros.recordings.mcap.metadata import BagMetadata, FileSummary, TopicSummary, yaml_text
 
 FILES = [FileSummary("scans_0.mcap", 5, 2_000_000_000, 12)]
 TOPICS = [

@@ -11,19 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags import export_npz, series
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import CommonTable, export_csv, write_csv
-from automax_ros.bags.export_npz import write_npz
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.scan_table import ScanTable
-from automax_ros.bags.series import Window
-from automax_ros.rack.loader import load
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import Scan, Values
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.messages import Scan
-from automax_ros.wire.stream import RackStream
-from automax_ros.wire.values import Values
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.info.info import bag_info
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.tables import export_npz, series
+from automax_ros.recordings.tables.export import CommonTable, export_csv, write_csv
+from automax_ros.recordings.tables.export_npz import write_npz
+from automax_ros.recordings.tables.scan_table import ScanTable
+from automax_ros.recordings.tables.series import Window
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 
 from .independent import GOLDEN, ROOT, decoded, nanoseconds, steps_of
 from .recordings import MS, TABLE, image_of, record, write_of

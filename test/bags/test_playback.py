@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.playback import NOT_CHOSEN, TABLE_TYPE, Renaming, choose, survey
-from automax_ros.wire.cdr import decode, encode
-from automax_ros.wire.messages import Int16
+from automax_ros.messages.cdr.cdr import decode, encode
+from automax_ros.messages.types.messages import Int16
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.playback import NOT_CHOSEN, TABLE_TYPE, Renaming, choose, survey
 
 from .recordings import TABLE, image_of, record, sample_recording, write_of
 
@@ -94,7 +94,7 @@ def test_malformed_table_is_refused(tmp_path):
 
 def foreign(path: Path, messages: list[tuple[str, str, bytes]], *, encode_schema: bool = False) -> None:
     """An mcap file of another program: type, topic and bytes of each message."""
-    from automax_ros.wire.definitions import schema_text
+    from automax_ros.messages.types.definitions import schema_text
 
     with path.open("wb") as file:
         writer = Writer(file)

@@ -7,20 +7,20 @@ from typing import Any
 
 import pytest
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import export_csv
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.live.recording import LiveRecording
-from automax_ros.bags.live.topics import LiveTopics
-from automax_ros.bags.playback import survey
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder
-from automax_ros.bags.traces import traces
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.rack_files import files_of
 from automax_ros.rack.rack import Rack
+from automax_ros.recordings.info.info import bag_info
+from automax_ros.recordings.live.recording import LiveRecording
+from automax_ros.recordings.live.topics import LiveTopics
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.playback import survey
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.tables.export import export_csv
+from automax_ros.recordings.tables.traces import traces
+from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.rack_files import files_of
-from automax_ros.wire.stream import RackStream
 
 from .live_racks import YAML, build
 

@@ -13,12 +13,12 @@ from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import automax_ros
-from automax_ros.bags.errors import RecordingError
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder
-from automax_ros.rack.loader import load
+from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.mcap.errors import RecordingError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.recorder import Recorder
 
 from .live_racks import SPEED, WORK, YAML, build
 
@@ -180,7 +180,7 @@ def test_existing_folder_is_refused(tmp_path):
 
 
 def test_full_disk_ends_the_recording_and_not_the_rack(tmp_path, monkeypatch):
-    from automax_ros.bags import writer
+    from automax_ros.recordings.write import writer
 
     rack = build(tmp_path)
     stream = RackStream(rack, 1)

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags import traces as traces_module
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.series import Window
-from automax_ros.bags.traces import ErrorMark, thinned, traces
-from automax_ros.wire.messages import Scan, ScanError
+from automax_ros.messages.types.messages import Scan, ScanError
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.tables import traces as traces_module
+from automax_ros.recordings.tables.series import Window
+from automax_ros.recordings.tables.traces import ErrorMark, thinned, traces
 
 from .independent import GOLDEN, steps_of
 from .recordings import MS, TABLE, image_of, record, sample_recording, write_of

@@ -13,12 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.columns import Table
-from automax_ros.bags.common_log import Cell
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import CommonTable, write_csv
-from automax_ros.bags.export_npz import write_npz
-from automax_ros.bags.whole_file import written_whole
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.read.common_log import Cell
+from automax_ros.recordings.tables.export import CommonTable, Table, write_csv
+from automax_ros.recordings.tables.export_npz import write_npz
 
 from .recordings import sample_recording
 
@@ -118,7 +117,7 @@ def test_standard_output_is_written_even_where_it_is_a_file(tmp_path: Path, bag:
 
 ENDLESS = """\
 import sys
-from automax_ros.bags.export import CommonTable
+from automax_ros.recordings.tables.export import CommonTable
 from automax_ros.cli.main import main
 
 def rows(self):

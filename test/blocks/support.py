@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.declare.instance import Instance
 
 TICK = 5_500_000
 """The default tick in ns: a scan period of TICKS = 1."""

@@ -4,7 +4,7 @@ from compile.support import run_scans, task_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.blocks.instance import InstanceError
+from automax_ros.blocks.declare.instance import InstanceError
 
 from .support import int16, repeatable, run
 

@@ -4,9 +4,8 @@ import ast
 from pathlib import Path
 
 import automax_ros
-from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Block
-from automax_ros.blocks.families import FAMILIES
+from automax_ros.blocks.catalogue import CATALOGUE, FAMILIES
+from automax_ros.blocks.declare.declaration import Block
 
 PACKAGE = Path(automax_ros.__file__).parent
 
@@ -14,10 +13,10 @@ OPERATORS = {"AND", "OR"}
 """Words of the language besides: they join conditions."""
 MAY_NAME = {
     "blocks/examples.py": set(CATALOGUE),  # one example for each block, for the documentation
-    "cli/compare_pulse_report.py": {"PULSE_MULT"},  # a command about this block and its Logix successor
+    "cli/tasks/compare_pulse.py": {"PULSE_MULT"},  # a command about this block and its Logix successor
     "logix/pulse_comparison.py": {"PULSE_MULT"},
-    "compile/cost.py": {"SCAN_LOOP"},  # imports the declaration for the time of the latch, which has no CALL of its own
-    "language/syntax/unknown.py": {"SELECT", "FUNCTION"},  # statements of other BASICs that ours does not have
+    "compile/base/cost.py": {"SCAN_LOOP"},  # for the time of the latch, which has no CALL of its own
+    "language/parse/unknown.py": {"SELECT", "FUNCTION"},  # statements of other BASICs that ours does not have
 }
 SPEAKS_THE_LANGUAGE = ("language/", "compile/")
 
@@ -27,7 +26,7 @@ def declaring_files():
     tree = ast.parse((PACKAGE / "blocks" / "families.py").read_text())
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
     files = {f"blocks/{module.rpartition('.')[2]}.py" for module in modules if module.startswith("automax_ros.blocks.")}
-    return files | {"blocks/families.py"}
+    return files | {"blocks/catalogue.py"}
 
 
 def blocks_named(path):

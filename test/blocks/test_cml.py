@@ -7,10 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.cml_limits import LIMITS, ioc_is_possible, is_good, ref_lag_limits, ref_rate_limits
+from automax_ros.blocks.cml import LIMITS, ioc_is_possible, is_good, ref_lag_limits, ref_rate_limits
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType
-from automax_ros.drive.cml import INPUTS, OUTPUTS
+from automax_ros.drive.current_loop.inputs import INPUTS
+from automax_ros.drive.current_loop.outputs import OUTPUTS
 
 from .support import repeatable
 

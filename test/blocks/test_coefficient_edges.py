@@ -8,7 +8,7 @@ import pytest
 from compile.support import task_of
 from language.check_support import problems
 
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.core.diagnostics import Severity
 from automax_ros.core.numbers import stored_real
 

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.coefficients import evaluate, integrator_range, limited
-from automax_ros.blocks.coefficients import mapping_constant as mapped
+from automax_ros.blocks.declare.coefficients import evaluate, integrator_range, limited
+from automax_ros.blocks.declare.coefficients import mapping_constant as mapped
 from automax_ros.core.numbers import stored_real
 
 from .support import mapping_constant, run

@@ -9,12 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import CALL_FACTS, HELPERS, Access, Form, Platform, Special, Time, Times
-from automax_ros.blocks.families import FAMILIES
-from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.catalogue import CATALOGUE, FAMILIES
+from automax_ros.blocks.declare.declaration import CALL_FACTS, HELPERS, Access, Form, Platform, Special, Time, Times
+from automax_ros.blocks.declare.instance import Instance
+from automax_ros.blocks.discrete.shift import STRUCTURE_STATES
 from automax_ros.blocks.scan_loop import END_TIMES, REMARK_TIMES
-from automax_ros.blocks.shift import STRUCTURE_STATES
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType
 

@@ -3,7 +3,7 @@ import re
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Form, Platform, Special
+from automax_ros.blocks.declare.declaration import Access, Form, Platform, Special
 from automax_ros.blocks.describe import WIDTH, description, summary, template, templates
 from automax_ros.core.diagnostics import SourceText, render
 from automax_ros.core.types import DataType

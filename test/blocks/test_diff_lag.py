@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from language.check_support import problems, task
 from scipy import signal
 
-from automax_ros.blocks.declaration import Platform
-from automax_ros.blocks.instance import InstanceError
+from automax_ros.blocks.declare.declaration import Platform
+from automax_ros.blocks.declare.instance import InstanceError
 from automax_ros.core.diagnostics import Severity
 
 from .support import TICK, filtered, int16, mapping_constant, outputs_of, repeatable, run, signals

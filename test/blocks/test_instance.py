@@ -1,6 +1,6 @@
 import pytest
 
-from automax_ros.blocks.instance import InstanceError
+from automax_ros.blocks.declare.instance import InstanceError
 
 from .support import run
 

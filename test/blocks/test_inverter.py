@@ -3,7 +3,7 @@ from compile.support import ran
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.blocks.instance import InstanceError
+from automax_ros.blocks.declare.instance import InstanceError
 
 from .support import int16, repeatable, run
 

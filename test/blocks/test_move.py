@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.running.task import Task
+from automax_ros.runtime.tasks.task import Task
 
 from .support import int16, repeatable, run
 

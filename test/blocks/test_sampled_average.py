@@ -7,8 +7,8 @@ from compile.support import lines, run_scans, scan_in_steps, task_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.blocks.instance import InstanceError
-from automax_ros.running.task import Task
+from automax_ros.blocks.declare.instance import InstanceError
+from automax_ros.runtime.tasks.task import Task
 
 from .support import int16, repeatable, run
 

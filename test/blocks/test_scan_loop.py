@@ -1,8 +1,8 @@
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Form, Platform, Special
-from automax_ros.blocks.instance import Instance, InstanceError
+from automax_ros.blocks.declare.declaration import Form, Platform, Special
+from automax_ros.blocks.declare.instance import Instance, InstanceError
 from automax_ros.core.types import DataType
 
 from .support import TICK

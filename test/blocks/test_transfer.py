@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.transfer import bilinear
+from automax_ros.blocks.declare.dynamics import bilinear
 
 from .support import repeatable, run
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.instance import Instance, InstanceError
+from automax_ros.blocks.declare.instance import Instance, InstanceError
 
 from .support import TICK, int16, repeatable
 from .test_shift_words import Shifter

@@ -4,11 +4,10 @@ from pathlib import Path
 
 from bags.recordings import RUN
 
-from automax_ros.bags.writer import BagWriter
 from automax_ros.core.kinds import WriteKind, WriterKind
 from automax_ros.core.types import DataType, type_of_name
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import (
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import (
     NAMES,
     CommonImage,
     CommonWrite,
@@ -16,12 +15,13 @@ from automax_ros.wire.messages import (
     PlantState,
     Scan,
     ScanError,
+    Values,
     Variable,
     VariableTable,
     Writer,
 )
-from automax_ros.wire.qos import LATCHED, SCAN
-from automax_ros.wire.values import Values
+from automax_ros.messages.types.topics import LATCHED, SCAN
+from automax_ros.recordings.write.writer import BagWriter
 
 S = 1_000_000_000
 WRITERS = (

@@ -7,13 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.coefficients import mapping_constant, no_defaults, per_period
-from automax_ros.blocks.declaration import Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
-from automax_ros.blocks.dynamics import Dynamics, Integrator, corners_at
+from automax_ros.blocks.catalogue import CATALOGUE, Family
+from automax_ros.blocks.declare.coefficients import mapping_constant, no_defaults, per_period
+from automax_ros.blocks.declare.declaration import Block, Coefficients, Form, Input, Limit, Output, State, Time, Times
+from automax_ros.blocks.declare.dynamics import Dynamics, Integrator, corners_at, mapped
 from automax_ros.blocks.examples import Example
-from automax_ros.blocks.families import Family
-from automax_ros.blocks.transfer import mapped
 from automax_ros.core.numbers import clamp16, round_count
 from automax_ros.core.types import DataType
 

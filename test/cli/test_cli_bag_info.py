@@ -6,7 +6,7 @@ import pytest
 from bags.independent import GOLDEN
 from bags.recordings import MS, TABLE, record, sample_recording, write_of
 
-from automax_ros.wire.messages import Int16
+from automax_ros.messages.types.messages import Int16
 
 
 @pytest.fixture

@@ -95,10 +95,10 @@ def test_an_action_is_needed(automax, capsys):
 
 
 def test_a_running_time_of_day_is_told(automax, bag):
-    from automax_ros.bags.writer import BagWriter
-    from automax_ros.wire.cdr import encode
-    from automax_ros.wire.messages import Int16
-    from automax_ros.wire.qos import VALUE
+    from automax_ros.messages.cdr.cdr import encode
+    from automax_ros.messages.types.messages import Int16
+    from automax_ros.messages.types.topics import VALUE
+    from automax_ros.recordings.write.writer import BagWriter
 
     with BagWriter(automax.folder / "live") as writer:
         writer.write(writer.channel("/a", "std_msgs/msg/Int16", VALUE), 1_700_000_000_500_000_000, encode(Int16(1)))

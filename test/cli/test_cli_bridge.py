@@ -8,7 +8,7 @@ from math import cos, pi, radians, sqrt
 
 import pytest
 
-from automax_ros.drive.steady import BridgeCase, steady_state
+from automax_ros.drive.circuit.steady import BridgeCase, steady_state
 
 from .support import columns_of
 

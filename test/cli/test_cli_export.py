@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bags.recordings import sample_recording
 
-from automax_ros.bags.export import export_csv
+from automax_ros.recordings.tables.export import export_csv
 
 from .support import columns_of
 
@@ -89,7 +89,7 @@ def test_scans_of_a_task(automax, bag):
     ],
 )
 def test_wrong_use_is_2(automax, bag, monkeypatch, arguments, text):
-    monkeypatch.setattr("automax_ros.bags.series.MAX_GRID_ROWS", 1000)
+    monkeypatch.setattr("automax_ros.recordings.tables.series.MAX_GRID_ROWS", 1000)
     result = automax("export", bag, "-o", "OUT.csv", *arguments)
     assert (result.code, result.out) == (2, "")
     assert text in result.err
@@ -103,7 +103,7 @@ def test_progress_is_shown_where_it_lasts(automax, bag, monkeypatch):
     def shown(title):
         yield lambda share: shares.append((title, share))
 
-    monkeypatch.setattr("automax_ros.cli.export.share_shown", shown)
+    monkeypatch.setattr("automax_ros.cli.recordings.export.share_shown", shown)
     assert automax("export", bag, "-o", "OUT.csv").code == 0
     assert shares
     assert all(title == "export" and 0 <= share <= 1 for title, share in shares)

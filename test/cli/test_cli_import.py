@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.rack.loader import load
+from automax_ros.rackfile.loader import load
 
 CNF = """\
 10 IODEF START_PB@[SLOT=5, REGISTER=0, BIT=3]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.compile.cost import Model
+from automax_ros.compile.base.cost import Model
 from automax_ros.compile.scan_times import ScanTimes
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.cpu_load import ModuleLoad, TaskLoad, faults
+from automax_ros.rackfile.checks.cpu_load import ModuleLoad, TaskLoad, faults
+from automax_ros.rackfile.model.config import RackConfig
 
 RACK = """\
 rack: PM1

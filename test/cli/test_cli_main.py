@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import automax_ros
-import automax_ros.cli.blocks
-import automax_ros.cli.check
+import automax_ros.cli.tasks.blocks
+import automax_ros.cli.tasks.check
 from automax_ros.cli.main import BROKEN_PIPE, INTERRUPTED, SUBCOMMANDS, main, module_of
 
 from .support import TASK
@@ -84,7 +84,7 @@ def test_interrupt_ends_silently(automax, monkeypatch):
     def interrupted(arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(automax_ros.cli.blocks, "run", interrupted)
+    monkeypatch.setattr(automax_ros.cli.tasks.blocks, "run", interrupted)
     assert automax("blocks") == (INTERRUPTED, "", "")
 
 
@@ -161,7 +161,7 @@ def test_interrupt_while_imports_last_is_silent(tmp_path):
         "sys.argv[1:] = [wanted]\n"
         "main.sys.exit(main.main(['check', 'none.BLK']))\n"
     )
-    for module in ("argparse", "automax_ros.cli.usage", "automax_ros.cli.check", "automax_ros.blocks.catalogue"):
+    for module in ("argparse", "automax_ros.cli.usage", "automax_ros.cli.tasks.check", "automax_ros.blocks.catalogue"):
         with started(module, code=code) as process:
             out, err = process.communicate(timeout=240)
         assert (process.returncode, out, err) == (INTERRUPTED, "", ""), module
@@ -211,5 +211,5 @@ def test_check_starts_with_what_it_needs_only(tmp_path):
         out, _ = process.communicate(timeout=240)
     loaded = set(out.split())
     assert "automax_ros.language.checks.checker" in loaded
-    heavy = {"numpy", "mcap", "rich", "rclpy", "yaml", "automax_ros.compile.compiler", "automax_ros.cli.trace"}
+    heavy = {"numpy", "mcap", "rich", "rclpy", "yaml", "automax_ros.compile.compiler", "automax_ros.cli.tasks.trace"}
     assert not loaded & heavy

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.native import native_forms
-from automax_ros.compile.native.forms import NativeMode
+from automax_ros.cli.options.work import native_forms
+from automax_ros.compile.native.run.forms import NativeMode
 
 CONFIG = Path(__file__).parent.parent.parent / "config"
 TASK = """

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import automax_ros
 from automax_ros.cli.main import main
-from automax_ros.rack.drafting import DraftFault, draft
-from automax_ros.rack.loader import load
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.old_plants.draft import DraftFault, draft
 
 EXAMPLE = Path(automax_ros.__file__).parent.parent / "config" / "section_drive"
 FAST = "10 COMMON REF%, RUN@, GAIN, TABLE%(10), NOTE$:12, TEXT$, GRID!(2,3)\n20 CALL SCAN_LOOP(TICKS=1)\n30 END\n"
@@ -207,7 +207,7 @@ def test_link_in_place_of_the_rack_file_is_not_written_through(plant):
 
 
 def test_rack_file_over_the_limit_is_refused(plant, monkeypatch):
-    monkeypatch.setattr("automax_ros.rack.drafting.MAX_BYTES", 500)
+    monkeypatch.setattr("automax_ros.rackfile.old_plants.draft.MAX_BYTES", 500)
     result = plant("new", "plant")
     assert result.code == 2
     assert "would have more than 500 bytes" in result.err
@@ -215,7 +215,7 @@ def test_rack_file_over_the_limit_is_refused(plant, monkeypatch):
 
 
 def test_folder_of_too_many_files_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("automax_ros.rack.drafting._MOST_FILES", 3)
+    monkeypatch.setattr("automax_ros.rackfile.old_plants.draft._MOST_FILES", 3)
     for number in range(4):
         (tmp_path / f"{number}.txt").touch()
     with pytest.raises(DraftFault, match="more than 3 files"):

@@ -2,29 +2,21 @@
 
 import argparse
 import ast
-import importlib
-import keyword
 from pathlib import Path
 
 import pytest
 
 from automax_ros import cli
-from automax_ros.cli.main import SUBCOMMANDS
+from automax_ros.cli.main import SUBCOMMANDS, module_of
 
 FOLDER = Path(cli.__file__).parent
 PREFIXED = {"record_"}
 """Options that are read by a name put together from this and a word."""
 
 
-def module_of(name: str) -> str:
-    """The module of a subcommand; one whose name Python keeps for itself ends with an underscore."""
-    module = name.replace("-", "_")
-    return f"{module}_" if keyword.iskeyword(module) else module
-
-
 def options_of(name: str) -> set[str]:
     parser = argparse.ArgumentParser()
-    importlib.import_module(f"automax_ros.cli.{module_of(name)}").add_arguments(parser)
+    module_of(name).add_arguments(parser)
     found: set[str] = set()
     parsers = [parser]
     while parsers:
@@ -38,15 +30,16 @@ def options_of(name: str) -> set[str]:
 
 def files_of(name: str) -> list[Path]:
     """The files of a subcommand: its own, and those of the command line that they import."""
-    found, waiting = set(), [module_of(name), *(path.stem for path in FOLDER.glob(f"{name}_*.py"))]
+    found, waiting = set(), [Path(str(module_of(name).__file__)), *FOLDER.rglob(f"{name}_*.py")]
     while waiting:
-        path = FOLDER / f"{waiting.pop()}.py"
+        path = waiting.pop()
         if path in found or not path.exists():
             continue
         found.add(path)
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and str(node.module).startswith("automax_ros.cli"):
-                waiting += [str(node.module).rpartition(".")[2], *(alias.name for alias in node.names)]
+                base = FOLDER.joinpath(*str(node.module).split(".")[2:])
+                waiting += [base.with_suffix(".py"), *(base / f"{alias.name}.py" for alias in node.names)]
     return sorted(found)
 
 

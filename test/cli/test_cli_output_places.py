@@ -115,14 +115,14 @@ def test_a_state_that_cannot_be_a_folder_is_refused_before_the_run(automax, run,
 def test_a_folder_that_must_not_be_written_is_refused_before_the_run(automax, run, monkeypatch):
     """Root may write everything, so access is what the system would say to anybody else."""
     (automax.folder / "X").mkdir()
-    monkeypatch.setattr("automax_ros.cli.output_files.os.access", lambda *_: False)
+    monkeypatch.setattr("automax_ros.cli.output.files.os.access", lambda *_: False)
     result = run("--state", "X/deep")
     assert (result.code, "X must not be written" in result.err) == (2, True)
 
 
 def test_a_report_that_must_not_be_written_is_refused_before_the_run(automax, run, monkeypatch):
     automax.write("end.json", "mine")
-    monkeypatch.setattr("automax_ros.cli.output_files.os.access", lambda place, _: place.name != "end.json")
+    monkeypatch.setattr("automax_ros.cli.output.files.os.access", lambda place, _: place.name != "end.json")
     result = run("--report", "end.json", "--record", "out")
     assert (result.code, "must not be written" in result.err) == (2, True)
     assert not (automax.folder / "out").exists()

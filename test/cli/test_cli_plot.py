@@ -9,11 +9,11 @@ import pytest
 from bags.independent import GOLDEN, steps_of
 from bags.recordings import MS, TABLE, image_of, record, sample_recording, write_of
 
-from automax_ros.bags.traces import ErrorMark, Line, Traces, traces
-from automax_ros.bags.variables import Watched
-from automax_ros.cli.plot_figure import Layout, figure_of, save
+from automax_ros.cli.output.figure import Layout, figure_of, save
 from automax_ros.core.types import DataType
-from automax_ros.wire.messages import Scan, ScanError
+from automax_ros.messages.types.messages import Scan, ScanError
+from automax_ros.recordings.read.common_log import Watched
+from automax_ros.recordings.tables.traces import ErrorMark, Line, Traces, traces
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
@@ -40,7 +40,7 @@ def corners(line):
 
 def test_a_recording_is_read_without_loading_what_runs_a_rack():
     """It would take as long as the picture itself."""
-    program = "import sys, automax_ros.bags.traces; print('automax_ros.rack.rack' in sys.modules)"
+    program = "import sys, automax_ros.recordings.tables.traces; print('automax_ros.rack.rack' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", program], text=True) == "False\n"
 
 

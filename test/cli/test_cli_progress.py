@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from automax_ros.cli import progress
-from automax_ros.cli.progress import ProgressBar, share_shown
+from automax_ros.cli.output import screen as progress
+from automax_ros.cli.output.screen import ProgressBar, share_shown
 
 
 class Terminal(io.StringIO):

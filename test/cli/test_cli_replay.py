@@ -10,8 +10,8 @@ import pytest
 from bags.test_bag_split import recorded as recorded_files
 from replay.replays import SPEED, WORK, edited, recorded
 
-from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.recordings.write.recorder import RecordingOptions
 
 STRONGER = edited(SPEED, ("INPUT2=100", "INPUT2=104"))
 
@@ -250,7 +250,7 @@ def test_wrong_usage_is_2_with_one_message(automax, bag, arguments, words):
 def test_progress_is_shown_where_it_lasts(automax, bag, monkeypatch):
     """With no patience left the bar is fed from 0 to nearly all."""
     shown: list[int] = []
-    monkeypatch.setattr("automax_ros.cli.progress.ProgressBar.show", lambda _, done: shown.append(done))
+    monkeypatch.setattr("automax_ros.cli.output.screen.ProgressBar.show", lambda _, done: shown.append(done))
     assert automax("replay", bag).code == 0
     assert shown == sorted(shown)
     assert shown

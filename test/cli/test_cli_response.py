@@ -11,7 +11,7 @@ import pytest
 from golden_text import GOLDEN, check_golden
 from scipy import signal
 
-from automax_ros.cli import response_plot
+from automax_ros.cli.tasks import response_plot
 
 from .support import WRONG
 

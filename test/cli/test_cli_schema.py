@@ -5,8 +5,8 @@ import json
 import jsonschema
 import pytest
 
-from automax_ros.rack.loader import schema as rack_schema
-from automax_ros.rack.stimuli.schema import schema as stimuli_schema
+from automax_ros.rackfile.loader import schema as rack_schema
+from automax_ros.scenario.stimuli.schema import schema as stimuli_schema
 
 
 @pytest.mark.parametrize(("kind", "schema"), [("rack", rack_schema), ("stimuli", stimuli_schema)])

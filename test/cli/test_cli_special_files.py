@@ -7,8 +7,8 @@ import signal
 import pytest
 from bags.independent import GOLDEN
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.playback import survey
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.playback import survey
 
 COMMANDS = {
     "info": ["bag", "info", "bag"],

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.state_keeping import SAVE_PERIOD_NS, StateKeeping
-from automax_ros.rack.loader import load
+from automax_ros.cli.run.saving import SAVE_PERIOD_NS, StateKeeping
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 RACK = """\
 rack: KEEP

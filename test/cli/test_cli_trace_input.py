@@ -10,13 +10,13 @@ from core.problem_pages import read_page
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.blocks.declaration import Platform
-from automax_ros.cli.csv_table import MAX_LINE, CsvFault
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.cli.main import main
-from automax_ros.cli.task_files import Target, check_task_file
-from automax_ros.cli.trace_input import InputTable
+from automax_ros.cli.options.task import Target, check_task_file
+from automax_ros.cli.output.csv_input import MAX_LINE, CsvFault
+from automax_ros.cli.tasks.trace_rows import InputTable
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.running.lone_task import LoneTask
+from automax_ros.runtime.tasks.standalone_task import LoneTask
 
 from .support import TASK, table_of
 

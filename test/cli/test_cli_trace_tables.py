@@ -5,8 +5,8 @@ import csv
 import pytest
 from bags.live_racks import build
 
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 
 from .support import columns_of
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from automax_ros.cli.watch import watch_list
+from automax_ros.cli.options.values import watch_list
 
 
 @pytest.mark.parametrize(

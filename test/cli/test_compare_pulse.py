@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.instance import Instance
-from automax_ros.cli import compare_pulse
+from automax_ros.blocks.declare.instance import Instance
 from automax_ros.cli.main import main
+from automax_ros.cli.tasks import compare_pulse
 from automax_ros.logix.pmul import PulseMultiplier
 
 from .support import columns_of, table_of

@@ -7,9 +7,9 @@ import subprocess
 
 import pytest
 
-from automax_ros.cli.arguments import commands
-from automax_ros.cli.completion import SHELLS
 from automax_ros.cli.main import SUBCOMMANDS
+from automax_ros.cli.shell.arguments import commands
+from automax_ros.cli.shell.completion import SHELLS
 
 FOUND = commands()
 EVERY = [inner for command in FOUND for inner in command.all()]

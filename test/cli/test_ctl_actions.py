@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 from system.support import RACKS
 
-from automax_ros.cli.ctl_actions import ACTIONS
-from automax_ros.cli.rack_space import space_of
+from automax_ros.cli.operate.actions import ACTIONS
+from automax_ros.cli.options.rack_name import space_of
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.faults import Fault
 

@@ -11,10 +11,9 @@ from typing import Any
 
 import pytest
 
-from automax_ros.cli.ctl_actions import ACTIONS
-from automax_ros.cli.ctl_arguments import add_actions
-from automax_ros.cli.ctl_session import Session
-from automax_ros.cli.ctl_shell import run_shell
+from automax_ros.cli.operate.actions import ACTIONS, add_actions
+from automax_ros.cli.operate.prompt import run_shell
+from automax_ros.cli.operate.session import Session
 from automax_ros.cli.usage import UsageError
 from automax_ros.cli.visible import VisibleOutput
 
@@ -48,7 +47,7 @@ class Rack:
         self.alone_ns.append(alone_ns)
 
     def refuse_several(self, racks: int) -> None:
-        from automax_ros.nodes.operating import NotOperable
+        from automax_ros.ros.clients.rack_client import NotOperable
 
         if racks > 1:
             raise NotOperable(f"{racks} racks")
@@ -120,8 +119,8 @@ def test_status_says_what_tripped_what_ended_and_what_is_displayed(capsys):
 
 @pytest.mark.parametrize(("local", "waits"), [(True, False), (False, True)])
 def test_who_operates_asks_the_rack_whether_it_is_alone_where_all_are_on_this_host(monkeypatch, local, waits):
-    from automax_ros.nodes import discovery_range
-    from automax_ros.nodes.participants import ALONE_NS
+    from automax_ros.ros.clients.recorded_run import ALONE_NS
+    from automax_ros.ros.setup import discovery as discovery_range
 
     monkeypatch.setattr(discovery_range, "is_this_host_alone", lambda: local)
     rack = Rack(**{"A@": "FALSE"})
@@ -137,7 +136,7 @@ def test_who_operates_asks_the_rack_whether_it_is_alone_where_all_are_on_this_ho
 
 
 def test_a_second_rack_that_the_rack_knows_of_is_operated_by_nobody():
-    from automax_ros.nodes.operating import NotOperable
+    from automax_ros.ros.clients.rack_client import NotOperable
 
     rack = Rack(**{"A@": "FALSE"})
     rack.racks = 2
@@ -197,7 +196,7 @@ def test_a_prompt_goes_on_after_errors_and_ends_with_its_input(monkeypatch, caps
 
         def __exit__(self, *_: object) -> None: ...
 
-    monkeypatch.setattr("automax_ros.cli.ctl_shell.connected", Connected)
+    monkeypatch.setattr("automax_ros.cli.operate.prompt.connected", Connected)
     lines = "get REF%\nfoo\nset 'REF%\npress REF%\n\n# a remark\nset REF%=7\nset NIL%=1\nquit\nset REF%=8\n"
     monkeypatch.setattr("sys.stdin", io.StringIO(lines))
     code = run_shell(argparse.Namespace(rack="PM1", timeout=10**9))

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.drive.limits import boundary_amps
-from automax_ros.drive.motor import Motor
-from automax_ros.drive.nameplate import EXAMPLES, derive
+from automax_ros.drive.assess.limits import boundary_amps
+from automax_ros.drive.base.motor import Motor
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
 
 from .drive_racks import loop_task, rack_file, write_rack
 

@@ -5,12 +5,12 @@ import shutil
 import pytest
 from system.support import RACKS
 
-from automax_ros.bags.recorder import RecordingOptions
-from automax_ros.cli.live_session import LiveSession
-from automax_ros.cli.run_plan import RunPlan
-from automax_ros.cli.signals import StopRequest
-from automax_ros.rack.installation import RackError
-from automax_ros.rack.loader import load
+from automax_ros.cli.output.signals import StopRequest
+from automax_ros.cli.run.live import LiveSession
+from automax_ros.cli.run.plan import RunPlan
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.write.recorder import RecordingOptions
 
 INACTIVE, ACTIVE, UNCONFIGURED, FINALIZED = "inactive", "active", "unconfigured", "finalized"
 
@@ -35,8 +35,8 @@ def stop():
 
 @pytest.fixture
 def run(ros_domain_id, plan, stop):
-    from automax_ros.cli.managed_run import Managed, ManagedRun
-    from automax_ros.nodes.process import RosProcess
+    from automax_ros.cli.run.lifecycle import Managed, ManagedRun
+    from automax_ros.ros.setup.process import RosProcess
 
     process = RosProcess()
     made = ManagedRun(Managed("operated", lambda: plan, plan), process, stop, ros_domain_id)
@@ -68,7 +68,7 @@ def test_transitions_end_where_they_should(run):
 
 @pytest.mark.parametrize("transition", ["activate", "deactivate"])
 def test_an_error_of_ours_leaves_nothing_on(run, monkeypatch, transition):
-    from automax_ros.nodes.rack_nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     change(run, "configure")
     if transition == "deactivate":
@@ -114,7 +114,7 @@ def test_errors_at_the_autostart_are_the_commands(run, folder):
 
 def test_a_signal_cuts_the_compilation_short(run, stop, monkeypatch):
     """It comes while tasks are compiled, which takes long for large racks."""
-    from automax_ros.cli import live_session
+    from automax_ros.cli.run import live as live_session
 
     def compiled(*_, **__):
         stop.note(2)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.places import add_where_arguments, where_of
+from automax_ros.cli.options.work import add_where_arguments, where_of
 from automax_ros.cli.usage import UsageError
-from automax_ros.pieces import Where
+from automax_ros.parallel.job import Where
 
 RACK = Path(__file__).parents[2] / "config" / "section_drive"
 
@@ -49,7 +49,7 @@ def test_a_cluster_has_an_address_and_jobs_of_its_own(arguments):
 def test_a_scheduler_that_cannot_be_used_is_exit_code_2(automax, monkeypatch, tmp_path):
     """Only where there is something to hand over: a recording of one file is replayed here."""
     monkeypatch.setattr("automax_ros.replay.side_by_side.LEAST_PART_BYTES", 1)
-    monkeypatch.setattr("automax_ros.pieces.connecting.CONNECT_S", 1)
+    monkeypatch.setattr("automax_ros.parallel.cluster.CONNECT_S", 1)
     bag = tmp_path / "bag"
     split = ("--record-split-s", "1")
     assert automax("run", RACK, "--simulated", "--duration", "2", "--record", bag, *split).code == 0

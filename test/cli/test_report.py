@@ -8,10 +8,10 @@ import zlib
 
 import pytest
 
-from automax_ros.bags.series import Window
-from automax_ros.cli.plot_figure import Layout, figure_of
-from automax_ros.replay.drive_report import drive_report
-from automax_ros.replay.rack_report import rack_report
+from automax_ros.cli.output.figure import Layout, figure_of
+from automax_ros.recordings.tables.series import Window
+from automax_ros.replay.drive_report.drive_report import drive_report
+from automax_ros.replay.drive_report.rack_report import rack_report
 
 from .drive_bags import DriveBag
 from .drive_racks import COMMONS, loop_task, rack_file, write_rack

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from automax_ros.cli.report_parts import merged_report
+from automax_ros.cli.run.process_messages import merged_report
 
 
 def part(**given):

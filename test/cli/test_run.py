@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli import status as status_module
-from automax_ros.cli.status import StatusDisplay
-from automax_ros.cli.status_line import erasing, fitting
-from automax_ros.rack.loader import load
+from automax_ros.cli.output.screen import erasing, fitting
+from automax_ros.cli.run import status as status_module
+from automax_ros.cli.run.status import StatusDisplay
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import watched
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.value_names import watched
 
 RACK = """\
 rack: LINE1
@@ -296,7 +296,7 @@ def test_existing_folder_is_not_recorded_into(run, automax):
 
 
 def test_recording_that_breaks_off_is_told_and_the_run_goes_on(run, automax, monkeypatch):
-    from automax_ros.bags import writer
+    from automax_ros.recordings.write import writer
 
     def full(self, data):
         if self._size > 20_000:
@@ -315,7 +315,7 @@ def test_recording_that_breaks_off_is_told_and_the_run_goes_on(run, automax, mon
 
 
 def test_a_disk_that_vanishes_is_told_once(run, automax, monkeypatch):
-    from automax_ros.bags import writer
+    from automax_ros.recordings.write import writer
 
     def vanished(self, data):
         if self._size > 20_000:

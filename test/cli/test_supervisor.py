@@ -13,10 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.restarts import BACKOFFS_NS, WINDOW_NS, Restarts
-from automax_ros.cli.seat_talk import Reported, Said, ToldScreen, heard, tell_report
-from automax_ros.cli.status_parts import Progress, Summary, merged_progress, merged_summary
-from automax_ros.cli.supervisor import Post, Supervisor
+from automax_ros.cli.run.process_messages import Reported, Said, ToldScreen, heard, tell_report
+from automax_ros.cli.run.status import Progress, Summary, merged_progress, merged_summary
+from automax_ros.cli.run.supervisor import BACKOFFS_NS, WINDOW_NS, Post, Restarts, Supervisor
 
 PATIENCE_S = 240.0
 REPORT = 'print(json.dumps({"report": {"ok": True}}), flush=True)'
@@ -35,8 +34,8 @@ print("down", flush=True)
 
 
 def program(text: str) -> list[str]:
-    head = "import json, os, signal, sys, time\nfrom automax_ros.cli.child_process import end_with_watcher\n"
-    return [sys.executable, "-c", head + "from automax_ros.cli.signals import StopRequest\n" + text]
+    head = "import json, os, signal, sys, time\nfrom automax_ros.cli.run.child_process import end_with_watcher\n"
+    return [sys.executable, "-c", head + "from automax_ros.cli.output.signals import StopRequest\n" + text]
 
 
 class Heard:
@@ -170,7 +169,7 @@ def test_a_process_asked_to_end_before_it_heeds_signals_has_ended_well():
 def test_children_end_with_a_watcher_that_is_killed(tmp_path):
     """SIGKILL lets nobody clean up: the children notice by themselves."""
     watcher = (
-        f"from automax_ros.cli.supervisor import Post, Supervisor\nchild = {program(WAITS)!r}\n"
+        f"from automax_ros.cli.run.supervisor import Post, Supervisor\nchild = {program(WAITS)!r}\n"
         "class Heard:\n"
         "    def heard(self, name, told): print(name, told.text, supervisor.pids[name], flush=True)\n"
         "    complained = died = print\n"

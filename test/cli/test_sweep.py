@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from sweep.helpers import LOOP, RACK
 
-from automax_ros.bags.data_file import DataFile
-from automax_ros.cli.sweep_output import prepared
+from automax_ros.cli.racks.sweep_output import prepared
 from automax_ros.rack.rack import Rack
+from automax_ros.recordings.write.data_file import DataFile
 
 from .support import Automax, Result
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sweep.helpers import plan_of, rack_in
 
-from automax_ros.cli import sweep_picture
+from automax_ros.cli.racks import sweep_picture
 from automax_ros.cli.usage import UsageError
 from automax_ros.sweep.points import grid, read_varied, sample
 from automax_ros.sweep.run import Outcome, Plan

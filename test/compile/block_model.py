@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 
-from automax_ros.blocks.coefficients import limited
-from automax_ros.blocks.declaration import Access, Block, Special
-from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.declare.coefficients import limited
+from automax_ros.blocks.declare.declaration import Access, Block, Special
+from automax_ros.blocks.declare.instance import Instance
 from automax_ros.core.types import DataType, type_of_name
 
 from .support import TICK

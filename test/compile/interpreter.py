@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 
-from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.declare.instance import Instance
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.language.program import Program
-from automax_ros.language.syntax import tree
-from automax_ros.language.syntax.tree import Scope
+from automax_ros.language.tree import tree
+from automax_ros.language.tree.tree import Scope
 
 from .builtin_model import HIGH32, LARGEST, LOW32, Functions, single, whole
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from hypothesis import settings
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
+from automax_ros.compile.base.cost import CostModel
 from automax_ros.compile.compiler import CompiledTask, compile_program
-from automax_ros.compile.cost import CostModel
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.core.types import Value
 from automax_ros.language.checks.checker import check
 from automax_ros.language.program import Program
-from automax_ros.language.syntax.tree import Scope
-from automax_ros.running.basic_task import BasicTask
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import ViewSpec
+from automax_ros.language.tree.tree import Scope
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import ViewSpec
+from automax_ros.runtime.tasks.basic_task import BasicTask
+from automax_ros.runtime.tasks.task import ScanRecord, Task
 
 TICK = 5_500_000
 WRITER, OTHER = 1, 9

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.compile.cost import STATEMENT_ESTIMATES_US, CostModel, Model
-from automax_ros.compile.scan_io import Suspension
-from automax_ros.compile.waiting import BURST_LIMIT
+from automax_ros.compile.base.cost import STATEMENT_ESTIMATES_US, CostModel, Model
+from automax_ros.compile.base.scan_io import Suspension
+from automax_ros.compile.lowering.basic_statements import BURST_LIMIT
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.running.channels import Channels
-from automax_ros.running.task import Status
+from automax_ros.runtime.scan.channels import Channels
+from automax_ros.runtime.tasks.task import Status
 
 from .support import TICK, basic_task_of, repeatable
 

@@ -10,12 +10,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Block, Form, Given, Platform, Special
-from automax_ros.blocks.instance import Instance
-from automax_ros.blocks.rules import AtLeast, Contiguous, Needs, NumberTrue
+from automax_ros.blocks.declare.declaration import Access, Block, Form, Given, Platform, Special
+from automax_ros.blocks.declare.instance import Instance
+from automax_ros.blocks.declare.rules import AtLeast, Contiguous, Needs, NumberTrue
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, type_of_name
-from automax_ros.running.memory import CommonMemory
+from automax_ros.runtime.memory.memory import CommonMemory
 
 from .block_model import SIZE, TICKS, Model, ModelBlock, Programmed
 from .support import OTHER, lines, logged, ran, repeatable, run_scans, scan_and_record, task_of
@@ -446,7 +446,7 @@ def made(tmp_path, monkeypatch):
 
 
 def block_like(name, step, inputs, outputs, states=()):
-    from automax_ros.blocks.declaration import Input, Output, State
+    from automax_ros.blocks.declare.declaration import Input, Output, State
 
     return dataclasses.replace(
         CATALOGUE["SUMMER"],

@@ -7,9 +7,8 @@ from random import Random
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Block
-from automax_ros.compile.coefficient_function import QUICK_AFTER, CoefficientFunction, kept_names
-from automax_ros.compile.native.coefficients import quick_form
+from automax_ros.blocks.declare.declaration import Block
+from automax_ros.compile.blocks.coefficients import QUICK_AFTER, CoefficientFunction, kept_names, quick_form
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Access, Block, Form, Input, Output, Platform, Special
-from automax_ros.blocks.rules import AtLeast, Contiguous, NumberTrue
-from automax_ros.compile.cost import STATEMENT_ESTIMATES_US, CostModel, Model
+from automax_ros.blocks.declare.declaration import Access, Block, Form, Input, Output, Platform, Special
+from automax_ros.blocks.declare.rules import AtLeast, Contiguous, NumberTrue
+from automax_ros.compile.base.cost import STATEMENT_ESTIMATES_US, CostModel, Model
 from automax_ros.core.types import DataType
 
 from .support import lines, scan_in_steps, task_of

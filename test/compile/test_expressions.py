@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.types import DataType
 from automax_ros.language.program import Program
-from automax_ros.language.syntax.tree import Assignment
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
+from automax_ros.language.tree.tree import Assignment
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.tasks.task import Task
 
 from .interpreter import Interpreter
 from .programs import DECLARATIONS, checked, expressions, numbers

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
-from automax_ros.compile.scan_io import Suspension
-from automax_ros.running.channels import Channels
-from automax_ros.running.task import Status, Task
+from automax_ros.compile.base.scan_io import Suspension
+from automax_ros.runtime.scan.channels import Channels
+from automax_ros.runtime.tasks.task import Status, Task
 
 from .support import basic_task_of, compiled_of, task_of
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.compile.layout import Layout, Role, StateField
+from automax_ros.compile.base.layout import Layout, Role, StateField
 from automax_ros.core.types import DataType
 
 from .support import compiled_of, lines, repeatable, task_of

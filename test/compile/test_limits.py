@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from automax_ros.blocks.declaration import HELPERS
+from automax_ros.blocks.declare.declaration import HELPERS
 from automax_ros.compile.compiler import compile_program
-from automax_ros.compile.statements import STATEMENT_LIMIT
-from automax_ros.running.task import Status
+from automax_ros.compile.lowering.statements import STATEMENT_LIMIT
+from automax_ros.runtime.tasks.task import Status
 
 from .support import compiled_of, lines, logged, program_of, ran, run_scans, scan_in_steps, task_of, views_of
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.compile.compiler import compile_program
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import ScanRecord, Task
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.tasks.task import ScanRecord, Task
 
 from .programs import checked, outside_writes, tasks
 from .support import OTHER, WRITER, basic_task_of, repeatable, task_of, views_of

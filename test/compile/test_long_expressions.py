@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from automax_ros.compile.compiler import compile_program
-from automax_ros.language.syntax.tree import (
+from automax_ros.language.tree.tree import (
     Assignment,
     Binary,
     FunctionCall,
@@ -17,8 +17,8 @@ from automax_ros.language.syntax.tree import (
     StringLiteral,
     Unary,
 )
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.tasks.task import Task
 
 from .support import lines, program_of, ran
 

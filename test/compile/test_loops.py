@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.running.task import Task
+from automax_ros.runtime.tasks.task import Task
 
 from .support import OTHER, lines, logged, ran, run_scans, scan_in_steps, task_of
 

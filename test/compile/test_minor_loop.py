@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.compile.cost import CostModel, Model
-from automax_ros.compile.expressions import SUBSCRIPT
+from automax_ros.compile.base.cost import CostModel, Model
+from automax_ros.compile.lowering.expressions import SUBSCRIPT
 from automax_ros.compile.scan_times import scan_times
 from automax_ros.core.types import DataType
-from automax_ros.drive.cml.inputs import Inputs
-from automax_ros.drive.cml.outputs import OUTPUTS
+from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.outputs import OUTPUTS
 
 from .support import compiled_of
 

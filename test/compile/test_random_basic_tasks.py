@@ -9,14 +9,14 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.compile.base.scan_io import Suspension
 from automax_ros.compile.compiler import compile_program
-from automax_ros.compile.scan_io import Suspension
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
 from automax_ros.language.program import Program
-from automax_ros.running.basic_task import BasicTask
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Status
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.tasks.basic_task import BasicTask
+from automax_ros.runtime.tasks.task import Status
 
 from .interpreter import Interpreter
 from .programs import REFUSED, tasks

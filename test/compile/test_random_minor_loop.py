@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Form, Input
+from automax_ros.blocks.declare.declaration import Form, Input
 from automax_ros.compile.compiler import CompiledTask
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.types import DataType
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.tasks.task import Task
 
 from .interpreter import Interpreter
 from .programs import checked, outside_writes, tasks

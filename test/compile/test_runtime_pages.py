@@ -6,7 +6,7 @@ import pytest
 from core.problem_pages import PAGES, Fence, read_page
 
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.running.task import Status
+from automax_ros.runtime.tasks.task import Status
 
 from .support import TICK, basic_task_of, task_of
 
@@ -47,9 +47,12 @@ def test_cure_logs_nothing(code):
 
 def test_what_the_runtime_logs_has_a_page():
     """Every number of a problem in the runtime's own modules is in the table."""
-    from automax_ros.blocks import declaration
-    from automax_ros.compile import expressions, functions, loops, statements, waiting
-    from automax_ros.running import channels, task
+    from automax_ros.blocks.declare import declaration
+    from automax_ros.compile.base import functions
+    from automax_ros.compile.lowering import basic_statements as waiting
+    from automax_ros.compile.lowering import expressions, loops, statements
+    from automax_ros.runtime.scan import channels
+    from automax_ros.runtime.tasks import task
 
     modules = (declaration, expressions, functions, loops, statements, waiting, channels, task)
     numbers = {value for module in modules for value in vars(module).values() if isinstance(value, int)}

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
-from automax_ros.compile.cost import STATEMENT_ESTIMATES_US, CostModel, Model
+from automax_ros.blocks.declare.declaration import Platform
+from automax_ros.compile.base.cost import STATEMENT_ESTIMATES_US, CostModel, Model
 from automax_ros.compile.scan_times import period_ns, scan_times
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import pytest
 
-from automax_ros.drive.plant_faults import values_of, work_on
-from automax_ros.rack.loader import load
+from automax_ros.drive.plant.faults import values_of, work_on
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 EXAMPLE = Path(__file__).parents[2] / "config" / "dc_drive"
 SPEEDS_RPM = (500, 720, 930, 1130, 1340, 1550, 1750)

@@ -9,14 +9,14 @@ import pytest
 
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType, Value, bare_name
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
-from automax_ros.rack.ros_names import set_topic
-from automax_ros.rack.tasks_check import check_tasks
-from automax_ros.running.scan_record import ScanRecord
-from automax_ros.running.task import Task
-from automax_ros.running.views import WriteGroup
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.ros_names import set_topic
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.scan.scan_record import ScanRecord
+from automax_ros.runtime.tasks.task import Task
 
 FOLDER = Path(__file__).parents[2] / "config" / "section_drive"
 README = (FOLDER / "README.md").read_text(encoding="utf-8")

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 from rack.modules.network_racks import Cable
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 
 FOLDER = Path(__file__).parents[2] / "config" / "two_racks"
 CRUISE, WINDER_CRUISE = 2457, 2481

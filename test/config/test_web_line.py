@@ -12,16 +12,16 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.recorder import Recorder
 from automax_ros.cli.main import main
-from automax_ros.rack.cpu_load import faults, loads_of
-from automax_ros.rack.loader import load
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
-from automax_ros.rack.tasks_check import check_tasks
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.checks.cpu_load import faults, loads_of
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.write.recorder import Recorder
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 
 FOLDER = Path(__file__).parents[2] / "config" / "web_line"
 START, WEB_BREAK = "start.yaml", "web_break.yaml"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 from pathlib import Path
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 CONFIG = Path(__file__).parents[2] / "config" / "web_line" / "rack.yaml"
 MS = 1_000_000

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import automax_ros.core
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.core.ticks import tick_ns
 from automax_ros.core.types import DataType, type_of_name
 from automax_ros.language.program import CommonSpec

@@ -14,7 +14,7 @@ from automax_ros.core import compiled
 
 PACKAGE = Path(automax_ros.__path__[0])
 HEAD = "\t".join(("automax_ros compiled", compiled.VERSION, EXTENSION_SUFFIXES[0]))
-TEXTS = {"drive/motor.py": b"MOTOR = 1\n", "core/types.py": b"TYPE = 1\n"}
+TEXTS = {"drive/base/motor.py": b"MOTOR = 1\n", "core/types.py": b"TYPE = 1\n"}
 LIBRARY = b"no machine code"
 
 
@@ -31,7 +31,7 @@ def package(tmp_path):
 def index(folder, head=HEAD):
     folder.mkdir(exist_ok=True)
     lines = [head, "group\tdrive", f"library\tautomax_drive__mypyc\tdrive-1/library.so\t{len(LIBRARY)}"]
-    lines.append(f"module\tautomax_ros.drive.motor\tdrive-1/shims.so\t{len(LIBRARY)}")
+    lines.append(f"module\tautomax_ros.drive.base.motor\tdrive-1/shims.so\t{len(LIBRARY)}")
     lines += [f"source\t{name}\t{compiled.source_digest(text)}" for name, text in TEXTS.items()]
     (folder / compiled.INDEX).write_text("\n".join(lines) + "\n")
     (folder / "drive-1").mkdir(exist_ok=True)
@@ -47,11 +47,11 @@ def finder(package):
 def test_module_and_its_library_come_from_the_folder(package):
     found = finder(package)
     folder = package.parent / compiled.FOLDER / "drive-1"
-    assert found.find_spec("automax_ros.drive.motor").origin == str(folder / "shims.so")
+    assert found.find_spec("automax_ros.drive.base.motor").origin == str(folder / "shims.so")
     assert found.find_spec("automax_drive__mypyc").origin == str(folder / "library.so")
 
 
-@pytest.mark.parametrize("name", ["automax_ros", "automax_ros.drive", "automax_ros.drive.plant", "numpy", "os"])
+@pytest.mark.parametrize("name", ["automax_ros", "automax_ros.drive", "automax_ros.drive.plant.plant", "numpy", "os"])
 def test_other_modules_are_left_to_python(package, name):
     assert finder(package).find_spec(name) is None
 
@@ -64,7 +64,7 @@ def test_a_source_that_changed_is_what_runs(package, name, text):
     else:
         (package / name).write_bytes(text)
     found = finder(package)
-    assert found.find_spec("automax_ros.drive.motor") is None
+    assert found.find_spec("automax_ros.drive.base.motor") is None
     assert found.find_spec("automax_drive__mypyc") is None
     assert found.groups[0].stale.startswith(name)
 
@@ -73,7 +73,7 @@ def test_a_source_that_changed_is_what_runs(package, name, text):
 def test_without_its_libraries_the_python_file_runs(package, library):
     found = finder(package)
     (package.parent / compiled.FOLDER / "drive-1" / library).unlink()
-    assert found.find_spec("automax_ros.drive.motor") is None
+    assert found.find_spec("automax_ros.drive.base.motor") is None
     assert found.groups[0].stale.endswith(f"{library} is missing")
 
 
@@ -82,18 +82,18 @@ def test_a_library_that_was_copied_by_half_is_never_loaded(package, library):
     """It would end the process, and nothing would say why."""
     found = finder(package)
     (package.parent / compiled.FOLDER / "drive-1" / library).write_bytes(LIBRARY[:7])
-    assert found.find_spec("automax_ros.drive.motor") is None
+    assert found.find_spec("automax_ros.drive.base.motor") is None
     assert found.groups[0].stale.endswith(f"{library} has 7 bytes of 15")
 
 
 def test_with_a_library_that_cannot_be_loaded_the_python_file_runs_and_it_is_told(package, monkeypatch):
     monkeypatch.delitem(sys.modules, "automax_drive__mypyc", raising=False)
     found = finder(package)
-    spec = found.find_spec("automax_ros.drive.motor")
+    spec = found.find_spec("automax_ros.drive.base.motor")
     motor = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(motor)
     assert (motor.MOTOR, motor.__file__) == (1, str(package / "drive" / "motor.py"))
-    assert found.find_spec("automax_ros.drive.motor") is None
+    assert found.find_spec("automax_ros.drive.base.motor") is None
     monkeypatch.setattr(sys, "meta_path", [found])
     (told,) = compiled.describe(str(package))
     assert told.startswith("plain Python: drive, for its library cannot be loaded: ")
@@ -123,7 +123,7 @@ def test_what_calls_another_version_of_a_c_interface_is_not_loaded(package, inte
     with (package.parent / compiled.FOLDER / compiled.INDEX).open("a") as file:
         file.write(f"interface\t{interface.format(binary, offered)}\n")
     found = compiled.CompiledFinder(compiled.read_index(str(package.parent / compiled.FOLDER)), str(package))
-    assert (found.find_spec("automax_ros.drive.motor") is None) == bool(why)
+    assert (found.find_spec("automax_ros.drive.base.motor") is None) == bool(why)
     assert found.groups[0].stale.startswith(why.format(binary, offered))
 
 
@@ -137,7 +137,7 @@ def test_what_is_told_was_tried(package, monkeypatch):
 def test_time_of_a_file_does_not_count(package):
     for name in TEXTS:
         os.utime(package / name, (1, 1))
-    assert finder(package).find_spec("automax_ros.drive.motor")
+    assert finder(package).find_spec("automax_ros.drive.base.motor")
 
 
 @pytest.mark.parametrize("head", ["", "automax_ros compiled\t0\t.so", HEAD.replace(EXTENSION_SUFFIXES[0], ".cp0.so")])
@@ -161,7 +161,7 @@ def run(program, switch):
 
 
 def test_switched_off_everything_is_python():
-    program = "from automax_ros.drive import motor; print(type(motor.Motor.emf).__name__, motor.__file__)"
+    program = "from automax_ros.drive.base import motor; print(type(motor.Motor.emf).__name__, motor.__file__)"
     kind, file = run(program, "off").split()
     assert (kind, Path(file)) == ("function", PACKAGE / "drive" / "motor.py")
 

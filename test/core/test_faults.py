@@ -2,9 +2,9 @@
 
 import pytest
 
-from automax_ros.bags.errors import BagError
 from automax_ros.cli.usage import UsageError
 from automax_ros.core.faults import Fault
+from automax_ros.recordings.mcap.errors import BagError
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,12 @@ import dataclasses
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.language.checks.checker import CheckResult, check
-from automax_ros.language.syntax.parser import SOURCE_LIMIT
-from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT
+from automax_ros.language.parse.parser import SOURCE_LIMIT
+from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT
 
 from .problem_pages import PAGES, Fence, read_page
 

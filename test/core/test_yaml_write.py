@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import Span
-from automax_ros.core.yaml_text import Mapping, Node, Scalar, Sequence, read_yaml
-from automax_ros.core.yaml_write import yaml_of
+from automax_ros.core.yaml_text import Mapping, Node, Scalar, Sequence, read_yaml, yaml_of
 
 CONFIGS = sorted((Path(__file__).parent.parent.parent / "config").glob("**/*.yaml"))
 HERE = Span(1, 1, 2)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import yaml
 
-from automax_ros.nodes import prepare
+from automax_ros.ros.setup.environment import prepare
 
 PATIENCE_S = 240.0
 

@@ -12,16 +12,16 @@ import pytest
 from yaml_core import data_of
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.cli.main import module_of, parsers
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import Severity
 from automax_ros.language.checks.checker import check
-from automax_ros.language.syntax.task_kind import is_task_file
-from automax_ros.rack.loader import KEYS, load
-from automax_ros.rack.loader import schema as rack_schema
+from automax_ros.language.tree.task_kind import is_task_file
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.schema import schema as stimuli_schema
+from automax_ros.rackfile.loader import KEYS, load
+from automax_ros.rackfile.loader import schema as rack_schema
+from automax_ros.scenario.stimuli.schema import schema as stimuli_schema
 
 from .fences import PAGES, ROOT, Fence, fences
 from .scratch import commands, execute, prepare, session, shows, standing_in, write

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from automax_ros.cli.arguments import commands
+from automax_ros.cli.shell.arguments import commands
 from automax_ros.core.problems import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -2,9 +2,9 @@
 
 from math import radians
 
-from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.circuit.firing import ConstantAlpha
+from automax_ros.drive.plant.plant import DrivePlant, LoadData, PlantData
 
 MS = 1_000_000
 S = 1_000_000_000

@@ -4,10 +4,10 @@ from math import pi, radians
 
 from hypothesis import settings
 
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.motor import FixedLoad
+from automax_ros.drive.base.motor import FixedLoad
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.circuit.bridge import Bridge
+from automax_ros.drive.circuit.circuit import Circuit
 
 from .switched import LATER, WAYS, Switched
 

@@ -4,8 +4,8 @@ from math import cos, exp, pi, sqrt
 
 import pytest
 
-from automax_ros.drive.ac_line import AcLine, Rotation
-from automax_ros.drive.errors import ParameterError
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.circuit.ac_line import AcLine, Rotation
 
 SECOND = 1_000_000_000
 

@@ -4,13 +4,13 @@ from math import pi, sin, sqrt
 
 import pytest
 
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.errors import GateError, ParameterError, SourceShortError
-from automax_ros.drive.events import EventKind
-from automax_ros.drive.motor import FixedLoad
-from automax_ros.drive.scr import FORWARD, PARTNER, REVERSE
+from automax_ros.drive.base.errors import GateError, ParameterError, SourceShortError
+from automax_ros.drive.base.motor import FixedLoad
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.circuit.bridge import Bridge
+from automax_ros.drive.circuit.circuit import Circuit
+from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.circuit.scr import FORWARD, PARTNER, REVERSE
 
 from .support import circuit_of, fire_all, plan
 

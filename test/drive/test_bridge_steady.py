@@ -5,8 +5,8 @@ from math import acos, atan, cos, degrees, exp, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 
-from automax_ros.drive.errors import ParameterError, SteadyStateError
-from automax_ros.drive.steady import BridgeCase, steady_state, waveforms
+from automax_ros.drive.base.errors import ParameterError, SteadyStateError
+from automax_ros.drive.circuit.steady import BridgeCase, steady_state, waveforms
 
 from .switched import Switched
 

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import pytest
 
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.motor import FixedLoad
+from automax_ros.drive.base.motor import FixedLoad
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.circuit.bridge import Bridge
+from automax_ros.drive.circuit.circuit import Circuit
+from automax_ros.drive.circuit.firing import ConstantAlpha
 
 HOUR_NS = 3_600_000_000_000
 

@@ -5,13 +5,13 @@ from math import radians
 import numpy as np
 import pytest
 
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.events import EventKind
-from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.motor import Motor
-from automax_ros.drive.nameplate import EXAMPLES, derive
+from automax_ros.drive.base.motor import Motor
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.circuit.bridge import Bridge
+from automax_ros.drive.circuit.circuit import Circuit
+from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.circuit.firing import ConstantAlpha
 
 from .support import circuit_of, fire_all, oracle_gates, plan
 from .switched import Switched

@@ -4,8 +4,7 @@ from math import acos, cos, degrees, pi, radians, sqrt
 
 import pytest
 
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.limits import (
+from automax_ros.drive.assess.limits import (
     TABLE_3_MH_A,
     boundary_amps,
     delta_bound_deg,
@@ -14,8 +13,9 @@ from automax_ros.drive.limits import (
     ripple_amps,
     table_3_line_v,
 )
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.steady import BridgeCase, steady_state
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.circuit.steady import BridgeCase, steady_state
 
 TABLE_3 = """
     1500.0 0.8431 1.5644 2.1079 2.3466

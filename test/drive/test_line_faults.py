@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, PlantData
-from automax_ros.drive.plant_faults import active_faults, values_of, work_on
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.plant.faults import active_faults, values_of, work_on
+from automax_ros.drive.plant.plant import DrivePlant, PlantData
 
 S = 1_000_000_000
 

@@ -7,14 +7,14 @@ from statistics import fmean, pstdev
 
 import pytest
 
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.coupling import Coupling
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.motor import FieldWinding, FixedLoad, Motor, MotorData
-from automax_ros.drive.sensors import Resolver, Tachometer
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.motor import FieldWinding, FixedLoad, Motor, MotorData
+from automax_ros.drive.base.sensors import Resolver, Tachometer
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.circuit.bridge import Bridge
+from automax_ros.drive.circuit.circuit import Circuit
+from automax_ros.drive.circuit.firing import ConstantAlpha
+from automax_ros.drive.plant.coupling import Coupling
 
 SECOND = 1_000_000_000
 DATA = MotorData(0.1, 2e-3, 2.5, 1.5, 0.2, 0.0)

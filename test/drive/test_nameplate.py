@@ -4,8 +4,8 @@ from math import pi
 
 import pytest
 
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.nameplate import EXAMPLES, NamePlate, derive
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.nameplate import EXAMPLES, NamePlate, derive
 
 # amps, ohm, mH, EMF, k, shaft torque, kg m2, source mH
 KNOWN = {

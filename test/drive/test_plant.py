@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DROP_OUT_NS, PICK_UP_NS, SCR_DROP_V, DrivePlant, LoadData, PlantData
-from automax_ros.drive.plant_faults import VERBS, active_faults, values_of, work_on
-from automax_ros.drive.plant_signals import SIGNALS, signals_of
-from automax_ros.drive.scr import PARTNER
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.circuit.scr import PARTNER
+from automax_ros.drive.plant.faults import VERBS, active_faults, values_of, work_on
+from automax_ros.drive.plant.plant import DROP_OUT_NS, PICK_UP_NS, SCR_DROP_V, DrivePlant, LoadData, PlantData
+from automax_ros.drive.plant.signals import SIGNALS, signals_of
 
 from .plants import LOCKED, MS, S, closed, fired, plant_of
 from .support import repeatable

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.plant import PICK_UP_NS, LoadData
-from automax_ros.drive.plant_coupling import DAMPING_RATIO, CoupledPlants, CouplingData
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.plant.coupling import DAMPING_RATIO, CoupledPlants, CouplingData
+from automax_ros.drive.plant.plant import PICK_UP_NS, LoadData
 
 from .plants import MS, S, plant_of
 from .support import fire_all, plan, repeatable

@@ -5,11 +5,10 @@ from math import radians
 import numpy as np
 import pytest
 
-from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import PICK_UP_NS, DrivePlant, PlantData
-from automax_ros.drive.plant_meter import Means
-from automax_ros.drive.plant_signals import signals_of
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.circuit.firing import ConstantAlpha
+from automax_ros.drive.plant.plant import PICK_UP_NS, DrivePlant, Means, PlantData
+from automax_ros.drive.plant.signals import signals_of
 
 MS = 1_000_000
 

@@ -6,12 +6,12 @@ from math import exp
 
 import pytest
 
-from automax_ros.drive import pmi_table as table
-from automax_ros.drive.cml.latching import Latched
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
-from automax_ros.drive.pmi import Commands, Pmi, inputs_of
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop.inputs import Latched
+from automax_ros.drive.plant.plant import DrivePlant, LoadData, PlantData
+from automax_ros.drive.pmi import registers as table
+from automax_ros.drive.pmi.pmi import Commands, Pmi, inputs_of
 
 READY = Commands(inputs=table.PERMITTED, linked=True, fed=True)
 

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.bridge import Bridge
-from automax_ros.drive.circuit import Circuit
-from automax_ros.drive.coupling import Coupling
-from automax_ros.drive.errors import ParameterError
-from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.drive.motor import FieldWinding, FixedLoad, Motor
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.sensors import Resolver, Tachometer
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.motor import FieldWinding, FixedLoad, Motor
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.base.sensors import Resolver, Tachometer
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.circuit.bridge import Bridge
+from automax_ros.drive.circuit.circuit import Circuit
+from automax_ros.drive.circuit.firing import ConstantAlpha
+from automax_ros.drive.plant.coupling import Coupling
 
 from .support import repeatable
 from .switched import WAYS

@@ -8,7 +8,7 @@ from statistics import fmean, pstdev
 
 import pytest
 
-from automax_ros.drive.sync_signal import SyncSignal, first_rise, random_number
+from automax_ros.drive.plant.sync_signal import SyncSignal, first_rise, random_number
 
 CYCLE_US = 1e6 / 60
 WIDTH = 300 / CYCLE_US

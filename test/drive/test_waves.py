@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from automax_ros.drive.waves import Moments, Piece, bound, first_zero
+from automax_ros.drive.circuit.waves import Moments, Piece, bound, first_zero
 
 from .support import repeatable
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.core.diagnostics import Diagnostic, SourceText
 from automax_ros.language.checks.checker import CheckResult, check
 from automax_ros.language.program import CommonSpec, Program

@@ -8,9 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 from random import Random
 
-from automax_ros.language.syntax.functions import FUNCTIONS, REFUSED_FUNCTIONS
-from automax_ros.language.syntax.tokens import BASIC_TASK_WORDS, RESERVED_WORDS
-from automax_ros.language.syntax.unknown import FOREIGN_WORDS
+from automax_ros.language.parse.unknown import FOREIGN_WORDS
+from automax_ros.language.text.tokens import BASIC_TASK_WORDS, RESERVED_WORDS
+from automax_ros.language.tree.functions import FUNCTIONS, REFUSED_FUNCTIONS
 
 PAGE = Path(__file__).parents[2] / "docs" / "grammar.md"
 END_OF_LINE = "\n"

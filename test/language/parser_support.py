@@ -1,8 +1,8 @@
 """Short ways for the parser's tests: the statements of a text that has no problems."""
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.language.syntax.parser import parse
-from automax_ros.language.syntax.tree import Assignment, Expression, Module, Statement
+from automax_ros.language.parse.parser import parse
+from automax_ros.language.tree.tree import Assignment, Expression, Module, Statement
 
 
 def module_of(text: str) -> Module:

@@ -4,10 +4,10 @@ import dataclasses
 
 from hypothesis import strategies as st
 
-from automax_ros.language.syntax.expressions import LEVELS
-from automax_ros.language.syntax.functions import FUNCTIONS
-from automax_ros.language.syntax.printer import numbered
-from automax_ros.language.syntax.tree import (
+from automax_ros.language.parse.expressions import LEVELS
+from automax_ros.language.printer import numbered
+from automax_ros.language.tree.functions import FUNCTIONS
+from automax_ros.language.tree.tree import (
     Argument,
     Assignment,
     Binary,

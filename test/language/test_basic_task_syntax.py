@@ -7,15 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import CheckResult, check
+from automax_ros.language.parse.parser import parse
+from automax_ros.language.printer import numbered, print_module
 from automax_ros.language.program import OpenedFile
-from automax_ros.language.syntax.parser import parse
-from automax_ros.language.syntax.printer import numbered, print_module
-from automax_ros.language.syntax.task_kind import NotATask, TaskKind, kind_of_file
-from automax_ros.language.syntax.tree import Module, SetEvent
-from automax_ros.language.syntax.waiting_tree import (
+from automax_ros.language.tree.basic_tree import (
     ITEM_TYPES,
     Close,
     Delay,
@@ -30,6 +28,8 @@ from automax_ros.language.syntax.waiting_tree import (
     Unit,
     WaitOn,
 )
+from automax_ros.language.tree.task_kind import NotATask, TaskKind, kind_of_file
+from automax_ros.language.tree.tree import Module, SetEvent
 from language.random_trees import EXPRESSIONS, LINES, TARGETS, WORDS
 
 FILES = st.integers(0, 300)

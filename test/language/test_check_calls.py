@@ -5,11 +5,11 @@ import math
 import pytest
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import stored_real
 from automax_ros.language.program import BoundCall
-from automax_ros.language.syntax.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Reference, Unary
+from automax_ros.language.tree.tree import BooleanLiteral, IntegerLiteral, RealLiteral, Reference, Unary
 
 from .check_support import codes, one, problems, program, task
 

@@ -2,12 +2,12 @@
 
 import pytest
 
-from automax_ros.blocks.declaration import Platform
+from automax_ros.blocks.declare.declaration import Platform
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.numbers import INT16_MAX, INT16_MIN, REAL_MAX, stored_real
 from automax_ros.core.types import DataType
 from automax_ros.language.program import CommonSpec, TuningLimits
-from automax_ros.language.syntax.tree import Scope
+from automax_ros.language.tree.tree import Scope
 
 from .check_support import codes, one, problems, program, task
 

@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Form, Input, Platform
+from automax_ros.blocks.declare.declaration import Form, Input, Platform
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType
-from automax_ros.language.syntax.tree import Reference
+from automax_ros.language.tree.tree import Reference
 
 from .check_support import check_text, codes, one, problems, program
 

@@ -4,7 +4,7 @@ import pytest
 
 from automax_ros.core.diagnostics import Span
 from automax_ros.core.problems import Severity
-from automax_ros.language.syntax.tree import Assignment, Call, Data, Declaration, End, Remark
+from automax_ros.language.tree.tree import Assignment, Call, Data, Declaration, End, Remark
 
 from .check_support import check_text, codes, one, problems, program, task
 

@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Form, Input, Platform
+from automax_ros.blocks.declare.declaration import Form, Input, Platform
 from automax_ros.core.diagnostics import has_errors
 from automax_ros.core.problems import PROBLEMS
 from automax_ros.core.types import DataType

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from automax_ros.core.diagnostics import in_order
-from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT
+from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT
 
 from .check_support import check_text, codes, one, problems, program, task
 

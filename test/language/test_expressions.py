@@ -3,8 +3,9 @@
 import pytest
 
 from automax_ros.core.types import DataType
-from automax_ros.language.syntax.functions import FUNCTIONS, Result
-from automax_ros.language.syntax.tree import (
+from automax_ros.language.checks.rules.unconfirmed import UNCONFIRMED_FUNCTIONS, UNCONFIRMED_STATEMENTS
+from automax_ros.language.tree.functions import FUNCTIONS, Result
+from automax_ros.language.tree.tree import (
     Binary,
     BooleanLiteral,
     Element,
@@ -16,7 +17,6 @@ from automax_ros.language.syntax.tree import (
     StringLiteral,
     Unary,
 )
-from automax_ros.language.syntax.unconfirmed import UNCONFIRMED_FUNCTIONS, UNCONFIRMED_STATEMENTS
 from language.parser_support import codes_of, expression_of
 
 A, B, C = Reference("A%"), Reference("B%"), Reference("C%")

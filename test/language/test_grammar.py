@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS, Severity
-from automax_ros.language.syntax.declarations import EVENT_KEYS, TUNING_KEYS
-from automax_ros.language.syntax.expressions import LEVELS
-from automax_ros.language.syntax.functions import FUNCTIONS
-from automax_ros.language.syntax.lexer import LineLexer
-from automax_ros.language.syntax.parser import parse
-from automax_ros.language.syntax.statements import SIMPLE_STATEMENTS
-from automax_ros.language.syntax.tokens import BOOLEAN_WORDS, OPERATOR_WORDS, RESERVED_WORDS, STATEMENT_WORDS
-from automax_ros.language.syntax.unknown import FOREIGN_WORDS
-from automax_ros.language.syntax.waiting import WAITING_KEYS, WAITING_STATEMENTS
+from automax_ros.language.parse.basic_statements import WAITING_KEYS, WAITING_STATEMENTS
+from automax_ros.language.parse.declarations import EVENT_KEYS, TUNING_KEYS
+from automax_ros.language.parse.expressions import LEVELS
+from automax_ros.language.parse.parser import parse
+from automax_ros.language.parse.statements import SIMPLE_STATEMENTS
+from automax_ros.language.parse.unknown import FOREIGN_WORDS
+from automax_ros.language.text.lexer import LineLexer
+from automax_ros.language.text.tokens import BOOLEAN_WORDS, OPERATOR_WORDS, RESERVED_WORDS, STATEMENT_WORDS
+from automax_ros.language.tree.functions import FUNCTIONS
 
 from .grammar import OTHER_ANSWERS, RULES, TOKENS, Recognizer, has_a_key_twice, is_token, text_of, tokens_of, words
 

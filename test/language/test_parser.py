@@ -3,8 +3,8 @@
 import pytest
 
 from automax_ros.core.diagnostics import SourceText, Span
-from automax_ros.language.syntax.parser import parse
-from automax_ros.language.syntax.tree import (
+from automax_ros.language.parse.parser import parse
+from automax_ros.language.tree.tree import (
     Argument,
     Assignment,
     Binary,

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import SourceText, render_all
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.language.syntax.parser import SOURCE_LIMIT, parse
-from automax_ros.language.syntax.printer import print_module
-from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT
-from automax_ros.language.syntax.tokens import BASIC_TASK_WORDS, RESERVED_WORDS
-from automax_ros.language.syntax.tree import For, If, Label, Module, Remark, Statement
+from automax_ros.language.parse.parser import SOURCE_LIMIT, parse
+from automax_ros.language.printer import print_module
+from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT
+from automax_ros.language.text.tokens import BASIC_TASK_WORDS, RESERVED_WORDS
+from automax_ros.language.tree.tree import For, If, Label, Module, Remark, Statement
 from language.random_trees import modules
 
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.language.syntax.parser import parse
-from automax_ros.language.syntax.printer import LINE_WIDTH, numbered, print_expression, print_module
-from automax_ros.language.syntax.tree import (
+from automax_ros.language.parse.parser import parse
+from automax_ros.language.printer import LINE_WIDTH, numbered, print_expression, print_module
+from automax_ros.language.tree.tree import (
     Assignment,
     Declaration,
     Declared,

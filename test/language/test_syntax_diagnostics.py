@@ -7,8 +7,8 @@ from golden_text import GOLDEN, check_golden
 
 from automax_ros.core.diagnostics import Diagnostic, SourceText, render_all
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.language.syntax.parser import SOURCE_LIMIT, parse
-from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT
+from automax_ros.language.parse.parser import SOURCE_LIMIT, parse
+from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT
 
 TEXTS = sorted((GOLDEN / "diagnostics").glob("syntax_*.BLK"))
 LARGE = {"AMX0001", "AMX0002", "AMX0005", "AMX0006"}

@@ -5,8 +5,8 @@ import itertools
 import pytest
 
 from automax_ros.core.types import DataType
-from automax_ros.language.checks.typing_rules import LOGICAL, RELATIONAL, binary_type, type_of, unary_type
-from automax_ros.language.syntax.tree import Binary, IntegerLiteral, Reference, Unary
+from automax_ros.language.checks.rules.typing_rules import LOGICAL, RELATIONAL, binary_type, type_of, unary_type
+from automax_ros.language.tree.tree import Binary, IntegerLiteral, Reference, Unary
 
 N, D, R, B, S = DataType.INTEGER, DataType.DOUBLE, DataType.REAL, DataType.BOOLEAN, DataType.STRING
 ARITHMETIC = frozenset({"+", "-", "*", "/", "**"})

@@ -3,7 +3,7 @@
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
-from automax_ros.language.written import lines_that_write, places_that_write
+from automax_ros.language.program import lines_that_write, places_that_write
 
 
 def program(name: str, text: str):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.instance import Instance
+from automax_ros.blocks.declare.instance import Instance
 from automax_ros.logix.pmul import PulseMultiplier
 
 from .support import BITS, repeatable, set_bits

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.logix.pulse_comparison import Pair, PulseComparison
-from automax_ros.logix.pulse_conversion import ConversionError, PulseParameters
+from automax_ros.logix.pulse_comparison import ConversionError, Pair, PulseComparison, PulseParameters
 
 from .support import repeatable
 

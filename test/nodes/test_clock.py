@@ -8,12 +8,12 @@ import pytest
 from system.support import TYPES, ns, wait_until
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.nodes.door import MOST_OF_ONE, MOST_ROUNDS_FIRST, Door
-from automax_ros.nodes.ros_arguments import split_arguments
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.writers import ROS_WRITER
-from automax_ros.running.simulated_pacer import LEAST_TICK_NS, MOST_TICK_NS, SimulatedTime
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.writers import ROS_WRITER
+from automax_ros.ros.intake.intake import MOST_OF_ONE, MOST_ROUNDS_FIRST, Door
+from automax_ros.ros.setup.arguments import split_arguments
+from automax_ros.runtime.time.simulated_pacer import LEAST_TICK_NS, MOST_TICK_NS, SimulatedTime
 
 from .support import until
 from .test_requests import parameter
@@ -25,7 +25,7 @@ STEP_NS = 20 * NS_PER_MS
 @pytest.fixture
 def made(ros_domain_id):
     """Live racks in simulated time, or with ROS arguments; closed at the end."""
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     lives: list[LiveRack] = []
 
@@ -329,7 +329,7 @@ def test_flood_of_writes_does_not_stop_the_clock(monkeypatch):
     write, clock = Way("write", log, range(100_000)), Way("clock", log, [1, 2, 3])
     door = Door(lambda what, error: pytest.fail(f"{what}: {error}"))
     door._last = clock
-    monkeypatch.setattr("automax_ros.nodes.door.time.sleep", lambda _: None)
+    monkeypatch.setattr("automax_ros.ros.intake.intake.time.sleep", lambda _: None)
 
     def woken(_):
         door._closing = not clock.messages

@@ -9,11 +9,11 @@ import pytest
 from bags.live_racks import build
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.rack.halting import Halting
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.rack.operator.halting import Halting
 from automax_ros.rack.rack import Rack
-from automax_ros.running.health import Health
-from automax_ros.running.pacer import Pacer
-from automax_ros.wire.stream import RackStream
+from automax_ros.runtime.health import Health
+from automax_ros.runtime.time.pacer import Pacer
 
 from .support import until
 
@@ -54,11 +54,11 @@ class World:
     """A rack on that clock, with its health and that of its Processor; ``sent`` are (ms of rack time, message)."""
 
     def __init__(self, config, monkeypatch) -> None:
-        from automax_ros.nodes.diagnostics import Diagnostics
-        from automax_ros.nodes.rack_health import RackHealth
+        from automax_ros.ros.base.diagnostics import Diagnostics
+        from automax_ros.ros.base.rack_health import RackHealth
 
         self.wall, self.rack = Wall(), Rack(config)
-        monkeypatch.setattr("automax_ros.nodes.throttle.time.monotonic", lambda: self.wall.now_ns / NS_PER_S)
+        monkeypatch.setattr("automax_ros.ros.intake.guard.time.monotonic", lambda: self.wall.now_ns / NS_PER_S)
         self.stream = RackStream(self.rack, 77)
         self.pacer = Pacer(self.rack.scheduler, clock=self.wall, wait=self.wall.wait)
         self.diagnostics = Diagnostics()
@@ -86,7 +86,7 @@ class World:
         self.sent.append((self.rack.now_ns / NS_PER_MS, message.status))
 
     def _task(self, _):
-        from automax_ros.nodes.diagnostics import status_of
+        from automax_ros.ros.base.diagnostics import status_of
 
         (task,) = self.rack.tasks
         level = b"\x01" if task.errors.count else b"\x00"
@@ -209,7 +209,7 @@ def test_skipped_scans_and_troubles_are_warnings_until_the_next_report(world) ->
 def test_the_worst_level_counts() -> None:
     from diagnostic_msgs.msg import DiagnosticStatus
 
-    from automax_ros.nodes.diagnostics import status_of, worst
+    from automax_ros.ros.base.diagnostics import status_of, worst
 
     levels = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
     made = [status_of("n", "h", level, "", {}) for level in levels]
@@ -220,7 +220,7 @@ def test_a_basic_task_that_has_done_its_work_is_well(ros_domain_id, client, tmp_
     """One that has come to a STOP is not."""
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     for name, last in (("ONCE", "END"), ("HALT", "STOP\n30 END")):
         (tmp_path / f"{name}.BAS").write_text(f"10 COMMON NIL%\n20 {last}\n")

@@ -6,11 +6,10 @@ from collections import deque
 import pytest
 from system.support import wait_until
 
-from automax_ros.nodes import door as door_module
-from automax_ros.nodes import rcl
-from automax_ros.nodes.door import MOST_A_ROUND, MOST_OF_ONE, Door
-from automax_ros.nodes.senders import MOST_SENDERS, Senders
-from automax_ros.nodes.taking import Taken
+from automax_ros.ros.intake import intake as door_module
+from automax_ros.ros.intake import rcl
+from automax_ros.ros.intake.intake import MOST_A_ROUND, MOST_OF_ONE, Door
+from automax_ros.ros.intake.raw_messages import MOST_SENDERS, Senders, Taken
 
 
 class Way:

@@ -17,9 +17,9 @@ from rclpy.qos import (
     qos_profile_sensor_data,
 )
 
-from automax_ros.nodes.rack_nodes import RackNodes
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.rack_nodes import RackNodes
 
 CONFIG = Path(__file__).parents[2] / "config"
 WITHOUT_END = {

@@ -12,7 +12,7 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from system.support import wait_until
 
-from automax_ros.nodes.executor import take_out
+from automax_ros.ros.setup.process import take_out
 
 LIMIT_S = 240.0
 
@@ -41,7 +41,7 @@ def executor(request, context):
 
 
 def test_nodes_are_let_go_of_before_they_may_be_destroyed(context, executor, monkeypatch):
-    monkeypatch.setattr("automax_ros.nodes.executor._ANSWER_S", LIMIT_S)  # however slow the host is
+    monkeypatch.setattr("automax_ros.ros.setup.process._ANSWER_S", LIMIT_S)  # however slow the host is
     node, ended, failed = Watched(context), threading.Event(), []
 
     def spin():

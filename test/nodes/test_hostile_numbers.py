@@ -5,8 +5,8 @@ import math
 import pytest
 from system.support import RACKS, Client
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 from .support import until
 from .test_requests import parameter
@@ -18,7 +18,7 @@ LONG = "A" * 900_000
 
 @pytest.fixture
 def live(ros_domain_id):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     made = LiveRack(Rack(load(RACKS / "operated" / "rack.yaml").config))
     made.start([])

@@ -8,9 +8,9 @@ import pytest
 from system.support import TYPES, Client
 
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.nodes import executor as executor_module
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.setup import process as executor_module
 
 from .support import PATIENCE_NS
 
@@ -41,7 +41,7 @@ class Observer:
 @pytest.fixture
 def live(ros_domain_id):
     """A live rack that is closed at the end."""
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     config = load(TYPES).config
     assert config is not None
@@ -133,7 +133,7 @@ def test_single_threaded_executor_stands_in(ros_domain_id, monkeypatch):
     from rclpy.executors import SingleThreadedExecutor
     from std_msgs.msg import Int16
 
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     monkeypatch.setattr(executor_module, "dispatches", lambda *_: False)
     config = load(TYPES).config
@@ -184,7 +184,7 @@ def test_executor_that_dispatches_is_found(ros_domain_id):
 
 
 def test_closing_before_the_start_is_clean(ros_domain_id):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     config = load(TYPES).config
     assert config is not None
@@ -194,9 +194,9 @@ def test_closing_before_the_start_is_clean(ros_domain_id):
 
 
 def test_two_topics_of_one_name_are_refused_with_the_reason(ros_domain_id):
-    from automax_ros.nodes.environment import RosUnavailable
-    from automax_ros.nodes.launcher import LiveRack
-    from automax_ros.nodes.ros_arguments import split_arguments
+    from automax_ros.ros.rack_nodes import LiveRack
+    from automax_ros.ros.setup.arguments import split_arguments
+    from automax_ros.ros.setup.environment import RosUnavailable
 
     arguments = split_arguments(["--ros-args", "-r", "scans:=states"])[1]
     with pytest.raises(RosUnavailable, match="existing topic name rt/types/states with incompatible type") as caught:

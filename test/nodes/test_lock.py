@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from automax_ros.nodes.environment import RosUnavailable
-from automax_ros.nodes.lock import LockError, RackAlreadyRuns, RackLock, domain_id
+from automax_ros.ros.setup.environment import RosUnavailable
+from automax_ros.ros.setup.lock import LockError, RackAlreadyRuns, RackLock, domain_id
 
 
 @pytest.fixture(autouse=True)

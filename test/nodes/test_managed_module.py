@@ -5,9 +5,9 @@ import shutil
 import pytest
 from system.support import RACKS, TYPES
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.task import Status
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.tasks.task import Status
 
 from .managing import ACTIVE, FINALIZED, INACTIVE, UNCONFIGURED, Manager
 from .support import until
@@ -45,7 +45,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def live(ros_domain_id, folder):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     made = LiveRack(Rack(load(folder / "rack.yaml").config))
     made.told = Told()
@@ -138,7 +138,7 @@ def test_shutdown_of_a_module_takes_its_tasks_out(live, manager):
 
 
 def test_an_error_of_ours_stops_everything(live, manager, monkeypatch):
-    from automax_ros.rack.module_tasks import ModuleTasks
+    from automax_ros.rack.operator.module_tasks import ModuleTasks
 
     def broken(_):
         raise ZeroDivisionError("a bug")
@@ -154,7 +154,7 @@ def test_an_error_of_ours_stops_everything(live, manager, monkeypatch):
 
 
 def test_a_critical_task_does_not_stop_alone(ros_domain_id, client):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     live = LiveRack(Rack(load(RACKS / "operated" / "rack.yaml").config))
     try:
@@ -168,7 +168,7 @@ def test_a_critical_task_does_not_stop_alone(ros_domain_id, client):
 
 
 def test_without_an_operator_nobody_may_ask(ros_domain_id, client):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     live = LiveRack(Rack(load(TYPES).config))
     try:

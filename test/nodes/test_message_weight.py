@@ -2,14 +2,14 @@
 
 import pytest
 
-from automax_ros.nodes.message_weight import MOST, OF_A_MESSAGE, OF_A_TEXT, TooHeavy, weight
+from automax_ros.ros.intake.request_size import MOST, OF_A_MESSAGE, OF_A_TEXT, TooHeavy, weight
 
 
 @pytest.fixture
 def weigh(ros_domain_id):
     from rclpy.type_support import check_is_valid_srv_type
 
-    from automax_ros.nodes.requests import Conversion
+    from automax_ros.ros.intake.service_requests import Conversion
 
     def weighed(kind, request):
         check_is_valid_srv_type(kind)

@@ -9,7 +9,7 @@ from rack.modules.network_racks import LINE, MASTER, SLAVE, WIND, built, station
 from system.support import wait_until
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.ros_names import network_topic
+from automax_ros.rackfile.model.ros_names import network_topic
 
 
 class Linked:
@@ -27,7 +27,7 @@ class Linked:
 
         from rclpy.executors import SingleThreadedExecutor
 
-        from automax_ros.nodes import RackNodes
+        from automax_ros.ros.rack_nodes import RackNodes
 
         nodes, executor = RackNodes(rack, context=self.context), SingleThreadedExecutor(context=self.context)
         nodes.add_to(executor)
@@ -105,9 +105,9 @@ def test_strangers_do_no_harm(linked, tmp_path: Path):
     from automax_msgs.msg import NetworkDrop
     from rclpy.node import Node
 
-    from automax_ros.nodes.network import MOST_BYTES
-    from automax_ros.nodes.topics import ros_qos
-    from automax_ros.wire.qos import NETWORK
+    from automax_ros.messages.types.topics import NETWORK
+    from automax_ros.ros.base.qos import ros_qos
+    from automax_ros.ros.nodes.network import MOST_BYTES
 
     line = linked.add(built(tmp_path / "line", MASTER, LINE))
     stranger = Node("stranger", context=linked.context)

@@ -11,7 +11,7 @@ class Graph:
     """What is seen in the graph, look by look."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, racks: int, operators: int) -> None:
-        from automax_ros.nodes.operating import RackClient
+        from automax_ros.ros.clients.rack_client import RackClient
 
         monkeypatch.setattr(RackClient, "_racks", lambda _: racks)
         monkeypatch.setattr(RackClient, "_nodes", lambda _, name: {"operator": operators}.get(name, 1))
@@ -27,7 +27,7 @@ class Graph:
     ],
 )
 def test_a_rack_that_cannot_be_operated_is_named_with_the_reason(ros_domain_id, monkeypatch, racks, operators, reason):
-    from automax_ros.nodes.operating import NotOperable, RackClient
+    from automax_ros.ros.clients.rack_client import NotOperable, RackClient
 
     Graph(monkeypatch, racks, operators)
     with RackClient("/pm1") as client, pytest.raises(NotOperable) as refused:
@@ -37,7 +37,7 @@ def test_a_rack_that_cannot_be_operated_is_named_with_the_reason(ros_domain_id, 
 
 
 def test_a_second_rack_of_the_name_that_is_seen_later_is_not_operated_either(ros_domain_id, monkeypatch):
-    from automax_ros.nodes.operating import ALONE_NS, NotOperable, RackClient
+    from automax_ros.ros.clients.rack_client import ALONE_NS, NotOperable, RackClient
 
     Graph(monkeypatch, 1, 1)
     looks = iter([1, 1, 1])
@@ -52,7 +52,7 @@ def test_a_second_rack_of_the_name_that_is_seen_later_is_not_operated_either(ros
 def test_a_service_that_does_not_answer_is_an_error_and_not_a_wait(ros_domain_id, monkeypatch):
     from std_srvs.srv import Trigger
 
-    from automax_ros.nodes.operating import NotOperable, RackClient
+    from automax_ros.ros.clients.rack_client import NotOperable, RackClient
 
     Graph(monkeypatch, 1, 1)
     with RackClient("/pm1") as client:
@@ -66,7 +66,7 @@ def test_an_answer_that_cannot_be_read_is_an_error_and_no_traceback(ros_domain_i
     from rclpy.impl.implementation_singleton import rclpy_implementation
     from std_srvs.srv import Trigger
 
-    from automax_ros.nodes.operating import NotOperable, RackClient
+    from automax_ros.ros.clients.rack_client import NotOperable, RackClient
 
     def malformed(*_, **__):
         raise rclpy_implementation.RCLError("Failed to take response from service")

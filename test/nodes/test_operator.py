@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 from .support import until
 
@@ -18,7 +18,7 @@ OPERATED = Path(__file__).parents[1] / "system" / "racks" / "operated" / "rack.y
 
 @pytest.fixture
 def live(ros_domain_id):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     made = LiveRack(Rack(load(OPERATED).config, stopwatch=time.monotonic_ns))
     made.start([])

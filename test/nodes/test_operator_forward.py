@@ -10,8 +10,8 @@ import pytest
 from rack.bus.parts import SEATS, config_in
 
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.messages.types.rack_files import files_of
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.rack_files import files_of
 
 from .support import PATIENCE_NS
 
@@ -24,8 +24,8 @@ def running(folder, **seating):
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
 
-    from automax_ros.nodes.bus import Seating
-    from automax_ros.nodes.rack_nodes import RackNodes
+    from automax_ros.ros.distributed.bus import Seating
+    from automax_ros.ros.rack_nodes import RackNodes
 
     config = config_in(folder)
     context = Context()
@@ -62,7 +62,7 @@ def ask(racks):
     from automax_msgs import srv
     from std_srvs.srv import Trigger
 
-    from automax_ros.nodes.operating import RackClient
+    from automax_ros.ros.clients.rack_client import RackClient
 
     ended = threading.Event()
 

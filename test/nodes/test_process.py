@@ -10,9 +10,9 @@ import pytest
 from rclpy.node import Node
 from system.support import wait_until
 
-from automax_ros.nodes.guard import Guard
-from automax_ros.nodes.process import RosProcess
-from automax_ros.running.health import Health
+from automax_ros.ros.intake.guard import Guard
+from automax_ros.ros.setup.process import RosProcess
+from automax_ros.runtime.health import Health
 
 ROOT = Path(__file__).parents[2]
 LEAVING = """
@@ -23,9 +23,9 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from std_msgs.msg import Int16
 
-from automax_ros.nodes.guard import Guard
-from automax_ros.nodes.process import RosProcess
-from automax_ros.running.health import Health
+from automax_ros.ros.intake.guard import Guard
+from automax_ros.ros.setup.process import RosProcess
+from automax_ros.runtime.health import Health
 
 TOPICS, CYCLES = [f"t{number}" for number in range(10)], 4
 other, over, met = Context(), threading.Event(), threading.Event()

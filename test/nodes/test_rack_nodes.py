@@ -12,10 +12,10 @@ from system.support import PATIENCE_S, RACKS, TYPES, wait_until
 from automax_ros.compile.compiler import compile_program
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.rack.installation import RackError
-from automax_ros.rack.loader import load
-from automax_ros.rack.observers import Observers
+from automax_ros.rack.base.observers import Observers
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
 
 ROOT = Path(__file__).parents[2]
 
@@ -32,7 +32,7 @@ def executor(request, context):
 
 @pytest.fixture
 def nodes(context):
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     with RackNodes(TYPES, context=context) as made:
         yield made
@@ -124,7 +124,7 @@ def test_nothing_stays_in_the_graph(context, executor):
     """Neither nodes nor topics nor services, but for one that rclpy leaves of each node: the process lives on."""
     from rclpy.node import Node
 
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     witness = Node("witness", context=context)
     executor.add_node(witness)
@@ -144,7 +144,7 @@ def test_nothing_stays_in_the_graph(context, executor):
 
 
 def test_two_racks_share_a_process(context, executor, tmp_path):
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     (tmp_path / "rack.yaml").write_text(
         "rack: OTHER\nslots:\n  0: {module: 57C435, tasks: {T: {priority: 5}}}\ncommon:\n  COUNT%:\n"
@@ -158,7 +158,7 @@ def test_two_racks_share_a_process(context, executor, tmp_path):
 
 
 def test_rack_of_ones_own_and_closing_before_the_start(context):
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     rack = Rack(load(TYPES).config)
     nodes = RackNodes(rack, context=context)
@@ -171,7 +171,7 @@ def test_rack_of_ones_own_and_closing_before_the_start(context):
 
 
 def test_file_with_errors_says_so(context, tmp_path):
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     (tmp_path / "rack.yaml").write_text("rack: [\n")
     with pytest.raises(RackError, match=r"rack\.yaml has errors") as caught:
@@ -179,20 +179,15 @@ def test_file_with_errors_says_so(context, tmp_path):
     assert caught.value.findings
 
 
-def test_face_of_the_room_needs_no_rclpy():
+def test_what_prepares_ros_needs_no_rclpy():
     """``prepare`` must be there before rclpy is imported."""
-    program = "import sys, automax_ros.nodes as nodes; assert 'rclpy' not in sys.modules; assert nodes.__all__"
+    program = "import sys; from automax_ros import prepare; assert 'rclpy' not in sys.modules"
     subprocess.run([sys.executable, "-c", program], check=True)
-    import automax_ros.nodes
-
-    assert all(hasattr(automax_ros.nodes, name) for name in automax_ros.nodes.__all__)
-    with pytest.raises(AttributeError):
-        _ = automax_ros.nodes.nothing
 
 
 def test_every_kind_of_module_has_its_node_or_none():
-    from automax_ros.nodes.registry import NODES
-    from automax_ros.rack.modules.registry import KINDS
+    from automax_ros.rackfile.modules.registry import KINDS
+    from automax_ros.ros.nodes.registry import NODES
 
     assert set(NODES) == set(KINDS)
 
@@ -204,7 +199,7 @@ def test_digital_modules_show_their_registers(context, tmp_path):
     from rclpy.node import Node
     from std_msgs.msg import Bool
 
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     (tmp_path / "rack.yaml").write_text(
         "rack: IO\nslots:\n  0: {module: 57C413}\n  1: {module: 57C435, tasks: {T: {priority: 5}}}\n"
@@ -243,7 +238,7 @@ def test_digital_modules_show_their_registers(context, tmp_path):
 def test_parameters_are_those_of_the_source_that_runs(context):
     from rclpy.parameter import Parameter
 
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     with RackNodes(TYPES, context=context) as nodes:
         node = next(node for node in nodes.nodes if node.get_name() == "processor_1")
@@ -262,7 +257,7 @@ def test_parameters_are_those_of_the_source_that_runs(context):
 
 def test_what_is_done_under_the_lock_happens_in_the_present(context):
     """Else a task put into RUN while nothing was due would begin in the past, and count scans as skipped."""
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     with RackNodes(TYPES, context=context) as nodes:
         with nodes.lock:
@@ -281,7 +276,7 @@ def test_a_rack_scans_while_a_new_source_is_compiled(context, executor, monkeypa
     from automax_msgs.srv import Reload
     from rclpy.node import Node
 
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     folder = RACKS / "operated"
     source = (folder / "SPEED.BLK").read_text()
@@ -298,7 +293,7 @@ def test_a_rack_scans_while_a_new_source_is_compiled(context, executor, monkeypa
     with RackNodes(folder / "rack.yaml", context=context) as nodes:
         told = []
         monkeypatch.setattr(Observers, "operated", lambda _, operation: told.append(operation))
-        monkeypatch.setattr("automax_ros.rack.installation.compile_program", slow)
+        monkeypatch.setattr("automax_ros.rack.tasks.installation.compile_program", slow)
         nodes.add_to(executor)
         nodes.start()
         spin_until(executor, client.service_is_ready)

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from system.support import TYPES, wait_until
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 from .support import until
 
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def live(ros_domain_id):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     made = LiveRack(Rack(load(TYPES).config))
     made.start([])
@@ -78,7 +78,7 @@ def test_simulated_time_of_a_launch_file_does_not_reach_the_rack(ros_domain_id):
     """The parameter is set for all nodes of a context there."""
     from rclpy.context import Context
 
-    from automax_ros.nodes import RackNodes
+    from automax_ros.ros.rack_nodes import RackNodes
 
     context = Context()
     context.init(args=["--ros-args", "-p", "use_sim_time:=true"])
@@ -197,8 +197,8 @@ def services(client):
 def test_player_goes_on_too(ros_domain_id, client):
     from rcl_interfaces.srv import SetParameters
 
-    from automax_ros.bags.playback import Renaming, survey
-    from automax_ros.nodes.player import Player
+    from automax_ros.recordings.read.playback import Renaming, survey
+    from automax_ros.ros.clients.player import Player
 
     found = survey(ROOT / "bags" / "section_drive")
     player = Player(found, Renaming(found.spaces, None), 1.0, clock=True)

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.nodes.discovery_range import choose_range, range_text
-from automax_ros.nodes.ros_arguments import LONGEST_WORD, RosArgumentsError, split_arguments
+from automax_ros.ros.setup.arguments import LONGEST_WORD, RosArgumentsError, split_arguments
+from automax_ros.ros.setup.discovery import choose_range, range_text
 
 
 def split(text, **environ):

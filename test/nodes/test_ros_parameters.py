@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.nodes.ros_arguments import split_arguments
-from automax_ros.nodes.ros_parameters import GivenParameter, RosArgumentsError, parameter_of, parameters_of
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.setup.arguments import split_arguments
+from automax_ros.ros.setup.parameter_files import GivenParameter, RosArgumentsError, parameter_of, parameters_of
 
 ROOT = Path(__file__).parents[2]
 FILE = """\

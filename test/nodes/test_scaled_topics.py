@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 from .support import until
 
@@ -27,7 +27,7 @@ TASK = "10 COMMON PRESSURE%, SPEED%\n20 CALL SCAN_LOOP(TICKS=1)\n30 SPEED% = -PR
 
 @pytest.fixture
 def live(ros_domain_id, tmp_path: Path):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     (tmp_path / "T.BLK").write_text(TASK)
     (tmp_path / "rack.yaml").write_text(RACK)

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from system.support import TYPES
 
-from automax_ros.nodes.ros_arguments import split_arguments
-from automax_ros.nodes.ros_parameters import RosArgumentsError
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.setup.arguments import split_arguments
+from automax_ros.ros.setup.parameter_files import RosArgumentsError
 
 from .support import until
 from .test_requests import answer, parameter
@@ -17,7 +17,7 @@ from .test_requests import answer, parameter
 @pytest.fixture
 def started(ros_domain_id):
     """A live rack with ROS arguments, and after them those with which a second one begins."""
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     lives: list[LiveRack] = []
 
@@ -50,7 +50,7 @@ def test_tunables_have_the_values_given(started, tmp_path):
 
 def test_they_are_recorded_with_the_states_at_the_start(started):
     """What a recording begins with has them, as after a power-up."""
-    from automax_ros.wire.cdr import decode
+    from automax_ros.messages.cdr.cdr import decode
 
     states = []
     live = started("-p", "FAST.TRIM:=7")

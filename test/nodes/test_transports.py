@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.nodes.discovery_range import choose_range, range_text
-from automax_ros.nodes.transports import announce_soon, avoid_shared_memory
+from automax_ros.ros.setup.discovery import announce_soon, avoid_shared_memory, choose_range, range_text
 
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 PROFILES, TRANSPORTS = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS"

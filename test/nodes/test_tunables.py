@@ -2,10 +2,10 @@
 
 import pytest
 
-from automax_ros.nodes.throttle import Throttle
-from automax_ros.nodes.tunables import Tunable, tunables_of
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.intake.guard import Throttle
+from automax_ros.ros.nodes.tunables import Tunable, tunables_of
 
 RACK = """\
 rack: LINE1
@@ -98,6 +98,6 @@ def test_every_value_on_the_grid_is_accepted(ros_domain_id, tunables, declared, 
 
 def test_throttle_passes_once_an_interval(monkeypatch):
     times = iter([0.0, 0.5, 0.99, 1.0, 1.5, 2.1])
-    monkeypatch.setattr("automax_ros.nodes.throttle.time.monotonic", lambda: next(times))
+    monkeypatch.setattr("automax_ros.ros.intake.guard.time.monotonic", lambda: next(times))
     throttle = Throttle(1.0)
     assert [throttle.passes() for _ in range(6)] == [True, False, False, True, False, True]

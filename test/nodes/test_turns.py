@@ -5,7 +5,7 @@ import time
 
 from system.support import wait_until
 
-from automax_ros.nodes.turns import Turns
+from automax_ros.ros.intake.rack_lock import Turns
 
 
 def test_visitor_enters_within_itself():

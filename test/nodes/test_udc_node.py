@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 from .support import until
 
@@ -40,7 +40,7 @@ SOURCES = {
 
 @pytest.fixture
 def live(ros_domain_id, tmp_path: Path):
-    from automax_ros.nodes.launcher import LiveRack
+    from automax_ros.ros.rack_nodes import LiveRack
 
     for name, text in SOURCES.items():
         (tmp_path / f"{name}.BLK").write_text(text)

@@ -14,7 +14,8 @@ pytest.importorskip("distributed", reason="needs automax_ros[cluster]")
 
 import distributed
 
-from automax_ros.pieces import ClusterFault, Piece, Where, run_pieces
+from automax_ros.parallel.job import ClusterFault, Piece, Where
+from automax_ros.parallel.run import run_pieces
 from pieces import works
 from pieces.clusters import cluster
 
@@ -142,7 +143,7 @@ def test_a_worker_of_another_installation_is_refused(tmp_path, other):
 
 
 def test_a_worker_that_hangs_before_it_tells_what_it_has_is_not_waited_for_for_ever(tmp_path, monkeypatch):
-    monkeypatch.setattr("automax_ros.pieces.cluster.SAME_S", 1)
+    monkeypatch.setattr("automax_ros.parallel.cluster.SAME_S", 1)
     with cluster(tmp_path, 2) as found:
         found.workers[1].send_signal(signal.SIGSTOP)
         with pytest.raises(ClusterFault, match="not every worker of the cluster has told within 1 s") as caught:
@@ -173,7 +174,7 @@ def test_a_scheduler_that_is_lost_is_said_to_be(tmp_path):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x", "tls://127.0.0.1:1"])
 def test_a_scheduler_that_does_not_answer_is_said_to_be(address, monkeypatch):
-    monkeypatch.setattr("automax_ros.pieces.connecting.CONNECT_S", 1)
+    monkeypatch.setattr("automax_ros.parallel.cluster.CONNECT_S", 1)
     with pytest.raises(ClusterFault, match="no Dask scheduler answers") as caught:
         run_pieces(squares(3), Where(scheduler=address))
     assert caught.value.code == "AMX6852"
@@ -181,8 +182,8 @@ def test_a_scheduler_that_does_not_answer_is_said_to_be(address, monkeypatch):
 
 
 def test_a_server_that_is_no_scheduler_is_not_waited_for_for_ever(monkeypatch):
-    monkeypatch.setattr("automax_ros.pieces.connecting.CONNECT_S", 1)
-    monkeypatch.setattr("automax_ros.pieces.connecting._MORE_S", 1)
+    monkeypatch.setattr("automax_ros.parallel.cluster.CONNECT_S", 1)
+    monkeypatch.setattr("automax_ros.parallel.cluster._MORE_S", 1)
     with socket.create_server(("127.0.0.1", 0)) as server:  # which connects, and says nothing
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(ClusterFault, match="answers: nothing that is one does within 1 s") as caught:
@@ -218,7 +219,7 @@ def test_a_machine_that_is_too_busy_for_dask_to_begin_gets_another_chance(two_wo
 
 
 def test_a_cluster_without_workers_is_waited_for_but_not_for_ever(tmp_path, monkeypatch):
-    monkeypatch.setattr("automax_ros.pieces.cluster.WITHOUT_WORKERS_S", 1)
+    monkeypatch.setattr("automax_ros.parallel.cluster.WITHOUT_WORKERS_S", 1)
     with cluster(tmp_path, 0) as found, pytest.raises(ClusterFault, match="has had no worker for 1 s"):
         run_pieces(squares(3), Where(scheduler=found.address))
 

@@ -7,8 +7,8 @@ import platform
 import numpy as np
 import pytest
 
-from automax_ros.pieces import installation as module
-from automax_ros.pieces.installation import Installation, installation, results_digest
+from automax_ros.parallel import installation as module
+from automax_ros.parallel.installation import Installation, installation, results_digest
 
 
 def test_all_that_decides_on_results_is_told():

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.pieces import Piece, Where, run_pieces
-from automax_ros.pieces.piece import MOST_TRIES, usable_cores
+from automax_ros.parallel.job import MOST_TRIES, Piece, Where, usable_cores
+from automax_ros.parallel.run import run_pieces
 from pieces import works
 
 ROOT = Path(__file__).parent.parent.parent
@@ -136,7 +136,8 @@ THREADS = {
 PROGRAM = """
 import sys, time
 sys.path.append(sys.argv[2])
-from automax_ros.pieces import Piece, Where, run_pieces
+from automax_ros.parallel.job import Piece, Where
+from automax_ros.parallel.run import run_pieces
 from pieces import works
 {thread}
 try:
@@ -173,7 +174,8 @@ def test_no_worker_outlives_the_one_that_gives_it_pieces(tmp_path, number, threa
 COPIED = """
 import atexit, sys, time
 sys.path.append(sys.argv[1])
-from automax_ros.pieces import Piece, Where, run_pieces
+from automax_ros.parallel.job import Piece, Where
+from automax_ros.parallel.run import run_pieces
 from pieces import works
 works.marks.append(7)
 {thread}

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from automax_ros.rack.config import CommonVariable, RackConfig
-from automax_ros.rack.loader import LoadResult, load
+from automax_ros.rackfile.loader import LoadResult, load
+from automax_ros.rackfile.model.config import CommonVariable, RackConfig
 
 HEAD = "rack: LINE1\nslots:\n  0: {module: 57C435, tasks: {LINE: {priority: 5}}}\n"
 

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.rack.loader import load
+from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
+from automax_ros.rackfile.loader import load
 
 YAML = """\
 rack: LINE1

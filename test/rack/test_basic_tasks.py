@@ -7,10 +7,10 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.scheduler import EventClass, EventKey
-from automax_ros.running.task import Status
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.tasks.task import Status
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 TICK = 5_500_000
 COUNT = "10 COMMON N%\n20 START EVERY 2 TICKS\n30 N% = N% + 1\n40 END\n"
@@ -146,7 +146,7 @@ def test_stop_all_forgets_events_and_channels(tmp_path):
 
 def test_a_reload_of_another_kind_of_task_is_refused(tmp_path):
     from automax_ros.core.diagnostics import SourceText
-    from automax_ros.rack.installation import RackError
+    from automax_ros.rack.tasks.installation import RackError
 
     rack = rack_of(tmp_path, {"COUNT": (1, COUNT)})
     rack.start()

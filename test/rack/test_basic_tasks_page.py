@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 PAGE = Path(__file__).parents[2] / "docs" / "basic_tasks.md"
 FILES = re.findall(

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.loader import load
-from automax_ros.rack.tasks_check import check_tasks, forgotten
+from automax_ros.rackfile.checks.tasks import check_tasks, forgotten
+from automax_ros.rackfile.loader import load
 
 CONFIG = Path(__file__).parents[2] / "config"
 RACK = """\

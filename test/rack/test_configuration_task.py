@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 import automax_ros.core
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.rack.config import Point
-from automax_ros.rack.configuration_task import DefinedTask, read_configuration
-from automax_ros.rack.importing import rack_file_of
-from automax_ros.rack.loader import load_stored
+from automax_ros.rackfile.loader import load_stored
+from automax_ros.rackfile.model.config import Point
+from automax_ros.rackfile.old_plants.configuration_task import DefinedTask, read_configuration
+from automax_ros.rackfile.old_plants.import_ import rack_file_of
 
 PAGES = Path(automax_ros.core.__file__).parent / "pages"
 GOOD = """\

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 from bags.live_racks import build
 
-from automax_ros.rack.controls import Controls
-from automax_ros.rack.modules.running import QuietModule
-from automax_ros.rack.observers import Operation
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.modules.module import QuietModule
+from automax_ros.rack.operator.controls import Controls
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
 
 YAML = """\
 rack: LINE1

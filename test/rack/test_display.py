@@ -6,10 +6,10 @@ import pytest
 from bags.live_racks import build
 
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.rack.display import MEANINGS, Display, displays_of
+from automax_ros.rack.operator.faults import MEANINGS, Display, displays_of
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.report import report_of
-from automax_ros.running.error_log import LogEntry
+from automax_ros.runtime.scan.error_log import LogEntry
+from automax_ros.scenario.report import report_of
 
 YAML = """\
 rack: LINE1

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.controls import Controls
-from automax_ros.rack.display import Display, displays_of
-from automax_ros.rack.drive_trips import DriveTrips
-from automax_ros.rack.loader import load
+from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.faults import Display, DriveTrips, displays_of
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 FAULTS = {"IOC@": 7110, "SYNC@": 7111, "TACH@": 7112, "OSV@": 7113, "IET@": 7114, "PHROT@": 7115, "BAD@": 7116}
 YAML = """\

@@ -9,14 +9,14 @@ import pytest
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.drive.cml.minor_loop import CurrentMinorLoop
-from automax_ros.rack.installation import RackError
-from automax_ros.rack.loader import load
+from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
+from automax_ros.rack.operator.retention import Retention
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.retention import Retention
-from automax_ros.rack.stepping.stepper import Stepper, Why
-from automax_ros.running.scan_record import Status
-from automax_ros.running.views import MemoryValueError
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.memory.views import MemoryValueError
+from automax_ros.runtime.scan.scan_record import Status
+from automax_ros.scenario.stepping.stepper import Stepper, Why
 
 from .drive_tasks import CML, SPEED, YAML, edited, folder_of, permit, rack_of, running
 

@@ -3,10 +3,10 @@
 import pytest
 
 from automax_ros.core.diagnostics import Severity
-from automax_ros.rack.config import ModuleLoss
+from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.running.views import MemoryValueError
+from automax_ros.rackfile.model.config import ModuleLoss
+from automax_ros.runtime.memory.views import MemoryValueError
 
 from .helpers import codes, good, loaded
 

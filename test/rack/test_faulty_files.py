@@ -10,9 +10,9 @@ import pytest
 
 from automax_ros.core.diagnostics import Diagnostic
 from automax_ros.core.problems import Severity
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.reader import read_for_rack
+from automax_ros.rackfile.loader import load
+from automax_ros.scenario.stimuli.reader import read_for_rack
 
 FOLDER = Path(__file__).parent / "faulty"
 EXPECTED = re.compile(r"^#! (\d+) (AMX\d{4}) (.*)$", re.MULTILINE)

@@ -9,12 +9,12 @@ import pytest
 from bags.live_racks import build
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.rack.observers import Operation
-from automax_ros.rack.orders import Orders
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.operator.requests import Orders
+from automax_ros.rack.operator.retention import Retention
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.report import report_of
-from automax_ros.rack.retention import Retention
-from automax_ros.running.views import MemoryValueError
+from automax_ros.runtime.memory.views import MemoryValueError
+from automax_ros.scenario.report import report_of
 
 from .modules.udc_racks import built as udc_rack
 from .test_orders import Told

@@ -8,11 +8,11 @@ import pytest
 from bags.live_racks import build
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.rack.halting import DONE, STOPPED, TIME_OVER, Halting, Stepped
-from automax_ros.rack.observers import Operation
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.operator.halting import DONE, STOPPED, TIME_OVER, Halting, Stepped
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.running.pacer import Pacer
+from automax_ros.runtime.time.pacer import Pacer
 
 YAML = """\
 rack: LINE1

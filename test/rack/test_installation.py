@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.installation import Installation
-from automax_ros.rack.loader import load, load_stored
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.installation import Installation
+from automax_ros.rackfile.loader import load, load_stored
+from automax_ros.rackfile.model.config import RackConfig
 
 CONFIG = Path(__file__).parent.parent.parent / "config" / "section_drive" / "rack.yaml"
 

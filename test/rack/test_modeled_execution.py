@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
-from automax_ros.running.task import Status
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.scan.error_log import LOG_NUMBERS, ErrorLog, LogEntry
+from automax_ros.runtime.tasks.task import Status
 
 TASK = """10 COMMON {name}%
 20 CALL SCAN_LOOP(TICKS={ticks})

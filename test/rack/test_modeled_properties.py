@@ -9,10 +9,10 @@ from pathlib import Path
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.processor_time import ProcessorTime
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.runtime.scan.processor_time import ProcessorTime
 
 HEAD = """\
 10 COMMON A%, B%, C%, D!, X@, R, T%(5)

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeMode
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 CONFIG = Path(__file__).parent.parent.parent / "config" / "section_drive" / "rack.yaml"
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from automax_ros.blocks.catalogue import CATALOGUE
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
-from automax_ros.language.syntax.parser import parse
-from automax_ros.rack.old_sources import convert
+from automax_ros.language.parse.parser import parse
+from automax_ros.rackfile.old_plants.sources import convert
 
 GOOD = """\
 10 LOCAL OUT%, NOTE$:40, NAMES$:20(3), KP [CURRENT=1.5, HIGH=9.0]

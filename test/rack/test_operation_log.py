@@ -2,8 +2,8 @@
 
 import pytest
 
-from automax_ros.rack.observers import Operation
-from automax_ros.rack.operation_log import OperationLog
+from automax_ros.rack.base.observers import Operation
+from automax_ros.scenario.operation_log import OperationLog
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.rack.installation import RackError
-from automax_ros.rack.loader import load
+from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.running.task import Status
-from automax_ros.running.views import MemoryValueError
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.memory.views import MemoryValueError
+from automax_ros.runtime.tasks.task import Status
 
 YAML = """\
 rack: LINE1

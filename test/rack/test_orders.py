@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from bags.live_racks import build
 
-from automax_ros.rack.observers import Operation
-from automax_ros.rack.orders import MAX_NAME, MAX_NAMES, MAX_VALUE, Orders, ReloadRefused
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.operator.requests import MAX_NAME, MAX_NAMES, MAX_VALUE, Orders, ReloadRefused
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
 
 YAML = """\
 rack: LINE1

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from replay.replays import record, replayed
 
-from automax_ros.rack.controls import Controls
-from automax_ros.rack.loader import load
+from automax_ros.rack.operator.controls import Controls
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 from .test_drive_faults import CML, FAULTS, SPEED, YAML, active, logged, reset, start
 

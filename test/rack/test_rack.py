@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.kinds import WriteKind, WriterKind
-from automax_ros.rack.installation import RackError
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack, scans_per_second
-from automax_ros.rack.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER
-from automax_ros.running.task import Status
-from automax_ros.running.views import MemoryValueError
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.writers import OPERATOR_WRITER, PRESET_WRITER, ROS_WRITER
+from automax_ros.runtime.memory.views import MemoryValueError
+from automax_ros.runtime.tasks.task import Status
 
 RACK = """\
 rack: LINE1

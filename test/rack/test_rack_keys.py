@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from automax_ros.rack.loader import load
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.loader import load
 
 PAGE = Path(__file__).parents[2] / "docs" / "rack_yaml.md"
 OUTPUT = """\

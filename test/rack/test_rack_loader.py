@@ -7,7 +7,7 @@ import pytest
 from automax_ros.core.diagnostics import render
 from automax_ros.core.kinds import Direction
 from automax_ros.core.types import DataType
-from automax_ros.rack.modules.common_memory import CommonMemoryConfig
+from automax_ros.rackfile.modules.common_memory import CommonMemoryConfig
 
 from .helpers import HEAD, codes, common, good, loaded
 
@@ -203,7 +203,7 @@ def test_files_of_other_editors_are_read(tmp_path):
     path = tmp_path / "rack.yaml"
     (tmp_path / "LINE.BLK").write_text("10 END\n")
     path.write_bytes(b"\xef\xbb\xbf" + HEAD.replace("\n", "\r\n").encode())
-    from automax_ros.rack.loader import load
+    from automax_ros.rackfile.loader import load
 
     assert load(str(path)).config.name == "LINE1"
 

@@ -3,8 +3,8 @@
 import pytest
 
 from automax_ros.core.types import DataType
-from automax_ros.language.syntax.tokens import RESERVED_WORDS
-from automax_ros.rack.names import DeclarationFault, VariableName, variable_name
+from automax_ros.language.text.tokens import RESERVED_WORDS
+from automax_ros.rackfile.reading.names import DeclarationFault, VariableName, variable_name
 
 from .helpers import HEAD, codes
 

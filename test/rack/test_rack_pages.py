@@ -7,9 +7,9 @@ import pytest
 
 import automax_ros.core
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.rack.files import MAX_BYTES
-from automax_ros.rack.loader import LoadResult, load
-from automax_ros.rack.tasks_check import check_tasks, forgotten
+from automax_ros.rackfile.checks.tasks import check_tasks, forgotten
+from automax_ros.rackfile.loader import LoadResult, load
+from automax_ros.rackfile.reading.files import MAX_BYTES
 
 from .helpers import write
 

@@ -84,7 +84,7 @@ def test_common_memory_has_neither_tasks_nor_tick(tmp_path):
 
 
 def test_module_without_its_key_gets_a_hint(tmp_path):
-    from automax_ros.rack.loader import load
+    from automax_ros.rackfile.loader import load
 
     result = load(write(tmp_path, "rack: A\nslots:\n  0: 57C431\n"))
     assert [(item.code, item.hint) for item in result.diagnostics] == [("AMX6008", "write {module: 57C431}")]

@@ -5,7 +5,7 @@ import os
 import pytest
 import yaml
 
-from automax_ros.rack.loader import load
+from automax_ros.rackfile.loader import load
 
 from .helpers import codes, good, loaded, write
 

@@ -1,7 +1,7 @@
 """The tasks of a rack are checked against the rack."""
 
 from automax_ros.core.types import DataType
-from automax_ros.rack.tasks_check import check_tasks, commons_of
+from automax_ros.rackfile.checks.tasks import check_tasks, commons_of
 
 from .helpers import HEAD, good
 

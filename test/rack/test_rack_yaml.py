@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import render_all
 from automax_ros.core.yaml_text import MAX_DEPTH, Mapping, Node, Scalar, read_yaml
-from automax_ros.rack.files import MAX_BYTES
-from automax_ros.rack.findings import MAX_FINDINGS, Findings
-from automax_ros.rack.loader import LoadResult, load
+from automax_ros.rackfile.loader import LoadResult, load
+from automax_ros.rackfile.reading.files import MAX_BYTES
+from automax_ros.rackfile.reading.values import MAX_FINDINGS, Findings
 
 from .helpers import HEAD, codes, loaded, write
 

@@ -4,9 +4,10 @@ import re
 from pathlib import Path
 
 from automax_ros.core.kinds import Direction
-from automax_ros.rack import commons, loader
-from automax_ros.rack.loader import load
-from automax_ros.rack.modules.registry import KINDS, SUPPORTED
+from automax_ros.rackfile import loader
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.modules.registry import KINDS, SUPPORTED
+from automax_ros.rackfile.sections import commons
 
 PAGE = Path(__file__).parents[2] / "docs" / "rack_yaml.md"
 

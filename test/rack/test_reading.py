@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from bags.live_racks import build
 
-from automax_ros.rack.orders import Orders
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.operator.requests import Orders
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
 
 YAML = """\
 rack: LINE1

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from automax_ros.rack.loader import load
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.operator.retention import Restored, Retention, RetentionFault, default_folder
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.retention import Restored, Retention, RetentionFault, default_folder
-from automax_ros.rack.standing import OperationRefused
+from automax_ros.rackfile.loader import load
 
 RACK = """\
 rack: KEEP

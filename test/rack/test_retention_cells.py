@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.types import Value
-from automax_ros.rack.loader import load
+from automax_ros.rack.operator.retention import Retention
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.retention import Retention
-from automax_ros.running.task import Status
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.tasks.task import Status
 
 YAML = """\
 rack: KEEP

@@ -7,8 +7,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.types import DataType
-from automax_ros.rack.names import is_rack_name, variable_name
-from automax_ros.rack.ros_names import namespace, set_topic, topic_names
+from automax_ros.rackfile.model.ros_names import namespace, set_topic, topic_names
+from automax_ros.rackfile.reading.names import is_rack_name, variable_name
 
 PROPERTY = settings(deadline=None, derandomize=True, database=None, max_examples=300)
 FEW = "A_0"  # few letters, so that names often differ in type or underscores only

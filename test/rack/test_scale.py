@@ -9,11 +9,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from automax_ros.rack.loader import load
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.scale import Scale
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.reading.scale import Scale
 
 from .helpers import HEAD, codes, common
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.scan_end import ScanEnd
-from automax_ros.running.task import OVERLAP
+from automax_ros.rack.tasks.scheduled_task import ScanEnd
+from automax_ros.runtime.tasks.task import OVERLAP
 
 from .helpers import HEAD, good
 

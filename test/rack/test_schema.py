@@ -13,12 +13,12 @@ import pytest
 from yaml_core import data_of
 
 import automax_ros.core
-from automax_ros.rack.loader import KEYS, load, schema
-from automax_ros.rack.modules.registry import KINDS, SUPPORTED, module_number
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.rack_verbs import rack_verbs
-from automax_ros.rack.stimuli.schema import VERB_SCHEMAS
-from automax_ros.rack.stimuli.schema import schema as stimuli_schema
+from automax_ros.rackfile.loader import KEYS, load, schema
+from automax_ros.rackfile.modules.registry import KINDS, SUPPORTED, module_number
+from automax_ros.scenario.stimuli.rack_verbs import rack_verbs
+from automax_ros.scenario.stimuli.schema import VERB_SCHEMAS
+from automax_ros.scenario.stimuli.schema import schema as stimuli_schema
 
 ROOT = Path(__file__).parents[2]
 FAULTY = Path(__file__).parent / "faulty"

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.seating import HOME, NoSuchSeat, _groups, seat_named, seats_of
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.processes import HOME, NoSuchSeat, _groups, seat_named, seats_of
 
 from .drive_tasks import CML, folder_of
 

@@ -8,9 +8,9 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonVariable, RackConfig
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.settings import DEFAULT_WATCHED, setting, watched
+from automax_ros.rackfile.model.config import CommonVariable, RackConfig
+from automax_ros.rackfile.model.value_names import DEFAULT_WATCHED, setting, watched
 
 from .helpers import HEAD, good
 

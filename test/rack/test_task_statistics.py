@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.task_statistics import TaskStatistics
-from automax_ros.running.pacer import Pacer
+from automax_ros.rack.tasks.statistics import TaskStatistics
+from automax_ros.runtime.time.pacer import Pacer
 
 YAML = """\
 rack: LINE1

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.triggers import Timeout
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
-from automax_ros.running.task import Status
+from automax_ros.rack.tasks.triggers import Timeout
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.tasks.task import Status
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 MS = 1_000_000
 KEY = EventKey(EventClass.SCAN, 5, "TASK")

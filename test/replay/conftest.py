@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.errors import BagError
-from automax_ros.compile.native import NativeCache, NotNative
-from automax_ros.compile.native.build import library
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.run.build import library
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.recordings.mcap.errors import BagError
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.library import ColumnLibrary, library_text
 from automax_ros.replay.engine import Replay
-from automax_ros.replay.report import ReplayReport
+from automax_ros.replay.scans.report import ReplayReport
 
 
 def outcome(run, *arguments, **named) -> ReplayReport | BagError:

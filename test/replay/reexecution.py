@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from automax_ros.bags.reader import BagReader
+from automax_ros.compile.base.layout import Layout
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.layout import Layout
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.task import Status, Task
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.runtime.tasks.task import Status, Task
 
 
 class RecordedMemory:

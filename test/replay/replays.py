@@ -8,17 +8,17 @@ from typing import Any
 
 from bags.live_racks import build
 
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.writer import BagWriter
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import NAMES
+from automax_ros.messages.types.topics import LATCHED, SCAN
 from automax_ros.rack.rack import Rack
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
+from automax_ros.recordings.write.writer import BagWriter
 from automax_ros.replay.engine import ReplayOptions, replay
-from automax_ros.replay.report import ReplayReport
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import NAMES
-from automax_ros.wire.qos import LATCHED, SCAN
-from automax_ros.wire.stream import RackStream
+from automax_ros.replay.scans.report import ReplayReport
 
 YAML = """\
 rack: LINE1

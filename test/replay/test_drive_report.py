@@ -9,11 +9,11 @@ from bags.live_racks import build
 from bags.ros2_bags import recorded_twice
 from cli.drive_racks import loop_task, rack_file
 
-from automax_ros.bags.series import Window
 from automax_ros.cli.main import main
 from automax_ros.rack.rack import Rack
-from automax_ros.replay.drive_report import drive_report
-from automax_ros.replay.drive_run import DriveRun
+from automax_ros.recordings.tables.series import Window
+from automax_ros.replay.drive_report.drive_report import drive_report
+from automax_ros.replay.drive_report.drive_run import DriveRun
 
 MORE = "  PERM@: {slot: 8, register: 0, bit: 0, ros: in}\n"
 STIMULI = """\

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder
-from automax_ros.rack.loader import load
+from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.recorder import Recorder
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "bags" / "section_drive"

@@ -11,11 +11,11 @@ from cli.drive_racks import COMMONS, loop_task, rack_file
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags.errors import BagError
-from automax_ros.cli.plot_figure import Layout, figure_of
-from automax_ros.cli.report_page import page
-from automax_ros.replay.drive_report import drive_report
-from automax_ros.replay.stored_rack import SourceRefused
+from automax_ros.cli.output.figure import Layout, figure_of
+from automax_ros.cli.recordings.report_page import page
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.replay.drive_report.drive_report import drive_report
+from automax_ros.replay.scans.stored_rack import SourceRefused
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from rack.drive_tasks import permit, rack_of
 
-from automax_ros.bags.recorder import Recorder
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
-from automax_ros.wire.stream import RackStream
 
 EPOCH = 1_795_368_125_358_325_800
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 from bags.live_racks import build
 
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.messages.types.messages import CommonWrite, Operation, Scan, VariableTable
+from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
+from automax_ros.recordings.info.info import bag_info
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.replay.engine import ReplayOptions, replay
-from automax_ros.running.task import OVERLAP
-from automax_ros.wire.messages import CommonWrite, Operation, Scan, VariableTable
+from automax_ros.runtime.tasks.task import OVERLAP
 
 from .replays import edited, record, replayed
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.reader import BagReader
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.loader import load
+from automax_ros.messages.types.messages import Scan
 from automax_ros.rack.rack import Rack
-from automax_ros.replay.report import Kind
-from automax_ros.wire.messages import Scan
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.replay.scans.report import Kind
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed
 
@@ -214,7 +214,7 @@ def test_difference_that_ends_is_told_as_ended(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_recording(tmp_path, monkeypatch):
-    monkeypatch.setattr("automax_ros.bags.block_buffer.BLOCK_BYTES", 60_000)  # both recordings have several blocks
+    monkeypatch.setattr("automax_ros.recordings.mcap.chunk_table.BLOCK_BYTES", 60_000)  # several blocks each
     changed = {"SPEED": edited(SPEED, ("INPUT2=100", "INPUT2=101"))}
     peaks = []
     for seconds in (2.0, 12.0):

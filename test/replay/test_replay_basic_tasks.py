@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 from automax_ros.replay.engine import replay
 
 from .replays import record, replayed

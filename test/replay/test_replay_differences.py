@@ -10,12 +10,11 @@ import pytest
 from bags.live_racks import YAML as OTHER_YAML
 from bags.live_racks import build
 
+from automax_ros.core.types import same_bits
+from automax_ros.messages.types.messages import Scan, ScanError, TaskState, Values
 from automax_ros.rack.rack import Rack
-from automax_ros.replay.compare import SETTLED_SCANS, Found, Label, Seen, Tallies, within
-from automax_ros.replay.report import Kind
-from automax_ros.replay.same import same_bits
-from automax_ros.wire.messages import Scan, ScanError, TaskState
-from automax_ros.wire.values import Values
+from automax_ros.replay.scans.compare import SETTLED_SCANS, Found, Label, Seen, Tallies, within
+from automax_ros.replay.scans.report import Kind
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed, rewritten
 

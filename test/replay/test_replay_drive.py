@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from rack.drive_tasks import CML, SPEED, YAML, rack_of
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.replay.report import Kind
-from automax_ros.running.drive_record import COMMAND_VIEW, MEASURED_VIEW
-from automax_ros.wire.messages import CommonWrite, Scan
-from automax_ros.wire.stream import RackStream
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import CommonWrite, Scan
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
+from automax_ros.replay.scans.report import Kind
+from automax_ros.runtime.scan.drive_record import COMMAND_VIEW, MEASURED_VIEW
 
 from .replays import edited, record, replayed, rewritten
 

@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 from compile.programs import DECLARATIONS
 
-from automax_ros.bags.errors import BagError
 from automax_ros.core.names import element_name
 from automax_ros.core.types import Value
-from automax_ros.rack.loader import load
-from automax_ros.rack.observers import Operation
+from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
-from automax_ros.replay.report import Kind
-from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import WriteGroup
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.replay.scans.report import Kind
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.tasks.task import ScanRecord, Task
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed
 from .replays import YAML as YAML_OF_TWO

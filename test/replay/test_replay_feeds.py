@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.reader import BagReader
 from automax_ros.core.kinds import WriterKind
-from automax_ros.rack.controls import Controls
+from automax_ros.messages.types.messages import CommonWrite
+from automax_ros.rack.operator.controls import Controls
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.messages import CommonWrite
+from automax_ros.recordings.info.info import bag_info
+from automax_ros.recordings.read.reader import BagReader
 
 from .replays import edited, recorded, replayed
 

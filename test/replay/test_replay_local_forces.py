@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from bags.live_racks import build
 
-from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
+from automax_ros.recordings.write.recorder import RecordingOptions
 
 from . import test_replay_basic_tasks as basic
 from . import test_replay_udc as udc

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
+from automax_ros.recordings.write.recorder import RecordingOptions
 
 from .replays import SPEED, WORK, busy, edited, recorded, replayed, rewritten
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from bags.live_racks import build
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.recorder import Recorder, RecordingOptions
 from automax_ros.core.ticks import NS_PER_S
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.messages import CommonImage, CommonWrite, Scan, TaskState
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState
-from automax_ros.wire.stream import RackStream
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 
 from .replays import SPEED, WORK, YAML, busy, edited, recorded, replayed, rewritten
 

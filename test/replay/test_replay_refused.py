@@ -13,11 +13,10 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.bags.errors import BagError
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.replay.stored_rack import SourceRefused
-from automax_ros.wire.messages import CommonImage, CommonWrite, Scan, TaskState, VariableTable
-from automax_ros.wire.values import Values
+from automax_ros.messages.types.messages import CommonImage, CommonWrite, Scan, TaskState, Values, VariableTable
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.replay.scans.stored_rack import SourceRefused
 
 from .replays import SPEED, WORK, edited, record, recorded, replayed, rewritten
 

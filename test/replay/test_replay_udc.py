@@ -6,7 +6,7 @@ import pytest
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
-from automax_ros.replay.report import Difference, ReplayReport
+from automax_ros.replay.scans.report import Difference, ReplayReport
 
 from .replays import edited, recorded, replayed
 

@@ -8,19 +8,18 @@ import pytest
 from bags.live_racks import build
 from bags.ros2_bags import JOINED_NS, Sent, recorded_twice, ros2_bag
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.export import CommonTable, export_csv
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.info_tasks import task_facts
-from automax_ros.bags.playback import survey
-from automax_ros.bags.reader import BagReader
-from automax_ros.bags.scan_table import ScanTable
-from automax_ros.bags.series import Window
-from automax_ros.bags.traces import traces
 from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import String
+from automax_ros.recordings.info.info import bag_info, task_facts
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.playback import survey
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.tables.export import CommonTable, export_csv
+from automax_ros.recordings.tables.scan_table import ScanTable
+from automax_ros.recordings.tables.series import Window
+from automax_ros.recordings.tables.traces import traces
 from automax_ros.replay.engine import replay
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import String
 
 from .replays import SPEED, WORK, YAML, busy, edited, rewritten
 from .replays import replayed as replayed_with

@@ -11,13 +11,12 @@ import signal
 import pytest
 from pieces.clusters import cluster
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.metadata import METADATA_FILE
-from automax_ros.bags.recorder import RecordingOptions
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.pieces import Done, Where
-from automax_ros.pieces.piece import PieceFault, result_of
+from automax_ros.parallel.job import Done, PieceFault, Where, result_of
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.metadata import METADATA_FILE
+from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.replay import side_by_side
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.engine import Replay, ReplayOptions

@@ -12,17 +12,17 @@ from bags.mutations import CHANGES, mutants
 from mcap.reader import make_reader
 from mcap.writer import Writer as McapWriter
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.info import bag_info
-from automax_ros.bags.recorder import Recorder, RecordingOptions
-from automax_ros.bags.repair.repairing import RepairReport, repair
-from automax_ros.bags.storage import StorageOptions
-from automax_ros.cli.bag_info import as_data
-from automax_ros.cli.bag_info_text import lines_of
+from automax_ros.cli.recordings.bag_info import as_data
+from automax_ros.cli.recordings.bag_info_text import lines_of
 from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.recordings.info.info import bag_info
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.repair.repairing import RepairReport, repair
+from automax_ros.recordings.write.data_file import StorageOptions
+from automax_ros.recordings.write.recorder import Recorder, RecordingOptions
 from automax_ros.replay.engine import replay
-from automax_ros.replay.stored_rack import SourceRefused
-from automax_ros.wire.stream import RackStream
+from automax_ros.replay.scans.stored_rack import SourceRefused
 
 from .replays import recorded
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from compile.support import OTHER, WRITER, program_of, views_of
 
+from automax_ros.compile.base.cost import CostModel
 from automax_ros.compile.compiler import compile_program
-from automax_ros.compile.cost import CostModel
 from automax_ros.core.types import Value
-from automax_ros.drive.cml.signals import PERMISSIVE, Command, Measured
-from automax_ros.drive.controller import DriveController
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, PlantData
-from automax_ros.running.cml_task import CmlTask
-from automax_ros.running.drives import Drives
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.scheduler import EventKey, PeriodicAction
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop.signals import PERMISSIVE, Command, Measured
+from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.plant.plant import DrivePlant, PlantData
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.scan.drives import Drives
+from automax_ros.runtime.tasks.cml_task import CmlTask
+from automax_ros.runtime.time.scheduler import EventKey, PeriodicAction
 
 REGISTERS = (109, 4, 2, 0)
 CML = """10 COMMON REF%, RUN@, RESET@, SPEED%, OSV%, STATE@, LOCKED@, PERIOD%, CURRENT%, DELTA%, DIAG%(37,1)

@@ -8,12 +8,12 @@ from itertools import islice
 import pytest
 from compile.support import OTHER
 
-from automax_ros.drive.cml.inputs import Inputs
-from automax_ros.drive.cml.minor_loop import NUMBERS, CurrentMinorLoop, Outcome
-from automax_ros.drive.cml.signals import Command
-from automax_ros.running.drive_record import COMMAND_VIEW, MEASURED_VIEW, command_of, measured_of
-from automax_ros.running.error_log import LOG_FIELD
-from automax_ros.running.scan_record import Status
+from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.minor_loop import NUMBERS, CurrentMinorLoop, Outcome
+from automax_ros.drive.current_loop.signals import Command
+from automax_ros.runtime.scan.drive_record import COMMAND_VIEW, MEASURED_VIEW, command_of, measured_of
+from automax_ros.runtime.scan.error_log import LOG_FIELD
+from automax_ros.runtime.scan.scan_record import Status
 from running.drives import CML, cml_task, finished, scans
 
 MS = 1_000_000

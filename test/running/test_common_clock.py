@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from automax_ros.core.types import DataType
-from automax_ros.running.common_clock import CommonClock
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.scheduler import Scheduler
-from automax_ros.running.views import Place, ViewSpec
+from automax_ros.runtime.memory.common_clock import CommonClock
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import Place, ViewSpec
+from automax_ros.runtime.time.scheduler import Scheduler
 
 INT = DataType.INTEGER
 SPECS = (

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.types import DataType
-from automax_ros.drive.cml.signals import Command, Measured, Pulse
-from automax_ros.running.channels import CHANNEL_VIEWS
-from automax_ros.running.drive_record import (
+from automax_ros.drive.current_loop.signals import Command, Measured, Pulse
+from automax_ros.runtime.scan.channels import CHANNEL_VIEWS
+from automax_ros.runtime.scan.drive_record import (
     COMMAND_NUMBERS,
     COMMAND_VIEW,
     MEASURED_NUMBERS,

@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.following_pacer import LONGEST_JUMP_NS, FollowingPacer
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.time.following_pacer import LONGEST_JUMP_NS, FollowingPacer
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 TYPES = Path(__file__).parents[1] / "system" / "racks" / "types" / "rack.yaml"
 KEY = EventKey(EventClass.SCAN, 4, "T")

@@ -1,6 +1,6 @@
 """Trouble is counted; each thing is told once."""
 
-from automax_ros.running.health import FROM_STRANGERS, Health
+from automax_ros.runtime.health import FROM_STRANGERS, Health
 
 
 def test_each_thing_is_told_once_and_counted_always():

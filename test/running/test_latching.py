@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.tasks.task import Task
 
 
 class Restless(CommonMemory):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.views import MemoryValueError, ViewSpec
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import MemoryValueError, ViewSpec
 
 VIEWS = (
     ViewSpec("SPEED%", DataType.INTEGER),

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.pacer import LONGEST_WAIT_NS, START_LEAD_NS, Pacer
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.time.pacer import LONGEST_WAIT_NS, START_LEAD_NS, Pacer
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 ROOT = Path(__file__).parents[2]
 TYPES = ROOT / "test" / "system" / "racks" / "types" / "rack.yaml"
@@ -165,9 +165,9 @@ def test_rack_keeps_real_time_without_ros():
     """In a process of its own, which must not have loaded anything of ROS."""
     program = f"""
 import sys, time
-from automax_ros.rack.loader import load
+from automax_ros.rackfile.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.pacer import Pacer
+from automax_ros.runtime.time.pacer import Pacer
 rack = Rack(load({str(TYPES)!r}).config)
 rack.start([("REF%", 12)])
 began = time.monotonic()
@@ -203,7 +203,7 @@ def test_no_other_source_below_the_nodes_asks_a_clock():
         for name in ([alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module])
         if name in {"time", "datetime"}
     }
-    assert asking == {"running/pacer.py"}
+    assert asking == {"runtime/time/pacer.py"}
 
 
 def test_halted_time_stands_still_and_nothing_is_late_afterwards(pacer, wall, scans):

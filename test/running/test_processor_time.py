@@ -8,8 +8,8 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.running.processor_time import ProcessorTime
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.runtime.scan.processor_time import ProcessorTime
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 Moments = list[tuple[int, str, int]]
 """Instant, name of the job, number of its step (0: begun)."""

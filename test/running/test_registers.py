@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.types import DataType
-from automax_ros.running.backplane import Backplane, Bank
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.private_image import PrivateImage
-from automax_ros.running.task import Task
-from automax_ros.running.views import Place, ViewSpec
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.private_image import PrivateImage
+from automax_ros.runtime.memory.registers import Backplane, Bank
+from automax_ros.runtime.memory.views import Place, ViewSpec
+from automax_ros.runtime.tasks.task import Task
 
 BANK = 0
 SPECS = (

@@ -5,7 +5,7 @@ import pickle
 
 import pytest
 
-from automax_ros.running.scan_record import ScanRecord
+from automax_ros.runtime.scan.scan_record import ScanRecord
 
 
 def record():

@@ -9,7 +9,7 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 
 def key(name="E", priority=0, event_class=EventClass.SCAN) -> EventKey:

@@ -7,10 +7,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.running.pace import BREATH_S
-from automax_ros.running.pacer import LONGEST_WAIT_NS
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
-from automax_ros.running.simulated_pacer import LEAST_TICK_NS, MOST_LATE_NS, MOST_TICK_NS, SimulatedPacer
+from automax_ros.runtime.time.pacer import BREATH_S, LONGEST_WAIT_NS
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.runtime.time.simulated_pacer import LEAST_TICK_NS, MOST_LATE_NS, MOST_TICK_NS, SimulatedPacer
 
 KEY = EventKey(EventClass.SCAN, 4, "T")
 

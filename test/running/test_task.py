@@ -6,9 +6,9 @@ import pytest
 from compile.support import OTHER, WRITER, lines, logged, run_scans, scan_in_steps, task_of
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.running.error_log import LOG_NUMBERS, ErrorLog, LogEntry
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Status
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.scan.error_log import LOG_NUMBERS, ErrorLog, LogEntry
+from automax_ros.runtime.tasks.task import Status
 
 COUNTING = """10 LOCAL N%, OUT%, STARTS%
 20 STARTS% = STARTS% + 1

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.rack.config import RackConfig
+from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.sweep.measures import FUNCTIONS, MOST_MEASURES, Measure, Subject, read_measures
 
 from .helpers import rack_in

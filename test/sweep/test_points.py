@@ -8,8 +8,8 @@ from scipy.stats import qmc
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.numbers import stored_real
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 from automax_ros.sweep import points
 from automax_ros.sweep.points import grid, read_varied, sample
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.pieces.piece import Where
-from automax_ros.rack.loader import load
+from automax_ros.parallel.job import Where
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 from automax_ros.sweep.points import grid, read_varied
 from automax_ros.sweep.run import Outcome, Stimuli, run_point, run_points
 from automax_ros.sweep.sweeping import best_rows, run_sweep

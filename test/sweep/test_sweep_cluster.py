@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("distributed", reason="the extra automax_ros[cluster] is not installed")
 from pieces.clusters import cluster
 
-from automax_ros.pieces.piece import Where
+from automax_ros.parallel.job import Where
 from automax_ros.sweep.points import grid, read_varied
 from automax_ros.sweep.run import Stimuli
 from automax_ros.sweep.sweeping import run_sweep

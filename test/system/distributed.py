@@ -12,13 +12,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from automax_ros.bags.live.topics import TopicKind
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.nodes.recorder import RawSubscription
-from automax_ros.wire.bus_messages import Presence, Stage
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.messages import NAMES
-from automax_ros.wire.qos import SCAN, VALUE, QosProfile
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.types.messages import NAMES, Presence, Stage
+from automax_ros.messages.types.topics import SCAN, VALUE, QosProfile
+from automax_ros.recordings.live.topics import TopicKind
+from automax_ros.ros.clients.recorder import RawSubscription
 
 from .support import PATIENCE_S, RACKS, Automax, Client, wait_until
 

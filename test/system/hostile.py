@@ -10,7 +10,7 @@ HEADER = b"\x00\x01\x00\x00"
 
 
 def main(kind: str) -> None:
-    from automax_ros.nodes.environment import prepare
+    from automax_ros.ros.setup.environment import prepare
 
     prepare()
     from rclpy.context import Context

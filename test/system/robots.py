@@ -91,7 +91,7 @@ def _plotjuggler(folder: Path) -> Iterator[tuple[str, str]]:
 
 def has_field(type_name: str, field: str) -> bool:
     """Whether a message type has a field such as ``wrench.force.x`` or ``velocity[]``."""
-    from automax_ros.nodes.topics import message_class
+    from automax_ros.ros.base.qos import message_class
 
     kind = type_name
     for part in field.split("."):

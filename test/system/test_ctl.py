@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.reader import BagReader
+from automax_ros.recordings.read.reader import BagReader
 from automax_ros.replay.engine import ReplayOptions, replay
 
 from .support import COMMAND, PATIENCE_S, RACKS, TYPES, Automax, Client, automax, automax_here, wait_until
@@ -31,7 +31,7 @@ def rack(module_domain_id, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def caller(rack):
-    from automax_ros.nodes.operating import RackClient
+    from automax_ros.ros.clients.rack_client import RackClient
 
     with RackClient("/operated") as made:
         yield made
@@ -40,7 +40,7 @@ def caller(rack):
 @pytest.fixture
 def one_client(caller, monkeypatch):
     """Calls in this process speak through one client: each of its own takes up to 3 s to find the rack."""
-    from automax_ros.nodes import operating
+    from automax_ros.ros.clients import rack_client as operating
 
     def joined(space: str, *_: object):
         assert space == "/operated"

@@ -13,12 +13,12 @@ from random import Random
 
 import pytest
 
-from automax_ros.bags.reader import BagReader
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.messages import NAMES, Scan
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.types.messages import NAMES, Scan
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.recordings.read.reader import BagReader
 
 from .distributed import RINGS, SEATS, Distributed, Line, copied
 from .support import PATIENCE_S, TYPES, Automax, automax, automax_here, wait_until

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.info import bag_info
+from automax_ros.recordings.info.info import bag_info
 from automax_ros.replay.engine import replay
 
 from .distributed import Distributed, copied

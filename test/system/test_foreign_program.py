@@ -11,7 +11,7 @@ from .support import PATIENCE_S, ROOT
 
 PROGRAM = """
 import sys
-from automax_ros.nodes import RackNodes, prepare
+from automax_ros import RackNodes, prepare
 prepare()
 import rclpy
 from automax_msgs.srv import ReadStatus

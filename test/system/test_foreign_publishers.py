@@ -5,9 +5,9 @@ import signal
 
 import pytest
 
-from automax_ros.bags.reader import BagReader
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import CommonWrite, Scan, Values, VariableTable
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import CommonWrite, Scan, Values, VariableTable
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import TYPES, Automax, Client, wait_until
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from automax_ros.bags.reader import BagReader
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import PATIENCE_S, ROOT, TYPES, Automax
 

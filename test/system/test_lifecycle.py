@@ -7,7 +7,7 @@ import signal
 import pytest
 from nodes.managing import ACTIVE, INACTIVE, UNCONFIGURED, Manager
 
-from automax_ros.bags.reader import BagReader
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import RACKS, ROOT, TYPES, Automax, Client, automax_here
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
 
 from .support import TYPES, Automax, Client, consecutive, entries, ns
 

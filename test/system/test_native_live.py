@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.reader import BagReader
-from automax_ros.wire.messages import NAMES, Scan
+from automax_ros.messages.types.messages import NAMES, Scan
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import Automax, Ended, automax_here, wait_until
 

@@ -12,7 +12,7 @@ import pytest
 from bags.recordings import sample_recording
 from mcap.writer import Writer
 
-from automax_ros.bags.reader import BagReader
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import TYPES, Automax, Client, Ended, automax, automax_here, consecutive, ns
 
@@ -264,10 +264,10 @@ def test_recording_of_another_program_plays_as_far_as_its_types_are_installed(ro
 def test_malformed_message_ends_the_playback(ros_domain_id, tmp_path):
     from bags.recordings import TABLE
 
-    from automax_ros.bags.writer import BagWriter
-    from automax_ros.wire.cdr import encode
-    from automax_ros.wire.messages import NAMES, Int16, VariableTable
-    from automax_ros.wire.qos import LATCHED, VALUE
+    from automax_ros.messages.cdr.cdr import encode
+    from automax_ros.messages.types.messages import NAMES, Int16, VariableTable
+    from automax_ros.messages.types.topics import LATCHED, VALUE
+    from automax_ros.recordings.write.writer import BagWriter
 
     with BagWriter(tmp_path / "bag") as writer:
         writer.write(writer.channel("/line1/variables", NAMES[VariableTable], LATCHED), 0, encode(TABLE))

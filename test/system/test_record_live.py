@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from replay.reexecution import Reexecution
 
-from automax_ros.bags.live.provenance import GAPS_NAMED
-from automax_ros.bags.reader import BagReader
 from automax_ros.core.ticks import NS_PER_S, NS_PER_US
+from automax_ros.recordings.live.topics import GAPS_NAMED
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import TYPES, Automax, Client, automax, automax_here, consecutive, wait_until
 

@@ -7,8 +7,8 @@ import pytest
 from golden_text import check_golden
 from replay.reexecution import Reexecution
 
-from automax_ros.bags.reader import BagReader
 from automax_ros.core.values import real_text
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import ROOT, TYPES, automax
 

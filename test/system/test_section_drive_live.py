@@ -2,7 +2,7 @@
 
 import signal
 
-from automax_ros.bags.reader import BagReader
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import ROOT, Automax, Client
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.reader import BagReader
 from automax_ros.cli.main import main
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import COMMAND, PATIENCE_S, RACKS, ROOT, Automax, catches
 from .test_python_page import IN_ROS

@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from automax_ros.bags.reader import BagReader
+from automax_ros.recordings.read.reader import BagReader
 
 from .support import STUCK, TYPES, Automax, Client, automax, automax_here, consecutive, ns, wait_until
 

@@ -37,7 +37,7 @@ def test_a_wheel_brings_its_compiled_modules_to_a_machine_without_compiler(tmp_p
     automax = fresh / "bin" / "automax"
     said = done(automax, "--version", PATH=str(tmp_path))
     assert [line.split(":")[0] for line in said.splitlines()[1:]] == ["compiled"], said
-    program = "from automax_ros.running import scheduler; print(scheduler.__file__)"
+    program = "from automax_ros.runtime.time import scheduler; print(scheduler.__file__)"
     assert done(fresh / "bin" / "python", "-c", program, PATH=str(tmp_path)).startswith(f"{site}/automax_ros_compiled/")
     run = (automax, "run", ROOT / "config" / "section_drive" / "rack.yaml", "--simulated", "--duration", "2")
     for switch in ("auto", "off"):

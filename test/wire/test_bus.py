@@ -5,15 +5,13 @@ from __future__ import annotations
 import pytest
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.rack.bus.link import Batch, HeldForce, Picture, Standing
-from automax_ros.rack.bus.versions import Held
-from automax_ros.rack.standing import StopCause
-from automax_ros.wire.bus import batch_of, image_message, picture_of, standing_of, with_standing, write_message
-from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence, Stage
-from automax_ros.wire.bus_peers import HUNG_NS, MISSING_NS, SILENCE_NS, Heard, Peers
-from automax_ros.wire.cdr import CdrError, decode, encode
-from automax_ros.wire.messages import NAMES
-from automax_ros.wire.values import Values
+from automax_ros.messages.bus.bus import batch_of, image_message, picture_of, standing_of, with_standing, write_message
+from automax_ros.messages.bus.peers import HUNG_NS, MISSING_NS, SILENCE_NS, Heard, Peers
+from automax_ros.messages.cdr.cdr import CdrError, decode, encode
+from automax_ros.messages.types.messages import NAMES, BusImage, BusWrite, Presence, Stage, Values
+from automax_ros.rack.base.stop_cause import StopCause
+from automax_ros.rack.distributed.link import Batch, HeldForce, Picture, Standing
+from automax_ros.rack.distributed.versions import Held
 
 TEXTS = frozenset({4})
 BATCH = Batch(2, 9, 11_000_000, 5, WriteKind.COMMIT, ((0, 0, 7.0), (4, 1, "ABC"), (3, 2, 1.5), (4, 0, "")))

@@ -7,12 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.rack.bus.link import Standing
-from automax_ros.wire.bus import with_standing
-from automax_ros.wire.bus_limits import AHEAD_NS, BusLimits
-from automax_ros.wire.bus_messages import BusImage, BusWrite, Presence
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.values import Values
+from automax_ros.messages.bus.bus import AHEAD_NS, BusLimits, with_standing
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Values
+from automax_ros.rack.distributed.link import Standing
 
 SEATS = {1: (1, 7), 3: (3,)}
 WALL_NS = 1_800_000_000 * NS_PER_S

@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from automax_ros.wire.cdr import HEADER, CdrError, decode, decoder, encode, encoder
-from automax_ros.wire.cdr_source import _appender
-from automax_ros.wire.definitions import TIME, message_types, schema_text
-from automax_ros.wire.messages import (
+from automax_ros.messages.cdr.cdr import HEADER, CdrError, _appender, decode, decoder, encode, encoder
+from automax_ros.messages.types.definitions import TIME, message_types, schema_text
+from automax_ros.messages.types.messages import (
     CLASSES,
     NAMES,
+    NO_VALUES,
     Bool,
     Clock,
     CommonWrite,
@@ -30,8 +30,8 @@ from automax_ros.wire.messages import (
     Scan,
     ScanError,
     String,
+    Values,
 )
-from automax_ros.wire.values import NO_VALUES, Values
 
 ALL = sorted(CLASSES)
 REPEATABLE = settings(deadline=None, derandomize=True, max_examples=60)

@@ -6,10 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.wire.cdr import CdrError, decode, encode
-from automax_ros.wire.cdr_columns import FEWEST, decode_columns
-from automax_ros.wire.messages import NAMES, CommonWrite, Scan, ScanError
-from automax_ros.wire.values import NO_VALUES, Values
+from automax_ros.messages.cdr.cdr import CdrError, decode, encode
+from automax_ros.messages.cdr.columns import FEWEST, decode_columns
+from automax_ros.messages.types.messages import NAMES, NO_VALUES, CommonWrite, Scan, ScanError, Values
 
 SCAN, WRITE = NAMES[Scan], NAMES[CommonWrite]
 

@@ -7,10 +7,9 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.wire.cdr import HEADER, CdrError, decoder, encode
-from automax_ros.wire.cdr_parts import MOST_TOGETHER, read_numbers, together
-from automax_ros.wire.messages import Scan
-from automax_ros.wire.values import Values
+from automax_ros.messages.cdr.cdr import HEADER, CdrError, decoder, encode
+from automax_ros.messages.cdr.parts import MOST_TOGETHER, read_numbers, together
+from automax_ros.messages.types.messages import Scan, Values
 
 ENTRIES = st.tuples(st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1), st.floats(allow_nan=False))
 

@@ -14,8 +14,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from automax_ros.core import kinds
 from automax_ros.core.types import DataType
-from automax_ros.wire import messages
-from automax_ros.wire.definitions import (
+from automax_ros.messages.types import messages
+from automax_ros.messages.types.definitions import (
     MAX_SCHEMA_BYTES,
     TIME,
     Constant,

@@ -12,14 +12,14 @@ from rack.drive_tasks import permit
 from rack.drive_tasks import rack_of as drive_rack
 
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
-from automax_ros.drive.firing import ConstantAlpha
-from automax_ros.rack.plants.driven import driven_plants
+from automax_ros.drive.circuit.firing import ConstantAlpha
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.stream.plant_stream import state_message
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.messages.types.topics import PLANT
 from automax_ros.rack.rack import Rack
-from automax_ros.running.scheduler import EventClass, EventKey
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.plant_stream import state_message
-from automax_ros.wire.qos import PLANT
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 YAML = """\
 rack: LINE1

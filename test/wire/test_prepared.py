@@ -14,16 +14,15 @@ from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_S
-from automax_ros.running.scan_record import ScanRecord
-from automax_ros.running.views import WriteGroup
-from automax_ros.wire import patterns
-from automax_ros.wire.cdr import CdrError, encode
-from automax_ros.wire.messages import CommonWrite, Int16, Scan, TaskState
-from automax_ros.wire.prepared import prepared
-from automax_ros.wire.rack_messages import value_encoder
-from automax_ros.wire.task_messages import TaskMessages
-from automax_ros.wire.values import NO_VALUES, Values
-from automax_ros.wire.write_messages import WriteMessages
+from automax_ros.messages.cdr.cdr import CdrError, encode
+from automax_ros.messages.stream import templates as patterns
+from automax_ros.messages.stream.rack_messages import value_encoder
+from automax_ros.messages.stream.task_messages import TaskMessages
+from automax_ros.messages.stream.templates import prepared
+from automax_ros.messages.stream.write_messages import WriteMessages
+from automax_ros.messages.types.messages import NO_VALUES, CommonWrite, Int16, Scan, TaskState, Values
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.scan.scan_record import ScanRecord
 
 STAMPS = st.integers(0, (2**31 - 1) * NS_PER_S)
 NUMBERS = st.one_of(st.booleans(), st.integers(-(2**31), 2**31 - 1), st.floats(width=32, allow_nan=False))

@@ -12,10 +12,10 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.kinds import Direction, WriteKind, WriterKind
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.core.types import DataType
+from automax_ros.messages.cdr.cdr import decode
+from automax_ros.messages.stream.stream import SNAPSHOT_PERIOD_NS, RackStream
+from automax_ros.messages.types.topics import LATCHED, SCAN
 from automax_ros.rack.rack import Rack
-from automax_ros.wire.cdr import decode
-from automax_ros.wire.qos import LATCHED, SCAN
-from automax_ros.wire.stream import SNAPSHOT_PERIOD_NS, RackStream
 
 
 class Sent(NamedTuple):

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from librt.strings import BytesWriter, write_i16_le, write_i32_le, write_i64_le
 
-from automax_ros.wire.unsigned import as_i16, as_i32, as_i64
+from automax_ros.messages.stream.task_messages import as_i16, as_i32, as_i64
 
 FORMS = [(as_i16, write_i16_le, "<H", 16), (as_i32, write_i32_le, "<I", 32), (as_i64, write_i64_le, "<Q", 64)]
 

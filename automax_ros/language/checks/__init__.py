@@ -1,1 +1,1 @@
-"""Tree to checked Program: the checker, and one file for each of its rules."""
+"""The checker: from the text of a task to a checked program."""

@@ -6,25 +6,24 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from automax_ros.blocks.declaration import Block, Platform
+from automax_ros.blocks.declare.declaration import Block, Platform
 from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
 from automax_ros.core.ticks import DEFAULT_TICK_NS
-from automax_ros.language.checks.broken_lines import broken_lines
-from automax_ros.language.checks.calls import check_call, check_scan_loop, event_name
-from automax_ros.language.checks.context import Context
-from automax_ros.language.checks.declarations import check_declarations, check_storage
-from automax_ros.language.checks.flow import check_flow
-from automax_ros.language.checks.sharing import check_sharing
-from automax_ros.language.checks.statements import check_reads, check_statement, data_pool
-from automax_ros.language.checks.structures import find_structures
-from automax_ros.language.checks.task_layout import TaskLayout, find_layout
-from automax_ros.language.checks.unconfirmed import find_unconfirmed
-from automax_ros.language.checks.waiting import check_waiting, find_files
+from automax_ros.language.checks.calls.calls import check_call, check_scan_loop, event_name
+from automax_ros.language.checks.calls.data_structures import find_structures
+from automax_ros.language.checks.calls.sharing import check_sharing
+from automax_ros.language.checks.rules.basic_statements import check_waiting, find_files
+from automax_ros.language.checks.rules.context import Context, broken_lines
+from automax_ros.language.checks.rules.declarations import check_declarations, check_storage
+from automax_ros.language.checks.rules.flow import check_flow
+from automax_ros.language.checks.rules.statements import check_reads, check_statement, data_pool
+from automax_ros.language.checks.rules.task_layout import TaskLayout, find_layout
+from automax_ros.language.checks.rules.unconfirmed import find_unconfirmed
+from automax_ros.language.parse.parser import parse
 from automax_ros.language.program import BoundCall, CommonSpec, Program
-from automax_ros.language.syntax.parser import parse
-from automax_ros.language.syntax.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
-from automax_ros.language.syntax.task_kind import TaskKind, kind_of_source
-from automax_ros.language.syntax.tree import Call, Declaration, Module, Read, Statement
+from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
+from automax_ros.language.tree.task_kind import TaskKind, kind_of_source
+from automax_ros.language.tree.tree import Call, Declaration, Module, Read, Statement
 
 AUTOMAX = Platform.AUTOMAX
 _TOO_LARGE, _TOO_MANY, _UTF_16 = "AMX0001", "AMX0002", "AMX0006"

@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from automax_ros.rack.modules.common_memory import CommonMemoryConfig
-from automax_ros.rack.modules.configured import ModuleConfig
-from automax_ros.rack.modules.drive_analog import DriveAnalogConfig
-from automax_ros.rack.modules.drive_config import DriveConfig
-from automax_ros.rack.modules.drive_controller import DriveControllerModule
-from automax_ros.rack.modules.drive_voltage import DriveAnalogModule
-from automax_ros.rack.modules.io_config import IoConfig
+from automax_ros.rack.modules.drive import DriveControllerModule
+from automax_ros.rack.modules.drive_io import DriveAnalogModule
 from automax_ros.rack.modules.io_module import IoModule
+from automax_ros.rack.modules.module import Module, Parts, QuietModule
 from automax_ros.rack.modules.network import NetworkModule
-from automax_ros.rack.modules.network_config import NetworkConfig
-from automax_ros.rack.modules.pc3000 import Pc3000Config
-from automax_ros.rack.modules.processor import ProcessorConfig
-from automax_ros.rack.modules.processor_module import ProcessorModule
-from automax_ros.rack.modules.running import Module, Parts, QuietModule
+from automax_ros.rack.modules.processor import ProcessorModule
 from automax_ros.rack.modules.udc import UdcModule
-from automax_ros.rack.modules.udc_config import UdcConfig
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.modules.common_memory import CommonMemoryConfig
+from automax_ros.rackfile.modules.drive import DriveAnalogConfig, DriveConfig
+from automax_ros.rackfile.modules.io import IoConfig
+from automax_ros.rackfile.modules.network import NetworkConfig
+from automax_ros.rackfile.modules.processor import Pc3000Config, ProcessorConfig
+from automax_ros.rackfile.modules.udc import UdcConfig
 
 
 def build_module(config: ModuleConfig, parts: Parts) -> Module:

@@ -14,11 +14,11 @@ from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
 from automax_ros.core.ticks import CLOCK_PERIOD_NS
 from automax_ros.core.types import DataType, Value
-from automax_ros.rack.modules.configured import Interrupt, ModuleConfig
-from automax_ros.rack.modules.running import ModuleState, Parts
-from automax_ros.rack.scheduled_task import ScheduledTask
-from automax_ros.running.process_inputs import Freezer
-from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
+from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rackfile.model.module import Interrupt, ModuleConfig
+from automax_ros.runtime.memory.process_inputs import Freezer
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
 
 _COUNTER_BITS = 24
 

@@ -25,10 +25,11 @@ from functools import partial
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.numbers import sign_extended
-from automax_ros.rack.modules.configured import ModuleConfig
-from automax_ros.rack.modules.network_hearing import Hearing
-from automax_ros.rack.modules.network_port import Frame, NetworkStatus, Send, Sender
-from automax_ros.rack.modules.network_registers import (
+from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rack.modules.network_drops import Frame, Hearing, NetworkStatus, Send, Sender
+from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.modules.network import (
     AREA,
     BROADCAST,
     CRC_ERRORS,
@@ -48,9 +49,7 @@ from automax_ros.rack.modules.network_registers import (
     from_slave,
     greatest_depth,
 )
-from automax_ros.rack.modules.running import ModuleState, Parts
-from automax_ros.rack.scheduled_task import ScheduledTask
-from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
 
 CYCLE_NS = 5_500_000
 """Time between two frames of a drop, ns."""

@@ -1,128 +1,41 @@
-"""AutoMax Processors: each runs up to 32 tasks on a tick of its own (J2-3106-1 p. 2-5, 10-1)."""
+"""A Processor of a running rack, with its tasks."""
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
-from automax_ros.compile.cost import Model
-from automax_ros.core.json_schema import Keys, steps
-from automax_ros.core.ticks import DEFAULT_TICK_NS, MAX_TICK_NS, MIN_TICK_NS, NS_PER_MS, TICK_STEP_NS, tick_ns
-from automax_ros.core.yaml_text import Node, Scalar
-from automax_ros.rack.executive import OLDEST, tick_fault, version_text
-from automax_ros.rack.modules.common_memory import COMMON_MEMORY
-from automax_ros.rack.modules.configured import NO_REGISTERS, Registers
-from automax_ros.rack.modules.kind import Arrangement, FoundModule
-from automax_ros.rack.scalars import wrong_kind
-from automax_ros.rack.task_config import TaskConfig
-from automax_ros.rack.tasks import PRIORITIES, tasks_schema
-
-MAX_PROCESSORS = 4
-"""Processors of one rack (J2-3106-1 p. 2-5)."""
-_COMMON_REGISTERS = 65536
-"""Registers for commons where a Processor works alone (decision: as many as the 57C413 has)."""
-_TICKS_MS = tuple(time / NS_PER_MS for time in (MIN_TICK_NS, MAX_TICK_NS, TICK_STEP_NS, DEFAULT_TICK_NS))
-_TICK = re.compile(r"[0-9]{1,6}(\.[0-9]{1,9})?\Z")
-_SINCE = {"57C435": 30}
-"""The first version of the Executive with a module, in tenths, where that is not the oldest (1.1)."""
-_SLOTS = range(1, 5)
-"""Where Processors stand next to a common memory module (J2-3106-1 p. 10-2)."""
+from automax_ros.rack.modules.module import ModuleState
+from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rackfile.model.module import ModuleConfig
 
 
-@dataclass(frozen=True)
-class ProcessorConfig:
-    """A Processor module; ``model`` is its number as the manuals write it (``57C430A``), tasks in the file's order."""
+@dataclass
+class ProcessorModule:
+    """A Processor with its tasks."""
 
-    slot: int
-    model: str
-    tick_ns: int
-    tasks: tuple[TaskConfig, ...] = ()
-    line: int = 0
+    config: ModuleConfig
+    tasks: Sequence[ScheduledTask]
+    kept: frozenset[tuple[int, int]] = frozenset()
 
-    has_battery = True
-    keeps_locals = True
-    registers: Registers = NO_REGISTERS
-    common_registers = _COMMON_REGISTERS
+    def power_on(self) -> None:
+        """Nothing begins: tasks are put into RUN by the rack, in the order of all its Processors."""
 
-    @property
-    def name(self) -> str:
-        """The module's name in the rack, as that of its node."""
-        return f"processor_{self.slot}"
+    def power_off(self) -> None:
+        """Stop the tasks; locals, tunables and error logs stay (2.4.5)."""
+        for task in self.tasks:
+            task.stop()
 
-    @property
-    def times(self) -> Model:
-        """Whose execution times its tasks have."""
-        return Model(self.model)
+    def stopped_all(self) -> None:
+        """Nothing follows: locals, tunables and error logs stay (2.4.5)."""
 
+    def state(self) -> ModuleState:
+        """Return the state of each task."""
+        return {item.task.name: item.state() for item in self.tasks}
 
-class ProcessorKind:
-    """What a rack file may say of a Processor."""
-
-    word = "processor"
-    models = {"57C430A": "6010", "57C431": "6011", "57C435": "7010"}  # noqa: RUF012
-    options: Keys = MappingProxyType(
-        {
-            "tick_ms": steps("Tick rate in ms; the scan time of a task is its TICKS times this.", *_TICKS_MS),
-            "tasks": tasks_schema(PRIORITIES),
-        }
-    )
-
-    def read(self, found: FoundModule) -> ProcessorConfig:
-        """Read tick and tasks."""
-        _check_model(found)
-        tick = _tick(found.section.get("tick_ms"), found)
-        tasks = found.section.get("tasks")
-        read = found.tasks.read(tasks, found.where) if tasks else ()
-        return ProcessorConfig(found.slot, found.model, tick, read, found.span.line)
-
-    def check_places(self, rack: Arrangement) -> None:
-        """Report too few or too many Processors, and those in other slots than 1 to 4, or 0 for a Processor alone."""
-        own = rack.of(self)
-        if not rack.complete:
-            return
-        has_memory = any(item.slot == 0 for item in rack.of(COMMON_MEMORY))
-        if not any(isinstance(item.kind, ProcessorKind) for item in rack.standing):
-            hint = f"Processors are {', '.join(self.models)}"
-            rack.findings.add("AMX6209", "the rack has no Processor", rack.span, hint)
-        elif len(own) > MAX_PROCESSORS:
-            message = f"the rack has {len(own)} Processors; it may have at most {MAX_PROCESSORS}"
-            rack.findings.add("AMX6207", message, own[MAX_PROCESSORS].span)
-        elif len(own) > 1 and not has_memory:
-            message = "more than one Processor needs a common memory module in slot 0"
-            hint = f"put {' or '.join(COMMON_MEMORY.models)} into slot 0 and the Processors into slots 1 to 4"
-            rack.findings.add("AMX6205", message, own[1].span, hint)
-        else:
-            allowed = _SLOTS if has_memory else range(1)
-            where = "slots 1 to 4 next to common memory" if has_memory else "slot 0 of a rack without common memory"
-            for item in own:
-                if item.slot not in allowed:
-                    message = f"a Processor stands in {where}, not in slot {item.slot}"
-                    rack.findings.add("AMX6206", message, item.span)
-
-
-PROCESSOR = ProcessorKind()
-
-
-def _tick(node: Node | None, found: FoundModule) -> int:
-    if node is None:
-        return DEFAULT_TICK_NS
-    if not isinstance(node, Scalar) or not node.plain or not _TICK.match(node.text):
-        wrong_kind(node, f"tick_ms of {found.where}", "a number of milliseconds such as 5.5", found.findings)
-        return DEFAULT_TICK_NS
-    try:
-        tick = tick_ns(node.text)
-    except ValueError as error:
-        found.findings.add("AMX6210", f"{found.where}: {error}", node.span)
-        return DEFAULT_TICK_NS
-    fault = tick_fault(found.executive, tick)
-    if fault is not None:
-        found.findings.add("AMX6702", f"{found.where}: {fault}", node.span)
-    return tick
-
-
-def _check_model(found: FoundModule) -> None:
-    since = _SINCE.get(found.model, OLDEST)
-    if found.executive < since:
-        message = f"{found.where} needs executive {version_text(since)} or later, not {version_text(found.executive)}"
-        found.findings.add("AMX6703", message, found.span)
+    def load(self, state: ModuleState) -> None:
+        """Take over the state of each task; those that ran go on with their next scan."""
+        if set(state) != {item.task.name for item in self.tasks}:
+            raise ValueError(f"{self.config.name} has the tasks {[item.task.name for item in self.tasks]}")
+        for item in self.tasks:
+            item.load(state[item.task.name])

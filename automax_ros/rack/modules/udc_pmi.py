@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.drive import pmi_table as table
-from automax_ros.drive.errors import DriveError
-from automax_ros.drive.pmi import Commands, Pmi
-from automax_ros.rack.modules.configured import ModuleConfig
-from automax_ros.rack.modules.running import ModuleState, Parts
-from automax_ros.rack.modules.udc_registers import RAIL_COUNTERS
-from automax_ros.rack.plants.driven import Driving
-from automax_ros.running.scheduler import EventClass, EventKey, ScheduledEvent
+from automax_ros.drive.base.errors import DriveError
+from automax_ros.drive.pmi import registers as table
+from automax_ros.drive.pmi.pmi import Commands, Pmi
+from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rackfile.model.driven import Driving
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.modules.udc import RAIL_COUNTERS
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
 
 
 class UdcPmis:

@@ -10,16 +10,16 @@ from collections.abc import Mapping, Sequence
 
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.types import Value
-from automax_ros.drive.plant import DrivePlant
-from automax_ros.drive.plant_signals import SIGNALS
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.observers import Observers
-from automax_ros.rack.operations import Operations
-from automax_ros.rack.plants.config import FeedConfig
-from automax_ros.rack.writers import writers_of
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.process_inputs import ProcessInputs
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.drive.plant.plant import DrivePlant
+from automax_ros.drive.plant.signals import SIGNALS
+from automax_ros.rack.base.observers import Observers
+from automax_ros.rack.operate.operations import Operations
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.plants import FeedConfig
+from automax_ros.rackfile.model.writers import writers_of
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 _AFTER_MODULES = 16
 """Priority among the I/O of an instant: modules have those of their slots."""

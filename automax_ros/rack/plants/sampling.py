@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from automax_ros.drive.plant import DrivePlant
-from automax_ros.running.scheduler import EventClass, EventKey, Scheduler
+from automax_ros.drive.plant.plant import DrivePlant
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 SAMPLE_NS = 10_000_000
 """Time between two looks, ns: 100 a second (decision)."""

@@ -44,7 +44,7 @@ int64_t automax_records(
     return found;
 }
 
-/* What is taken of the messages of a type: how their fields are found (wire/cdr_fields.h), which `numbers` are wanted,
+/* What is taken of the messages of a type: how their fields are found (messages/cdr/fields.h), which `numbers` are wanted,
  * the first lists of values of variables (`groups`: numbers, elements, values), and the lists of pairs of uint16 and of
  * the text by which messages are told apart (-1: none). */
 typedef int automax_find(const uint8_t *message, int64_t length, int64_t *numbers, int64_t *places, int64_t *counts);

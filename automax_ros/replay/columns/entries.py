@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonVariable
-from automax_ros.wire.cdr_columns import Array, Ints, MessageColumns
-from automax_ros.wire.values import Values
+from automax_ros.messages.cdr.columns import Array, Ints, MessageColumns
+from automax_ros.messages.types.messages import Values
+from automax_ros.rackfile.model.config import CommonVariable
 
 Floats = NDArray[np.float64]
 

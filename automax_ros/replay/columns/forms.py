@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from automax_ros.compile.base.scan_io import StateValues
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native.executed import BesideLatch
-from automax_ros.compile.native.forms import IN_PYTHON, NativeForms, NativeOutcome
-from automax_ros.compile.scan_io import StateValues
+from automax_ros.compile.native.run.columns import BesideLatch
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms, NativeOutcome
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonVariable
+from automax_ros.messages.cdr.columns import Ints
+from automax_ros.rackfile.model.config import CommonVariable
 from automax_ros.replay.columns.entries import Entries
 from automax_ros.replay.columns.execution import ColumnForm, Executed, PythonColumns
 from automax_ros.replay.columns.library import ColumnLibrary, library_text
-from automax_ros.running.backplane import Backplane
-from automax_ros.wire.cdr_columns import Ints
+from automax_ros.runtime.memory.registers import Backplane
 
 if TYPE_CHECKING:
-    from automax_ros.compile.native.task import (
+    from automax_ros.compile.native.run.task import (
         NativeTask,
     )  # it takes a tenth of a second, and only native tasks need it
 

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from automax_ros.bags.chunk_table import MESSAGE_HEAD, MOST_MESSAGES, ChunkTable, definition_at
-from automax_ros.bags.unpacking import Buffer
+from automax_ros.messages.cdr.cdr import MAX_TRAILING
+from automax_ros.messages.cdr.columns import Bytes, Ints
+from automax_ros.messages.cdr.fields import MACROS, FieldsSource, fields_source
+from automax_ros.messages.types.messages import NAMES, CommonWrite, Scan
+from automax_ros.recordings.mcap.chunk_table import MESSAGE_HEAD, MOST_MESSAGES, ChunkTable, definition_at
+from automax_ros.recordings.mcap.unpacking import Buffer
 from automax_ros.replay.columns.entries import Entries, ValueRules
-from automax_ros.wire.cdr_columns import Bytes, Ints
-from automax_ros.wire.cdr_fields import MACROS, FieldsSource, fields_source
-from automax_ros.wire.cdr_source import MAX_TRAILING
-from automax_ros.wire.messages import NAMES, CommonWrite, Scan
 
 _MOST_DEFINITIONS = 1000
 _MOST_FIELDS = 32

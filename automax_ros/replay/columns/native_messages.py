@@ -7,13 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from automax_ros.bags.blocks import MessageBlock
-from automax_ros.bags.errors import BagError
+from automax_ros.messages.cdr.columns import Ints
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.read.blocks import MessageBlock
 from automax_ros.replay.columns.entries import ValueRules
 from automax_ros.replay.columns.library import SCANS, WRITES, ColumnLibrary, TakenMessages
-from automax_ros.replay.columns.scans import ScanColumns, ScanErrors, tell_of_time
-from automax_ros.replay.columns.writes import FORCING, LIMIT, WriteColumns, decoded_write
-from automax_ros.wire.cdr_columns import Ints
+from automax_ros.replay.columns.scans import (
+    FORCING,
+    LIMIT,
+    ScanColumns,
+    ScanErrors,
+    WriteColumns,
+    decoded_write,
+    tell_of_time,
+)
 
 _UINT64 = (1 << 64) - 1
 

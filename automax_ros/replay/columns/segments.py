@@ -6,17 +6,16 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
-from automax_ros.bags.blocks import MessageBlock
-from automax_ros.bags.reader import BagMessage
+from automax_ros.recordings.read.blocks import MessageBlock
+from automax_ros.recordings.read.reader import BagMessage
 from automax_ros.replay.columns.entries import ValueRules
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.library import ColumnLibrary
 from automax_ros.replay.columns.native_messages import native_scans, native_writes
-from automax_ros.replay.columns.scans import SCAN, ScanColumns, scans_by_task
+from automax_ros.replay.columns.scans import SCAN, WRITE, ScanColumns, WriteColumns, scans_by_task, write_columns
 from automax_ros.replay.columns.stretch import TaskStretches
-from automax_ros.replay.columns.writes import WRITE, WriteColumns, write_columns
-from automax_ros.replay.commons import RecordedCommons
-from automax_ros.replay.task import TaskReplay
+from automax_ros.replay.scans.commons import RecordedCommons
+from automax_ros.replay.scans.task import TaskReplay
 
 FEWEST_MESSAGES = 64
 """Between two messages that have to be taken by themselves, fewer than this go one by one too (decision)."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import random
 
+from automax_ros.compile.base.scan_io import ScanTooLong
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native import NativeTask
-from automax_ros.compile.scan_io import ScanTooLong
+from automax_ros.compile.native.run.task import NativeTask
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType, Value, type_of_name
 

@@ -14,15 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from automax_ros.compile.native.build import library
-from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.calls import called
-from automax_ros.compile.native.environment import Environment
-from automax_ros.compile.native.frame import Frame
-from automax_ros.compile.native.ranges import ANY_BOOL, ANY_REAL, Kind, Range
-from automax_ros.compile.native.translation import fixed_parts
-from automax_ros.compile.native.typed import WIDE, bare, c_type
-from automax_ros.compile.native.unit import Unit
+from automax_ros.compile.native.run.build import library
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.translate.calls import called
+from automax_ros.compile.native.translate.environment import Environment
+from automax_ros.compile.native.translate.frame import Frame, Unit
+from automax_ros.compile.native.translate.ranges import ANY_BOOL, ANY_REAL, Kind, Range
+from automax_ros.compile.native.translate.translation import fixed_parts
+from automax_ros.compile.native.translate.typed import WIDE, bare, c_type
 from automax_ros.core import numbers
 
 FAULT = 5

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.compile.native import build, native_form
-from automax_ros.compile.native.build import find_compiler, key_of, library, python_options
-from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.source import NotNative
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.run import build
+from automax_ros.compile.native.run.build import find_compiler, key_of, library, python_options
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.task import native_form
 
 from ..support import compiled_of, lines
 from .support import await_that, begun_compiler_of, compiler_of, has_ended
@@ -166,8 +167,8 @@ def test_python_h_is_asked_for_by_its_package(monkeypatch, tmp_path):
 BUILDING = """
 import ctypes, sys
 from pathlib import Path
-from automax_ros.compile.native.build import library
-from automax_ros.compile.native.cache import NativeCache
+from automax_ros.compile.native.run.build import library
+from automax_ros.compile.native.run.cache import NativeCache
 path = library("int answer(void) { return 42; }", NativeCache(Path(sys.argv[1])))
 assert ctypes.CDLL(str(path)).answer() == 42
 """

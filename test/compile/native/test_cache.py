@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.compile.native.cache import STALE_S, NativeCache, user_folder
-from automax_ros.compile.native.source import NotNative
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.run.cache import STALE_S, NativeCache, user_folder
 
 KEY, OTHER = "a" * 64, "b" * 64
 
@@ -175,7 +175,7 @@ def test_a_home_that_cannot_be_written_is_told(tmp_path):
 STORING = """
 import sys
 from pathlib import Path
-from automax_ros.compile.native.cache import NativeCache
+from automax_ros.compile.native.run.cache import NativeCache
 cache = NativeCache(Path(sys.argv[1]))
 for number in range(100):
     cache.store("same", sys.argv[2].encode() * 20_000)

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.task import NativeTask, native_form
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.task import NativeTask, native_form
 from automax_ros.core.types import DataType
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.task import Task
-from automax_ros.running.views import Place, ViewSpec
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import Place, ViewSpec
+from automax_ros.runtime.tasks.task import Task
 
 from ..support import OTHER, WRITER, compiled_of, program_of, repeatable, views_of
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.executed import BesideLatch
-from automax_ros.compile.native.source import NativeSource
-from automax_ros.compile.native.task import native_form
+from automax_ros.compile.base.native_source import NativeSource
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.columns import BesideLatch
+from automax_ros.compile.native.run.task import native_form
 
 from ..support import compiled_of
 from .support import exporting

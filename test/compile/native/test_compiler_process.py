@@ -10,11 +10,11 @@ import time
 
 import pytest
 
-from automax_ros.compile.native import compiler_process
-from automax_ros.compile.native.build import build, find_compiler
-from automax_ros.compile.native.cache import STALE_S
-from automax_ros.compile.native.compiler_process import FOLDER, abandon, memory_of, run_compiler
-from automax_ros.compile.native.source import NotNative
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.run import compiler_process
+from automax_ros.compile.native.run.build import build, find_compiler
+from automax_ros.compile.native.run.cache import STALE_S
+from automax_ros.compile.native.run.compiler_process import FOLDER, abandon, memory_of, run_compiler
 
 from .support import PATIENCE_S, await_that, begun_compiler_of, compiler_of, has_ended
 
@@ -193,8 +193,8 @@ def test_what_a_compiler_leaves_running_ends_with_it(tmp_path):
 RUNNING = """
 import os, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background of a shell
-from automax_ros.compile.native.cache import STALE_S
-from automax_ros.compile.native.compiler_process import run_compiler
+from automax_ros.compile.native.run.cache import STALE_S
+from automax_ros.compile.native.run.compiler_process import run_compiler
 run_compiler([os.environ["CC"]], os.environ["PATH"])
 """
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.compile.native import environment
-from automax_ros.compile.native.environment import Environment, joined
-from automax_ros.compile.native.ranges import Kind, Range
+from automax_ros.compile.native.translate import environment
+from automax_ros.compile.native.translate.environment import Environment, joined
+from automax_ros.compile.native.translate.ranges import Kind, Range
 
 NAMES = "abcdefgh"
 Model = dict[str, Range]

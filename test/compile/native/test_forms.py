@@ -5,10 +5,11 @@ import threading
 
 import pytest
 
-from automax_ros.compile.native import task as task_module
-from automax_ros.compile.native.build import build, find_compiler
-from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.forms import (
+from automax_ros.compile.base.native_source import NOT_KEPT
+from automax_ros.compile.native.run import task as task_module
+from automax_ros.compile.native.run.build import build, find_compiler
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.forms import (
     IN_PYTHON,
     WORTHWHILE_KEPT_LINE_NS,
     WORTHWHILE_KEPT_NS,
@@ -17,8 +18,7 @@ from automax_ros.compile.native.forms import (
     NativeForms,
     NativeMode,
 )
-from automax_ros.compile.native.source import NOT_KEPT
-from automax_ros.compile.native.task import native_form
+from automax_ros.compile.native.run.task import native_form
 
 from ..support import compiled_of
 from .support import await_that, begun_compiler_of, compiler_of, has_ended
@@ -139,7 +139,7 @@ def test_ctrl_c_amid_a_translation_waits_for_nothing_and_starts_no_compiler(comp
         finally:
             over.set()
 
-    monkeypatch.setattr("automax_ros.compile.native.task.native_form", translating)
+    monkeypatch.setattr("automax_ros.compile.native.run.task.native_form", translating)
     with pytest.raises(KeyboardInterrupt):
         NativeForms(NativeMode.ON, cache=NativeCache(tmp_path / "cache")).made({"A": compiled})
     goes_on.set()
@@ -152,7 +152,7 @@ def test_an_end_asked_for_on_a_thread_is_raised(compiled, monkeypatch, tmp_path)
     def ends(*_, **__):
         raise SystemExit("the program is to end")
 
-    monkeypatch.setattr("automax_ros.compile.native.task.native_form", ends)
+    monkeypatch.setattr("automax_ros.compile.native.run.task.native_form", ends)
     with pytest.raises(SystemExit, match="the program is to end"):
         NativeForms(NativeMode.ON, cache=NativeCache(tmp_path / "cache")).made({"A": compiled, "B": compiled})
 

@@ -7,14 +7,14 @@ import weakref
 
 import pytest
 
+from automax_ros.compile.base.native_source import NativeSource, NotNative
+from automax_ros.compile.base.scan_io import ScanTooLong
 from automax_ros.compile.compiler import CompiledTask
-from automax_ros.compile.native.cache import NativeCache
-from automax_ros.compile.native.source import NativeSource, NotNative
-from automax_ros.compile.native.task import native_form
-from automax_ros.compile.scan_io import ScanTooLong
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.task import native_form
 from automax_ros.core.types import type_of_name
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.views import ViewSpec
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import ViewSpec
 
 from ..support import compiled_of, task_of
 from .support import exporting

@@ -9,10 +9,12 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
 from automax_ros.blocks.catalogue import CATALOGUE
-from automax_ros.blocks.declaration import Block, Platform
+from automax_ros.blocks.declare.declaration import Block, Platform
 from automax_ros.compile.compiler import CompiledTask, compile_program
-from automax_ros.compile.native import NativeCache, native_form, translate
-from automax_ros.compile.native.repeated import Repeated
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.task import native_form
+from automax_ros.compile.native.translate.scan_body import Repeated
+from automax_ros.compile.native.translate.translation import translate
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.language.checks.checker import check
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.compile.native import NativeCache, NotNative, kept_translations, translate
-from automax_ros.compile.native.kept_translations import kept_translation, translation_key
-from automax_ros.compile.native.translation import scans_of
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.run import task as kept_translations
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.task import kept_translation, translation_key
+from automax_ros.compile.native.translate.translation import scans_of, translate
 
 from ..support import compiled_of, lines
 

@@ -7,10 +7,11 @@ import shutil
 
 import pytest
 
-from automax_ros.compile import functions
-from automax_ros.compile.native import NativeCache, NotNative
-from automax_ros.compile.native.coefficients import raised
-from automax_ros.compile.native.unit import Unit
+from automax_ros.compile.base import functions
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.blocks.coefficients import raised
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.translate.frame import Unit
 from automax_ros.core import numbers
 from automax_ros.core.numbers import stored_real
 

@@ -6,8 +6,11 @@ import shutil
 
 import pytest
 
-from automax_ros.compile.native import NativeCache, NotNative, native_form, translate
-from automax_ros.compile.native.ranges import INFINITE, Kind, Range
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.run.cache import NativeCache
+from automax_ros.compile.native.run.task import native_form
+from automax_ros.compile.native.translate.ranges import INFINITE, Kind, Range
+from automax_ros.compile.native.translate.translation import translate
 
 from ..support import compiled_of, lines
 from .identity import assert_same
@@ -32,7 +35,7 @@ def test_a_loop_is_native_wherever_it_counts(start: int, stop: int, step: int) -
 
 
 def test_a_loop_that_comes_to_no_end_is_given_up(monkeypatch) -> None:
-    monkeypatch.setattr("automax_ros.compile.native.ranges._reaching", lambda _, bound: bound)
+    monkeypatch.setattr("automax_ros.compile.native.translate.ranges._reaching", lambda _, bound: bound)
     loop = ("FOR A% = -10 TO B%", "D! = D! + A%", "NEXT A%")
     with pytest.raises(NotNative, match="line 50: a loop in which a value has no bounds"):
         translate(compiled_of(lines(*loop, declare="LOCAL A%, B%, D!")))

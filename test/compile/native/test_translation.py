@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.blocks.declaration import Platform
-from automax_ros.compile.native import NotNative, translate
+from automax_ros.blocks.declare.declaration import Platform
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.translate.translation import translate
 
 from ..support import basic_task_of, compiled_of, lines
 

@@ -1,11 +1,13 @@
 """A drive on the bench whose plant, line and inputs a test breaks; outputs are told by name, as the block has them."""
 
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.drive.cml import OUTPUTS, CurrentMinorLoop, Inputs
-from automax_ros.drive.cml.signals import PERMISSIVE
-from automax_ros.drive.controller import DriveController
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
+from automax_ros.drive.current_loop.outputs import OUTPUTS
+from automax_ros.drive.current_loop.signals import PERMISSIVE
+from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.plant.plant import DrivePlant, PlantData
 
 INPUTS = Inputs(
     io_cntl_slot=7, dig_io_slot=8, ac_line_freq=60, reference=0, ref_rate=0.0, ref_lag=400.0, kp=0.2, pi_w_lead=50.0,

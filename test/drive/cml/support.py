@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, replace
 
-from automax_ros.drive.cml import proposals
-from automax_ros.drive.cml.inputs import Inputs
-from automax_ros.drive.cml.minor_loop import CurrentMinorLoop
-from automax_ros.drive.cml.signals import PERMISSIVE, Command, Measured
-from automax_ros.drive.controller import DriveController
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop import proposals
+from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
+from automax_ros.drive.current_loop.signals import PERMISSIVE, Command, Measured
+from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.plant.plant import DrivePlant, PlantData
 
 LIM_BAR = 150
 HELD = 1e6

@@ -5,11 +5,11 @@ from itertools import pairwise
 
 import pytest
 
-from automax_ros.drive.cml.bridge_change import FLOOR, BridgeChange, Stage, preset_us
-from automax_ros.drive.cml.outputs import OUTPUTS
-from automax_ros.drive.cml.signals import OVERCURRENT, VOLTAGE, VOLTS, Measured, gate_numbers
-from automax_ros.drive.events import EventKind
-from automax_ros.drive.limits import largest_inductance_mh
+from automax_ros.drive.assess.limits import largest_inductance_mh
+from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.current_loop.bridge_change import FLOOR, BridgeChange, Stage, preset_us
+from automax_ros.drive.current_loop.outputs import OUTPUTS
+from automax_ros.drive.current_loop.signals import OVERCURRENT, VOLTAGE, VOLTS, Measured, gate_numbers
 
 from .support import Bench, parameters_of
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.drive.events import EventKind
-from automax_ros.drive.plant import DROP_OUT_NS
+from automax_ros.drive.circuit.events import EventKind
+from automax_ros.drive.plant.plant import DROP_OUT_NS
 
 from .support import Bench
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.drive.cml.diagnostics import PAGE_NUMBER, SIZE, next_entry_index, page_of, writes
+from automax_ros.drive.current_loop.outputs import PAGE_NUMBER, SIZE, next_entry_index, page_of, writes
 
 from ..support import repeatable
 

@@ -3,9 +3,9 @@
 import pytest
 
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.drive.cml.signals import EXTERNAL_TRIP, PERMISSIVE
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop.signals import EXTERNAL_TRIP, PERMISSIVE
+from automax_ros.drive.plant.plant import DrivePlant, PlantData
 
 from .protected import CLOSED_S, CODES, LOCKED_S, Drive, resets, starts_again, tripped
 

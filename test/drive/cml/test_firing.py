@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.drive.ac_line import AcLine, Rotation
-from automax_ros.drive.cml.firing import Firing
-from automax_ros.drive.cml.signals import gate_numbers
-from automax_ros.drive.firing import natural_angle
+from automax_ros.drive.circuit.ac_line import AcLine, Rotation
+from automax_ros.drive.circuit.firing import natural_angle
+from automax_ros.drive.current_loop.firing import Firing
+from automax_ros.drive.current_loop.signals import gate_numbers
 
 from ..support import repeatable
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.plant.plant import DrivePlant, PlantData
 
 from .protected import LOCKED_S, Drive
 

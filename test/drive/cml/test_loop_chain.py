@@ -5,14 +5,13 @@ from math import exp, pi, sqrt
 
 import pytest
 
-from automax_ros.drive.cml import proposals
-from automax_ros.drive.cml.outputs import OUTPUTS
-from automax_ros.drive.cml.reference import ReferenceChain
-from automax_ros.drive.cml.regulator import Regulator
-from automax_ros.drive.cml.signals import LINE, PERMISSIVE, VOLTAGE, VOLTS, Command, Pulse, gate_bits
-from automax_ros.drive.controller import DriveController
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop import proposals
+from automax_ros.drive.current_loop.outputs import OUTPUTS
+from automax_ros.drive.current_loop.regulator import ReferenceChain, Regulator
+from automax_ros.drive.current_loop.signals import LINE, PERMISSIVE, VOLTAGE, VOLTS, Command, Pulse, gate_bits
+from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.plant.plant import DrivePlant, LoadData, PlantData
 
 from .support import Bench, parameters_of
 

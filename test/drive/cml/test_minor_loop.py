@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.drive.cml import CurrentMinorLoop
-from automax_ros.drive.cml.minor_loop import NUMBERS
-from automax_ros.drive.cml.signals import EXTERNAL_TRIP, PERMISSIVE, RESET_SWITCH, SWITCH_A, SWITCH_B
-from automax_ros.drive.state import Stateful
+from automax_ros.drive.base.state import Stateful
+from automax_ros.drive.current_loop.minor_loop import NUMBERS, CurrentMinorLoop
+from automax_ros.drive.current_loop.signals import EXTERNAL_TRIP, PERMISSIVE, RESET_SWITCH, SWITCH_A, SWITCH_B
 
 from ..support import repeatable
 from .protected import LOCKED_S, Drive, inputs

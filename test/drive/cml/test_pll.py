@@ -5,9 +5,9 @@ from math import pi
 
 import pytest
 
-from automax_ros.drive.ac_line import AcLine
-from automax_ros.drive.cml.pll import Pll
-from automax_ros.drive.cml.signals import LINE, Measured
+from automax_ros.drive.circuit.ac_line import AcLine
+from automax_ros.drive.current_loop.pll import Pll
+from automax_ros.drive.current_loop.signals import LINE, Measured
 
 CYCLE = 6
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.drive.cml.scr_test import GO_ON, THRESHOLD, ScrTest
-from automax_ros.drive.cml.signals import Measured, gate_numbers
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop.scr_test import GO_ON, THRESHOLD, ScrTest
+from automax_ros.drive.current_loop.signals import Measured, gate_numbers
+from automax_ros.drive.plant.plant import DrivePlant, PlantData
 
 from .protected import LOCKED_S, Drive
 

@@ -5,10 +5,10 @@ from math import atan, cos, exp, pi, sin, sqrt
 
 import pytest
 
-from automax_ros.drive.cml.sequence import Phase
-from automax_ros.drive.cml.signals import FMCR, PERMISSIVE, RMCR
-from automax_ros.drive.nameplate import EXAMPLES, derive
-from automax_ros.drive.plant import DrivePlant, LoadData, PlantData
+from automax_ros.drive.base.nameplate import EXAMPLES, derive
+from automax_ros.drive.current_loop.sequence import Phase
+from automax_ros.drive.current_loop.signals import FMCR, PERMISSIVE, RMCR
+from automax_ros.drive.plant.plant import DrivePlant, LoadData, PlantData
 
 from .protected import CLOSED_S, LOCKED_S, Drive
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from automax_ros.drive.controller import DriveController
-from automax_ros.drive.plant import DrivePlant
+from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.plant.plant import DrivePlant
 
 from .support import Bench
 

@@ -8,9 +8,9 @@ import subprocess
 
 import pytest
 
-from automax_ros.nodes.security.keystore import Keystore, KeystoreError
-from automax_ros.nodes.security.policy import written_topics
-from automax_ros.nodes.security.profiles import Enclave, Profile
+from automax_ros.ros.security.keystore import Keystore, KeystoreError
+from automax_ros.ros.security.policy import written_topics
+from automax_ros.ros.security.profiles import Enclave, Profile
 
 RACK = Enclave("/plant/pm1/rack", (Profile("/plant/pm1", "rack", publish=("/plant/pm1/variables",)),))
 OTHER = Enclave("/plant/pm2/rack", (Profile("/plant/pm2", "rack", publish=("/plant/pm2/variables",)),))

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from automax_ros.nodes.security.policy import (
+from automax_ros.ros.security.policy import (
     Validity,
     governance_text,
     permissions_text,
@@ -15,7 +15,7 @@ from automax_ros.nodes.security.policy import (
     read_topics,
     written_topics,
 )
-from automax_ros.nodes.security.profiles import Enclave, Profile, operator_of, recorder_of
+from automax_ros.ros.security.profiles import Enclave, Profile, operator_of, recorder_of
 
 RACK = Enclave(
     "/pm1/rack",

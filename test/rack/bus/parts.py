@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from automax_ros.rack.bus.link import Batch, BusLink
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load
+from automax_ros.rack.distributed.link import Batch, BusLink
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
 
 RACK = """
 rack: CUT1

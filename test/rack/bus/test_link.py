@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_MS
-from automax_ros.rack.bus.link import MOST_AHEAD_NS, Batch, Picture, Standing
-from automax_ros.rack.bus.versions import Held
+from automax_ros.rack.base.stop_cause import StopCause
+from automax_ros.rack.distributed.link import MOST_AHEAD_NS, Batch, Picture, Standing
+from automax_ros.rack.distributed.versions import Held
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import StopCause
-from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
 from rack.bus.parts import ONE, SEATS, Process, config_in, cut, image, settle
 
 WRITTEN = {

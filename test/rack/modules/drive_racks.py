@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from automax_ros.drive.cml import Command, CurrentMinorLoop, Inputs, Measured
-from automax_ros.rack.loader import load
-from automax_ros.rack.modules.drive_controller import DriveControllerModule
+from automax_ros.drive.current_loop.inputs import Inputs
+from automax_ros.drive.current_loop.minor_loop import CurrentMinorLoop
+from automax_ros.drive.current_loop.signals import Command, Measured
+from automax_ros.rack.modules.drive import DriveControllerModule
 from automax_ros.rack.rack import Rack
-from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 YAML = """\
 rack: PM1

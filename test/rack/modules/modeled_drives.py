@@ -6,13 +6,13 @@ from pathlib import Path
 from statistics import fmean
 from typing import NamedTuple
 
-from automax_ros.drive.assessment import assess
-from automax_ros.drive.drive_case import DriveCase
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.drive_cases import drive_cases
-from automax_ros.rack.loader import load
+from automax_ros.drive.assess.assessment import assess
+from automax_ros.drive.assess.drive_case import DriveCase
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.drives import drive_cases
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.config import RackConfig
 
 MOTORS = ("dc_10hp_240v", "dc_150hp_500v", "dc_800hp_700v")
 GAINS = {"KP": "KP=0.2", "PI_W_LEAD": "PI_W_LEAD=60.0", "AG_FACTOR": "AG_FACTOR=40", "CC_THRESH": "CC_THRESH=700"}

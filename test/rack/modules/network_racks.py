@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.modules.network import CYCLE_NS, NetworkModule
-from automax_ros.rack.modules.network_port import Frame, Sender
+from automax_ros.rack.modules.network_drops import Frame, Sender
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 MASTER = """rack: LINE
 slots:

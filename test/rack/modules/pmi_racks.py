@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from automax_ros.drive.plant import RAD_S_PER_RPM, DrivePlant
-from automax_ros.rack.controls import Controls
-from automax_ros.rack.loader import load
+from automax_ros.drive.plant.plant import RAD_S_PER_RPM, DrivePlant
+from automax_ros.rack.operator.controls import Controls
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 YAML = """\
 rack: PM1

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.rack.installation import RackError
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
 
 HEAD = """\
 rack: PM1

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.drive.cml.signals import late_us
-from automax_ros.rack.loader import load
-from automax_ros.rack.modules.drive_config import ACCESS_NS
+from automax_ros.drive.current_loop.signals import late_us
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.modules.drive import ACCESS_NS
 from rack.modules.modeled_drives import follow, held
 
 ACCESS_US = ACCESS_NS / 1000
@@ -67,7 +67,7 @@ def test_in_ideal_execution_nothing_is_delayed(tmp_path):
 
 def test_a_delay_ends_before_the_next_interrupt_and_the_current_stands(tmp_path, monkeypatch):
     """The gates go on by the DELTA before: however late commands are, none is lost."""
-    monkeypatch.setattr("automax_ros.rack.modules.drive_controller.ACCESS_NS", 100_000)
+    monkeypatch.setattr("automax_ros.rack.modules.drive.ACCESS_NS", 100_000)
     (tmp_path / "OTHER.BAS").write_text(READS)
     rack = held(tmp_path, "57C435", rpm=600, others="OTHER: {priority: 5, file: OTHER.BAS}")
     for reference in (800, 2730, -2730):

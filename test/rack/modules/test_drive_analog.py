@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.drive.cml.signals import VOLTAGE, VOLTS
-from automax_ros.rack.modules.drive_voltage import GAINS, voltage_counts, voltage_gain
+from automax_ros.drive.current_loop.signals import VOLTAGE, VOLTS
+from automax_ros.rack.modules.drive_io import GAINS, voltage_counts, voltage_gain
 from rack.modules.drive_racks import YAML, Hand, built, turning
 
 TRANSFORMERS = [(240, 230, 250.0), (397, 380, 413.54), (480, 460, 500.0), (575, 550, 598.96), (690, 660, 718.75)]

@@ -8,11 +8,19 @@ from dataclasses import replace
 
 import pytest
 
-from automax_ros.cli.status import StatusDisplay
-from automax_ros.drive.cml import Command
-from automax_ros.drive.cml.signals import EXTERNAL_TRIP, LINE, PERMISSIVE, RESET_SWITCH, SWITCH_A, SWITCH_B, VOLTAGE
-from automax_ros.rack.controls import Controls
-from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.cli.run.status import StatusDisplay
+from automax_ros.drive.current_loop.signals import (
+    EXTERNAL_TRIP,
+    LINE,
+    PERMISSIVE,
+    RESET_SWITCH,
+    SWITCH_A,
+    SWITCH_B,
+    VOLTAGE,
+    Command,
+)
+from automax_ros.rack.operator.controls import Controls
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
 from rack.modules.drive_racks import CYCLE_NS, YAML, Hand, built, controller, turning
 
 SCAN = EventKey(EventClass.SCAN, 4, "CML")

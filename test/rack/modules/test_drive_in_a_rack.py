@@ -9,12 +9,12 @@ from itertools import cycle
 
 import pytest
 
-from automax_ros.rack.loader import load
-from automax_ros.rack.modules.timed import Timed
+from automax_ros.rack.modules.drive import Timed
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
-from automax_ros.running.task import Status
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.tasks.task import Status
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 from rack.modules.cml_racks import ALONE, CML, COMMONS, NEAR, built, started
 
 

@@ -6,8 +6,8 @@ from itertools import pairwise, product
 
 import pytest
 
-from automax_ros.drive.cml.signals import LATE_BIT, LATEST_US, OVERCURRENT, Command, late_us
-from automax_ros.drive.controller import DriveController
+from automax_ros.drive.current_loop.signals import LATE_BIT, LATEST_US, OVERCURRENT, Command, late_us
+from automax_ros.drive.plant.controller import DriveController
 from rack.modules.modeled_drives import MOTORS, case_of, follow, held
 
 MODELS = ("57C430A", "57C431", "57C435")

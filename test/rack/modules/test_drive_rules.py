@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.rack.loader import load
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
 from rack.drive_tasks import CML, YAML, edited, folder_of
 
 

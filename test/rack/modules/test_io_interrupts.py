@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriteKind
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.running.scheduler import EventClass, EventKey
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
 
 MS = 1_000_000
 COMMON = """\
@@ -413,11 +413,11 @@ def test_what_waits_in_a_basic_task_freezes_too():
     from automax_ros.core.types import DataType
     from automax_ros.language.checks.checker import check
     from automax_ros.language.program import CommonSpec
-    from automax_ros.running.basic_task import BasicTask
-    from automax_ros.running.events import Events
-    from automax_ros.running.interrupts import Interrupts
-    from automax_ros.running.memory import CommonMemory
-    from automax_ros.running.views import Place, ViewSpec
+    from automax_ros.runtime.memory.memory import CommonMemory
+    from automax_ros.runtime.memory.views import Place, ViewSpec
+    from automax_ros.runtime.scan.events import Events
+    from automax_ros.runtime.tasks.basic_task import BasicTask
+    from automax_ros.runtime.tasks.interrupts import Interrupts
 
     text = """\
 10 COMMON ISCR%

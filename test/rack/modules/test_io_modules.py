@@ -8,12 +8,12 @@ import pytest
 
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType
-from automax_ros.rack.installation import RackError
-from automax_ros.rack.loader import load
-from automax_ros.rack.modules.registry import SUPPORTED
 from automax_ros.rack.rack import Rack
-from automax_ros.running.memory import CommonMemory
-from automax_ros.running.views import Place, ViewSpec
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.modules.registry import SUPPORTED
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import Place, ViewSpec
 
 DIRECTIONS = {
     "57C402": "o",

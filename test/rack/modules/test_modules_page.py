@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.loader import load
-from automax_ros.rack.modules.configured import Registers
-from automax_ros.rack.modules.io_config import HasTable
-from automax_ros.rack.modules.registry import KINDS
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.model.module import Registers
+from automax_ros.rackfile.modules.io import HasTable
+from automax_ros.rackfile.modules.registry import KINDS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "modules.md").read_text(encoding="utf-8")
 MODELS = {

@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.modules.network import CYCLE_NS
-from automax_ros.rack.modules.network_hearing import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, Hearing
-from automax_ros.rack.modules.network_port import Frame, Sender
-from automax_ros.rack.modules.network_registers import greatest_depth, registers_of
+from automax_ros.rack.modules.network_drops import MISSES, MOST_RIVALS, TIMEOUT_CYCLES, Frame, Hearing, Sender
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.modules.network import greatest_depth, registers_of
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 from rack.modules.network_racks import LINE, MASTER, SLAVE, WIND, Cable, built, station
 
 LOST_AFTER = TIMEOUT_CYCLES * MISSES

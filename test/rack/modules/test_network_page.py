@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.modules.network_registers import AREA, registers_of
+from automax_ros.rackfile.modules.network import AREA, registers_of
 from rack.modules.network_racks import Cable, built
 
 PAGE = (Path(__file__).parents[3] / "docs" / "network.md").read_text(encoding="utf-8")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.compile.cost import Model
-from automax_ros.rack.cpu_load import loads_of
-from automax_ros.rack.loader import load
+from automax_ros.compile.base.cost import Model
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.cpu_load import loads_of
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
 
 from ..helpers import codes, good, write
 

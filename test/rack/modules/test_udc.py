@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.running.task import Status
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.runtime.tasks.task import Status
 
 from .udc_racks import Seen, built
 
@@ -200,7 +200,7 @@ def test_the_error_log_of_a_udc_task_outlives_stop_all(tmp_path):
 
 def test_a_reload_with_other_ticks_than_the_other_task_is_refused(tmp_path):
     from automax_ros.core.diagnostics import SourceText
-    from automax_ros.rack.installation import RackError
+    from automax_ros.rack.tasks.installation import RackError
 
     rack = plain(tmp_path)
     rack.start()

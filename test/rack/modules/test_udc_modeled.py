@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.running.task import Status
+from automax_ros.runtime.tasks.task import Status
 
 from .udc_racks import Seen, built
 

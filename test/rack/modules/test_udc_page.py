@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.drive.pmi_table import COMMAND_REGISTERS, DRIVE_B, FEEDBACK_REGISTERS, LINK_REGISTERS
-from automax_ros.rack.loader import load
-from automax_ros.rack.modules.udc_registers import RETAINED, UDC_REGISTERS
+from automax_ros.drive.pmi.registers import COMMAND_REGISTERS, DRIVE_B, FEEDBACK_REGISTERS, LINK_REGISTERS
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
+from automax_ros.rackfile.modules.udc import RETAINED, UDC_REGISTERS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "udc.md").read_text(encoding="utf-8")
 WHO = {

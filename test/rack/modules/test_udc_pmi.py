@@ -8,10 +8,10 @@ from math import log
 import pytest
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.drive import pmi_table as table
-from automax_ros.rack.loader import load
+from automax_ros.drive.pmi import registers as table
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.rack_state import RackState
+from automax_ros.rack.state import RackState
+from automax_ros.rackfile.loader import load
 
 from .pmi_racks import CURRENT, IDLE, SPEED_LOOP, breaks, built, rpm, started, winder
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from automax_ros.rack.loader import load
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import load
 
 from .udc_racks import written
 
@@ -74,7 +74,7 @@ def test_the_estimated_size_is_at_most_20_kbytes(tmp_path):
         commons="FB%, TRIP@, OUT%, IN%", more="", ticks=2, scan=THERMAL.format(more="") + "{}"
     )
     config = load(written(tmp_path, POINTS, tasks="WIND_A: {drive: A}", WIND_A=long.format(""))).config
-    from automax_ros.rack.modules.udc_size import estimated_bytes
+    from automax_ros.rackfile.modules.udc import estimated_bytes
 
     (alone,) = (item for item in check_tasks(config) if item.task.name == "WIND_A")
     fixed = estimated_bytes(alone.result.program)

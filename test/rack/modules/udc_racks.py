@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from automax_ros.rack.loader import load
-from automax_ros.rack.observers import Operation
+from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.rack import Rack
-from automax_ros.running.task import ScanRecord, Task
-from automax_ros.running.views import WriteGroup
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.tasks.task import ScanRecord, Task
 
 HEAD = """\
 rack: PM1

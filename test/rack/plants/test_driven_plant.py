@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.controls import Controls
-from automax_ros.rack.loader import load
+from automax_ros.rack.operator.controls import Controls
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.loader import load
 
 from ..helpers import good
 

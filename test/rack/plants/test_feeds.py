@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from automax_ros.core.kinds import WriterKind
-from automax_ros.rack.controls import Controls
+from automax_ros.rack.operator.controls import Controls
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.tasks_check import check_tasks
+from automax_ros.rackfile.checks.tasks import check_tasks
 
 from ..helpers import good, loaded
 

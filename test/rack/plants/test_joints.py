@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.plants.joint_keys import INTERFACES
-from automax_ros.rack.scale import Scale
+from automax_ros.rackfile.reading.scale import Scale
+from automax_ros.rackfile.sections.joint_keys import INTERFACES
 
 from ..helpers import good, loaded
 

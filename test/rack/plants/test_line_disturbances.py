@@ -10,12 +10,12 @@ from typing import NamedTuple
 import pytest
 from replay.replays import edited, record, replayed
 
-from automax_ros.rack.controls import Controls
-from automax_ros.rack.loader import load
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.operator.controls import Controls
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
+from automax_ros.rackfile.loader import load
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 
 from ..modules.modeled_drives import TASK, held
 from ..test_drive_faults import active, logged, powered, start

@@ -7,10 +7,10 @@ import pytest
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.faults import Fault
-from automax_ros.rack.config import RackConfig
-from automax_ros.rack.loader import load, load_stored
-from automax_ros.rack.plants.config import PlantConfig
-from automax_ros.rack.plants.numbers import plant_number, with_numbers
+from automax_ros.rackfile.loader import load, load_stored
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.plants import PlantConfig
+from automax_ros.rackfile.plant_numbers import plant_number, with_numbers
 
 CONFIG = Path(__file__).parent.parent.parent.parent / "config" / "dc_drive" / "rack.yaml"
 

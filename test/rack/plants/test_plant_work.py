@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.controls import MOST_CHARACTERS, Controls
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.operator.controls import MOST_CHARACTERS, Controls
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.standing import OperationRefused
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 
 from ..helpers import good
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from automax_ros.drive.ac_line import Rotation
-from automax_ros.drive.nameplate import NamePlate
-from automax_ros.rack.plants.config import PlantConfig
+from automax_ros.drive.base.nameplate import NamePlate
+from automax_ros.drive.circuit.ac_line import Rotation
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.model.plants import PlantConfig
 
 from ..helpers import good, loaded
 

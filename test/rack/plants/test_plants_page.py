@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.drive.plant_faults import VERBS, values_of
-from automax_ros.drive.plant_signals import SIGNALS
-from automax_ros.rack.plants import couples, feeds, keys, reading
+from automax_ros.drive.plant.faults import VERBS, values_of
+from automax_ros.drive.plant.signals import SIGNALS
 from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.sections import couples, feeds
+from automax_ros.rackfile.sections import plant_keys as keys
+from automax_ros.rackfile.sections import plants as reading
 
 from ..helpers import good
 

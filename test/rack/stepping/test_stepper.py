@@ -4,11 +4,11 @@ import pytest
 
 from automax_ros.core.faults import Fault
 from automax_ros.core.names import NameFault
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stepping.stepper import Stepper, Why
-from automax_ros.rack.stepping.variables import Change
-from automax_ros.running.task import Status
+from automax_ros.rackfile.loader import load
+from automax_ros.runtime.tasks.task import Status
+from automax_ros.scenario.stepping.stepper import Stepper, Why
+from automax_ros.scenario.stepping.variables import Change
 
 MS = 1_000_000
 RACK = """\

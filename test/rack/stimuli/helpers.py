@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import StimuliFile, read_for_rack
+from automax_ros.rackfile.loader import load
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import StimuliFile, read_for_rack
 
 RACK = """\
 rack: PM1

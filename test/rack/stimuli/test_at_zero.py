@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.recorder import Recorder
-from automax_ros.rack.loader import load
+from automax_ros.messages.stream.stream import RackStream
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.report import report_of
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
-from automax_ros.replay import replay
-from automax_ros.wire.stream import RackStream
+from automax_ros.rackfile.loader import load
+from automax_ros.recordings.write.recorder import Recorder
+from automax_ros.replay.engine import replay
+from automax_ros.scenario.report import report_of
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 
 RACK = """\
 rack: PM1

@@ -8,9 +8,9 @@ import pytest
 from automax_ros.core.kinds import WriterKind
 from automax_ros.core.types import Value
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.running.task import ScanRecord, Status, Task
-from automax_ros.running.views import WriteGroup
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
+from automax_ros.scenario.stimuli.player import Stimulation
 
 from .helpers import SPEED, playing, rack_in
 

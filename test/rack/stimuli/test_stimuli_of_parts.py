@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.loader import load
 from automax_ros.rack.rack import Rack
-from automax_ros.rack.stimuli.player import Stimulation
-from automax_ros.rack.stimuli.reader import read_for_rack
+from automax_ros.rackfile.loader import load
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.reader import read_for_rack
 
 RACK = """\
 rack: PM1

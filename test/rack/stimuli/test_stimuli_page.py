@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.report import report_of
+from automax_ros.scenario.report import report_of
 
 from .helpers import SPEED, playing, rack_in, read
 

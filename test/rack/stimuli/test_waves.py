@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from automax_ros.core.numbers import stored_real
 from automax_ros.core.types import DataType
-from automax_ros.rack.stimuli.waves import Ramp, Sine, Square
+from automax_ros.scenario.stimuli.waves import Ramp, Sine, Square
 
 PROPERTY = settings(deadline=None, derandomize=True, database=None, max_examples=200)
 WHOLE = st.integers(-(2**31), 2**31 - 1)

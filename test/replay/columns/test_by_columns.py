@@ -11,15 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.recorder import RecordingOptions
-from automax_ros.compile.native.forms import NativeForms, NativeMode
+from automax_ros.compile.native.run.forms import NativeForms, NativeMode
 from automax_ros.core.diagnostics import SourceText
+from automax_ros.messages.types.messages import CommonWrite, Scan, TaskState, Values
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.write.recorder import RecordingOptions
 from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.columns.stretch import TaskStretches
 from automax_ros.replay.engine import Replay, ReplayOptions
-from automax_ros.wire.messages import CommonWrite, Scan, TaskState
-from automax_ros.wire.values import Values
 
 from ..replays import SPEED, YAML, recorded, rewritten
 

@@ -14,23 +14,21 @@ from bags.mutations import CHANGES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from automax_ros.bags.blocks import MessageBlock, message_blocks
-from automax_ros.bags.chunk_table import WholeChunk
-from automax_ros.bags.errors import BagError
-from automax_ros.bags.mcap_file import McapFile
-from automax_ros.bags.reader import BagMessage, BagReader, ChannelReader, DataSource
 from automax_ros.core.types import DataType
-from automax_ros.rack.config import CommonVariable
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import NAMES, CommonWrite, Scan, ScanError, Values
+from automax_ros.rackfile.model.config import CommonVariable
+from automax_ros.recordings.mcap.chunk_table import WholeChunk
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.mcap_file import McapFile
+from automax_ros.recordings.read.blocks import MessageBlock, message_blocks
+from automax_ros.recordings.read.reader import BagMessage, BagReader, ChannelReader, DataSource
 from automax_ros.replay.columns.entries import Entries, ValueRules, first_other
-from automax_ros.replay.columns.latched import LatchedColumns
 from automax_ros.replay.columns.library import ColumnLibrary
 from automax_ros.replay.columns.native_messages import native_scans, native_writes
-from automax_ros.replay.columns.scans import SCAN, scans_by_task
-from automax_ros.replay.columns.writes import WRITE, write_columns
-from automax_ros.running.task import OVERLAP
-from automax_ros.wire.cdr import encode
-from automax_ros.wire.messages import NAMES, CommonWrite, Scan, ScanError
-from automax_ros.wire.values import Values
+from automax_ros.replay.columns.scans import SCAN, WRITE, scans_by_task, write_columns
+from automax_ros.replay.columns.stretch import LatchedColumns
+from automax_ros.runtime.tasks.task import OVERLAP
 
 from ..replays import recorded
 

@@ -182,7 +182,7 @@ static int take_gate(Scans *self, PyObject *commit)
     return -1;
 }
 
-/* Looks whether a commit may go without a call (running/views.py, CellCommit). */
+/* Looks whether a commit may go without a call (runtime/memory/views.py, CellCommit). */
 static int bind_commit(Scans *self)
 {
     PyObject *commit = self->cells == NULL ? NULL : optional(self->io, "cell_commit");

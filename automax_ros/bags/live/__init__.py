@@ -1,1 +1,0 @@
-"""Recording a running rack from outside."""

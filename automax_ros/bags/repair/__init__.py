@@ -1,1 +1,0 @@
-"""Repair of recordings whose writer was killed, or that were damaged."""

@@ -1,0 +1,1 @@
+"""Blocks of numbers without dynamics over frequency: arithmetic, averages, ramps, selection."""

@@ -1,0 +1,105 @@
+"""RAMP: a signal that moves at a limited rate (section 22)."""
+
+from __future__ import annotations
+
+from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, State, Time, Times
+from automax_ros.core.numbers import INT16_MAX
+from automax_ros.core.types import DataType
+
+
+def ramp_step(
+    input: int,
+    abs_ramp: bool,
+    reset: bool,
+    initial_value: int,
+    hold: bool,
+    accel_rate: int,
+    decel_rate: int,
+    scale: int,
+    register: int,
+) -> tuple[int, int, int]:
+    """Move the register of OUTPUT x SCALE toward INPUT x SCALE by at most a rate (22).
+
+    In the absolute-value ramp decel leads toward zero, and a move that would cross zero stops there for that scan.
+    OUTPUT truncates toward zero. A rate of -32768 counts as 32768; RATE, the register's move, clamps to 16 bit and is 0
+    while HOLD or RESET (decisions).
+    """
+    move = 0
+    if reset:
+        register = initial_value * scale
+    elif not hold:
+        move = input * scale - register
+        if move > 0:
+            if abs_ramp and register < 0:
+                most = decel_rate if decel_rate >= 0 else -decel_rate
+                if most > -register:
+                    most = -register
+            else:
+                most = accel_rate if accel_rate >= 0 else -accel_rate
+            if move > most:
+                move = most
+            register = register + move
+        elif move < 0:
+            if abs_ramp and register <= 0:
+                most = -accel_rate if accel_rate >= 0 else accel_rate
+            else:
+                most = -decel_rate if decel_rate >= 0 else decel_rate
+                if abs_ramp and most < -register:
+                    most = -register
+            if move < most:
+                move = most
+            register = register + move
+    if scale == 1:
+        output = register
+    elif register >= 0:
+        output = register // scale
+    else:
+        output = -(-register // scale)
+    rate = move if move <= INT16_MAX else INT16_MAX
+    return output, rate, register
+
+
+RAMP = Block(
+    name="RAMP",
+    section="22",
+    title="Ramp",
+    function="OUTPUT moves toward INPUT by at most ACCEL_RATE / SCALE or DECEL_RATE / SCALE counts per scan",
+    inputs=(
+        Input("INPUT", DataType.INTEGER, "I", "signal input", required=True),
+        Input(
+            "ABS_RAMP",
+            DataType.BOOLEAN,
+            "ABS",
+            "TRUE: accel leads away from zero, decel toward it; FALSE: accel leads up, decel down",
+            default=True,
+            form=Form.LITERAL,
+        ),
+        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at INITIAL_VALUE", default=False),
+        Input("INITIAL_VALUE", DataType.INTEGER, "IV", "the output while RESET is TRUE", default=0),
+        Input("HOLD", DataType.BOOLEAN, "H", "TRUE holds OUTPUT where it is", default=False),
+        Input("ACCEL_RATE", DataType.INTEGER, "AR", "acceleration in counts/scan, its magnitude", default=INT16_MAX),
+        Input("DECEL_RATE", DataType.INTEGER, "DR", "deceleration in counts/scan, its magnitude", default=INT16_MAX),
+        Input(
+            "SCALE",
+            DataType.INTEGER,
+            "SC",
+            "divides both rates: with scans per second here they are in counts/s",
+            default=1,
+            form=Form.LITERAL,
+            low=1,
+            high=INT16_MAX,
+        ),
+    ),
+    outputs=(
+        Output("OUTPUT", DataType.INTEGER, "O", "the ramp"),
+        Output("RATE", DataType.INTEGER, "RATE", "change of OUTPUT x SCALE in this scan", required=False),
+    ),
+    states=(State("register", DataType.INTEGER, 0),),
+    times=Times(Time(27.72), Time(122.0), Time(24.96), Time(19.40)),
+    notes=(
+        "A rate of 0 holds the ramp in that direction.",
+        "The rate in counts/s is rate / SCALE / T: at 5.5 ms from 0.00554882 to 5957636.4.",
+        "An absolute-value ramp that would cross zero stops at zero for one scan.",
+    ),
+    step=ramp_step,
+)

@@ -1,0 +1,1 @@
+"""How a control block is declared, and what declarations share."""

@@ -1,0 +1,1 @@
+"""Blocks of booleans, bits, counters and tables."""

@@ -1,0 +1,103 @@
+"""PULSE_MULT: counts of a pulse input, multiplied without losing any (section 21)."""
+
+from __future__ import annotations
+
+from automax_ros.blocks.declare.declaration import Block, Form, Input, Output, State, Time, Times
+from automax_ros.core.numbers import INT16_MAX, INT32_MAX
+from automax_ros.core.types import DataType
+
+
+def pulse_mult_step(
+    input: int,
+    reset: bool,
+    word_size: int,
+    initial_value: int,
+    multiplier: int,
+    previous: int,
+    running: bool,
+    was_reset: bool,
+    remainder: int,
+) -> tuple[int, int, bool, bool, int]:
+    """Multiply counts by MULTIPLIER / 32768 and carry what is left over (21).
+
+    ``remainder`` counts in 1/32768, exactly, with its sign; counts above 32767 that the output cannot show stay in it
+    (below -32768 none can arise); it clamps at 32 bits. In relative mode the error is the low WORD_SIZE bits of
+    INPUT - INPUT(n-1), sign extended; INPUT(n-1) is INITIAL_VALUE on the scan that RESET ends and INPUT on a first pass
+    without RESET, which gives 0 (decision).
+    """
+    if reset:
+        total = 0
+        was_reset = True
+    elif word_size > 0:
+        if not running:
+            previous = initial_value if was_reset else input
+        total = (
+            ((input - previous + (1 << (word_size - 1))) & ((1 << word_size) - 1)) - (1 << (word_size - 1))
+        ) * multiplier + remainder
+    else:
+        total = input * multiplier + remainder
+    if total >= 0:
+        output = total >> 15
+        remainder = total & 32767
+        if output > INT16_MAX:
+            output = INT16_MAX
+            remainder = total - output * 32768
+            if remainder > INT32_MAX:
+                remainder = INT32_MAX
+    else:
+        output = -(-total >> 15)
+        remainder = total - output * 32768
+    previous = input
+    running = not reset
+    return output, previous, running, was_reset, remainder
+
+
+PULSE_MULT = Block(
+    name="PULSE_MULT",
+    section="21",
+    title="Pulse multiplier",
+    function="OUTPUT = INT(counts * MULTIPLIER / 32768 + remainder of the last scan)",
+    inputs=(
+        Input(
+            "INPUT",
+            DataType.INTEGER,
+            "I",
+            "counts, or counts/scan where WORD_SIZE is 0",
+            required=True,
+            form=Form.VARIABLE,
+        ),
+        Input("RESET", DataType.BOOLEAN, "R", "TRUE holds OUTPUT at 0 and clears the remainder", default=False),
+        Input(
+            "WORD_SIZE",
+            DataType.INTEGER,
+            "WS",
+            "significant bits of INPUT for relative mode; 0: absolute mode, INPUT is in counts/scan",
+            default=0,
+            form=Form.LITERAL,
+            low=0,
+            high=16,
+        ),
+        Input(
+            "INITIAL_VALUE",
+            DataType.INTEGER,
+            "IV",
+            "the last INPUT, right-justified, on the scan on which RESET goes FALSE; relative mode only",
+            default=0,
+        ),
+        Input("MULTIPLIER", DataType.INTEGER, "M", "gain x 32768", default=32768),
+    ),
+    outputs=(Output("OUTPUT", DataType.INTEGER, "O", "counts/scan times the gain"),),
+    states=(
+        State("previous", DataType.INTEGER, 0),
+        State("running", DataType.BOOLEAN, False),
+        State("was_reset", DataType.BOOLEAN, False),
+        State("remainder", DataType.INTEGER, 0),
+    ),
+    times=Times(Time(18.32), Time(86.0), Time(18.96), Time(12.84)),
+    notes=(
+        "A gain of exactly 1 is reached only by not programming MULTIPLIER.",
+        "Relative mode gives 0 on its first scan unless RESET was TRUE before.",
+        "Counts that OUTPUT cannot show are given out on later scans.",
+    ),
+    step=pulse_mult_step,
+)

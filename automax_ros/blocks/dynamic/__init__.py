@@ -1,0 +1,1 @@
+"""Blocks with a transfer function: filters, integrators, PID, protection."""

@@ -1,0 +1,1 @@
+"""`automax ctl`: one action, or many at a prompt."""

@@ -1,0 +1,331 @@
+"""The actions of `automax ctl` as arguments: of its command line, and of each line of its prompt."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from automax_ros.cli.operate.press import add_press_arguments, press_asks
+from automax_ros.cli.operate.requests import Action, Ask, Means
+from automax_ros.cli.operate.text import (
+    error_lines,
+    fields_of,
+    message_told,
+    reload_told,
+    status_lines,
+    step_lines,
+    task_lines,
+    value_lines,
+    value_told,
+)
+from automax_ros.cli.operate.watch import NAMES_HELP, add_watch_arguments, values_of
+from automax_ros.cli.options.values import seconds_above_0, whole_number
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.text import quoted, table
+from automax_ros.core.ticks import NS_PER_S, seconds_ns
+from automax_ros.rackfile.reading.files import FileFault, read_task_source
+
+STATE = "state"
+_TRANSITIONS = ("configure", "activate", "deactivate", "cleanup", "shutdown")
+
+
+def _add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("transition", choices=(*_TRANSITIONS, STATE), help="what is asked for; state reads the state")
+    parser.add_argument(
+        "node", nargs="?", default="rack", metavar="NODE", help="a node, such as processor_1 (default: rack)"
+    )
+
+
+def _asks(given: argparse.Namespace) -> list[Ask]:
+    if not given.node.isidentifier() or not given.node.isascii():
+        raise UsageError(f"{quoted(given.node)} is not the name of a node", "such as rack, processor_1, udc_10")
+    of = f"{given.transition} {given.node}"
+    if given.transition == STATE:
+        return [Ask(f"{given.node}/get_state", "lifecycle_msgs/GetState", of=of)]
+    from lifecycle_msgs.msg import Transition
+
+    wanted = {"transition": Transition(label=given.transition)}
+    return [Ask(f"{given.node}/change_state", "lifecycle_msgs/ChangeState", wanted, of, _reason)]
+
+
+def _reason(_: str) -> str:
+    return "the rack's console and /rosout say why"
+
+
+LIFECYCLE = Action(
+    "configure, activate, deactivate, clean up or shut down the node `rack` or a module's; or read its state",
+    _asks,
+    _add,
+    lambda answer: answer.current_state.label if hasattr(answer, "current_state") else "done",
+    lambda state: [state],
+    by_operator=False,
+)
+
+
+_MOST_STEPS = 1_000_000
+
+
+def _tasks(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tasks", nargs="+", metavar="TASK", help="a task of the rack")
+
+
+def _some_tasks(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("tasks", nargs="*", metavar="TASK", help="a task of the rack (default: all)")
+
+
+def _assignments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "assignments", nargs="+", metavar="NAME=VALUE", help="REF%%=1500, TABLE%%(3)=7, RUN@=ON; tune: SPEED.KP=1.2"
+    )
+
+
+def _names(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("names", nargs="+", metavar="NAME", help=NAMES_HELP)
+
+
+def _released(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("names", nargs="*", metavar="NAME", help="what is forced")
+    parser.add_argument("--all", action="store_true", help="end all forces")
+
+
+def _reloaded(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("task", metavar="TASK", help="the task")
+    parser.add_argument("file", type=Path, metavar="FILE", help="its new source, on this computer")
+    parser.add_argument(
+        "--keep-state", action="store_true", help="carry values over by name (default: locals 0, tunables as written)"
+    )
+
+
+def _control(name: str, help_text: str) -> Callable[[argparse.ArgumentParser], None]:
+    def add(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("name", metavar=name, help=help_text)
+        parser.add_argument("control", metavar="WHAT", help="as stimuli files write it")
+        parser.add_argument("value", nargs="*", metavar="VALUE", help="a position, a number (default: true)")
+
+    return add
+
+
+def _moved(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    def asks(given: argparse.Namespace) -> list[Ask]:
+        value = " ".join(given.value) or "true"
+        fields = {"name": given.name, "control": given.control, "value": value}
+        return [Ask(service, "automax_msgs/OperateControl", fields, f"{given.name} {given.control} {value}")]
+
+    return asks
+
+
+def _each_task(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    return lambda given: [Ask(service, "automax_msgs/OperateTask", {"task": name}, name) for name in given.tasks]
+
+
+def _each_assignment(service: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    def asks(given: argparse.Namespace) -> list[Ask]:
+        found = []
+        for text in given.assignments:
+            name, equals, value = text.partition("=")
+            if not (name.strip() and equals):
+                raise UsageError(f"{quoted(text)} is not NAME=VALUE")
+            fields = {"name": name.strip(), "value": value}
+            found.append(Ask(service, "automax_msgs/SetValue", fields, f"{name.strip()} = {value}"))
+        return found
+
+    return asks
+
+
+def _release(given: argparse.Namespace) -> list[Ask]:
+    names = [] if _means_all(given.names) else given.names
+    if bool(given.names) == given.all:
+        raise UsageError("unforce takes names, or --all")
+    return [Ask("unforce", "automax_msgs/Unforce", {"names": names}, " ".join(names) or "all")]
+
+
+def _means_all(names: Sequence[str]) -> bool:
+    """Return whether ``all`` stands for names, as in stimuli and in `automax step`; a REAL of that name is ``ALL``."""
+    return list(names) == ["all"]
+
+
+def _reload(given: argparse.Namespace) -> list[Ask]:
+    try:
+        source = read_task_source(given.file)
+    except FileFault as fault:
+        raise UsageError(f"{given.file} {fault}") from fault
+    fields = {"task": given.task, "source": source.text, "keep_state": given.keep_state}
+    worded = _naming_file(given.task.strip().upper(), given.file)
+    return [Ask("reload", "automax_msgs/Reload", fields, f"{given.task} with {given.file}", worded)]
+
+
+def _naming_file(task: str, file: Path) -> Callable[[str], str]:
+    """Return what names a file where the rack names the text of it that was sent: ``SPEED.BLK:1:1``."""
+    sent = re.compile(rf"^{re.escape(task)}\.[A-Za-z]+(?=[: ])", re.MULTILINE)
+    return lambda text: sent.sub(lambda _: str(file), text)
+
+
+def _clear(given: argparse.Namespace) -> list[Ask]:
+    tasks = [""] if _means_all(given.tasks) or not given.tasks else given.tasks
+    return [Ask("clear_errors", "automax_msgs/OperateTask", {"task": name}, name or "all tasks") for name in tasks]
+
+
+def _stepped(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "what", nargs="?", choices=("scan", "tick", "until"), default="scan", help="what is stepped (default: scan)"
+    )
+    parser.add_argument(
+        "of", nargs="?", default="", metavar="TASK|SECONDS", help="whose scan or tick; until: the rack time to go to"
+    )
+    parser.add_argument(
+        "--count", type=whole_number, default=1, metavar="N", help="how many scans or ticks (default: 1)"
+    )
+
+
+def _step(given: argparse.Namespace) -> list[Ask]:
+    if not 1 <= given.count <= _MOST_STEPS:
+        raise UsageError(f"--count: {given.count} is not a number from 1 to {_MOST_STEPS}")
+    fields: dict[str, Any] = {"what": given.what, "task": given.of, "count": given.count}
+    if given.what == "until":
+        try:
+            fields = {"what": "until", "until_s": seconds_ns(given.of) / NS_PER_S}
+        except ValueError as error:
+            raise UsageError(f"step until takes a rack time in seconds, not {quoted(given.of)}") from error
+    return [Ask("step", "automax_msgs/Step", fields, " ".join(filter(None, (given.what, given.of))))]
+
+
+def _powered(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("off", "on", "cycle"), help="cycle: off, and on again by itself")
+    parser.add_argument(
+        "--off-for", type=seconds_above_0, default="1", metavar="S", help="cycle: for how long, s (default: 1)"
+    )
+    help_text = "on, cycle: non-volatile memory is lost too, as with a bad battery"
+    parser.add_argument("--without-battery", action="store_true", help=help_text)
+
+
+def _power(given: argparse.Namespace) -> list[Ask]:
+    fields = {
+        "what": given.what,
+        "off_for_s": given.off_for / NS_PER_S if given.what == "cycle" else 0.0,
+        "without_battery": given.without_battery,
+    }
+    return [Ask("power", "automax_msgs/Power", fields, given.what)]
+
+
+def _one(service: str, type_name: str) -> Callable[[argparse.Namespace], list[Ask]]:
+    return lambda _: [Ask(service, type_name)]
+
+
+def _plant_verbs() -> str:
+    from automax_ros.drive.plant.faults import VERBS
+
+    rows = [[f"  {name}", verb.wants] for name, verb in VERBS.items()]
+    return "\n".join(["what, and its values:", *table(rows)])
+
+
+ACTIONS: Mapping[str, Action] = {
+    "run": Action("put tasks into RUN", _each_task("run"), _tasks),
+    "stop": Action("stop tasks", _each_task("stop"), _tasks),
+    "delete": Action("take stopped tasks out; a reload brings them back", _each_task("delete"), _tasks),
+    "run-all": Action("put all tasks into RUN", _one("run_all", "std_srvs/Trigger"), told=message_told),
+    "stop-all": Action("STOP ALL", _one("stop_all", "std_srvs/Trigger"), told=message_told),
+    "power": Action("switch the power off and on", _power, _powered),
+    "pause": Action("halt the rack: rack time stands still", _one("pause", "std_srvs/Trigger"), told=message_told),
+    "step": Action(
+        "let a halted rack go on by scans, ticks, or until a rack time at most 1 s later",
+        _step,
+        _stepped,
+        fields_of,
+        step_lines,
+        acts=True,
+    ),
+    "resume": Action("let a halted rack go on", _one("resume", "std_srvs/Trigger"), told=message_told),
+    "set": Action("write commons once", _each_assignment("set"), _assignments, told=value_told),
+    "press": Action("hold BOOLEANs at TRUE for a while", press_asks, add_press_arguments, means=Means.PRESS),
+    "get": Action(
+        "read commons, array elements, variables of tasks",
+        lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names})],
+        _names,
+        values_of,
+        value_lines,
+    ),
+    "watch": Action(
+        "read them again and again, and print what has changed",
+        lambda given: [Ask("get", "automax_msgs/ReadValues", {"names": given.names}, " ".join(given.names))],
+        add_watch_arguments,
+        values_of,
+        value_lines,
+        means=Means.WATCH,
+    ),
+    "force": Action("hold commons or TASK.NAME at values against every write", _each_assignment("force"), _assignments),
+    "unforce": Action("end forces", _release, _released),
+    "forces": Action("what is forced", _one("forces", "automax_msgs/ReadValues"), read=values_of, lines=value_lines),
+    "tune": Action("set tunables (TASK.NAME=VALUE)", _each_assignment("tune"), _assignments, told=value_told),
+    "module": Action("move a switch of a module", _moved("module"), _control("SLOT", "the module's slot")),
+    "plant": Action(
+        "break, mend or load the plant of a drive",
+        _moved("plant"),
+        _control("PLANT", "its name in the rack's file"),
+        more=_plant_verbs,
+    ),
+    "reload": Action("replace the source of a task while the others run", _reload, _reloaded, told=reload_told),
+    "clear": Action("clear error logs, so that faulted tasks can run again", _clear, _some_tasks),
+    "errors": Action(
+        "the error logs",
+        lambda given: [Ask("errors", "automax_msgs/ReadErrors", {"task": name}) for name in given.tasks or [""]],
+        _some_tasks,
+        lambda answer: [fields_of(item) for item in answer.errors],
+        error_lines,
+    ),
+    "tasks": Action(
+        "how the tasks stand",
+        _one("tasks", "automax_msgs/ReadTasks"),
+        read=lambda answer: [fields_of(item) for item in answer.tasks],
+        lines=task_lines,
+    ),
+    "status": Action(
+        "how the rack stands, and what stopped it",
+        _one("status", "automax_msgs/ReadStatus"),
+        read=fields_of,
+        lines=status_lines,
+    ),
+    "lifecycle": LIFECYCLE,
+}
+"""What can be asked, by the word for it."""
+
+
+DEFAULT_TIMEOUT_S = "5"
+
+
+class ActionParser(argparse.ArgumentParser):
+    """The parser of one action; what stands below its help is made when it is asked for."""
+
+    more: Callable[[], str] = str
+
+    def format_help(self) -> str:
+        """Return the help with what stands below it."""
+        below = self.more()
+        return super().format_help() + (f"\n{below}\n" if below else "")
+
+
+def add_actions(parser: argparse.ArgumentParser, *, required: bool = True) -> argparse._SubParsersAction[ActionParser]:
+    """Add all actions with their arguments."""
+    actions = parser.add_subparsers(
+        title="actions", metavar="ACTION", dest="action", required=required, parser_class=ActionParser
+    )
+    for name, action in ACTIONS.items():
+        own = actions.add_parser(name, help=action.help, description=action.help)
+        own.more = action.more
+        action.add_arguments(own)
+        add_common(own)
+    return actions
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """Add what all actions take."""
+    parser.add_argument("--json", action="store_true", help="print the answers for programs to read")
+    parser.add_argument(
+        "--timeout",
+        type=seconds_above_0,
+        metavar="S",
+        default=DEFAULT_TIMEOUT_S,
+        help=f"seconds to look for the rack, and to wait for each answer (default: {DEFAULT_TIMEOUT_S})",
+    )

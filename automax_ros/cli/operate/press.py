@@ -1,0 +1,80 @@
+"""`automax ctl RACK press`: push-buttons and contacts are TRUE for a while, and FALSE again."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+from automax_ros.cli.operate.requests import Ask
+from automax_ros.cli.options.values import seconds_above_0
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.text import quoted
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import DataType, type_of_name
+
+DEFAULT_FOR_S = "0.2"
+_LOOK_S = 0.01
+_SET = "automax_msgs/SetValue"
+Answer = Callable[[Ask, int], Any]
+"""Sends a request, waits for at most a time (ns), and returns the answer."""
+
+
+def add_press_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is pressed, and for how long."""
+    parser.add_argument("names", nargs="+", metavar="NAME@", help="a BOOLEAN: START_PB@, LAMP@(3)")
+    parser.add_argument(
+        "--for",
+        dest="held",
+        type=seconds_above_0,
+        metavar="S",
+        default=DEFAULT_FOR_S,
+        help=f"seconds for which it is held (default: {DEFAULT_FOR_S})",
+    )
+
+
+def press_asks(given: argparse.Namespace) -> list[Ask]:
+    """Return the requests that set all names.
+
+    Raises:
+        UsageError: one is not a BOOLEAN's.
+    """
+    for name in given.names:
+        if type_of_name(name.partition("(")[0].partition("[")[0].strip()) is not DataType.BOOLEAN:
+            raise UsageError(f"{quoted(name)} cannot be pressed", "a BOOLEAN can, such as START_PB@; set writes others")
+    return [Ask("set", _SET, {"name": name, "value": "TRUE"}, name) for name in given.names]
+
+
+def press(
+    answer: Answer, asks: Sequence[Ask], given: argparse.Namespace, should_stop: Callable[[], bool]
+) -> list[tuple[Ask, Any]]:
+    """Set all names at once, hold them, and put back those that were FALSE; return what became of each.
+
+    One that was TRUE already is not pressed: nobody would see an edge, and it is left as it is. Ctrl-C lets go early.
+    """
+    pressed: list[tuple[Ask, Any]] = []
+    found: list[tuple[Ask, Any]] = []
+    try:
+        for ask in asks:
+            set_to = answer(ask, given.timeout)
+            if set_to.ok and set_to.before == "TRUE":
+                reason = f"it was already 1: `set {ask.of}=0` lets it go"
+                found.append((ask, SimpleNamespace(ok=False, reason=reason)))
+            else:
+                found.append((ask, set_to))
+                pressed += [(ask, set_to)] if set_to.ok else []
+        _hold(given.held if pressed else 0, should_stop)
+    finally:
+        for ask, _ in pressed:
+            released = answer(Ask("set", _SET, {"name": ask.of, "value": "FALSE"}, ask.of), given.timeout)
+            if not released.ok:
+                found = [item if item[0] is not ask else (ask, released) for item in found]
+    return found
+
+
+def _hold(time_ns: int, should_stop: Callable[[], bool]) -> None:
+    end_ns = time.monotonic_ns() + time_ns
+    while (left := end_ns - time.monotonic_ns()) > 0 and not should_stop():
+        time.sleep(min(_LOOK_S, left / NS_PER_S))

@@ -1,0 +1,113 @@
+"""The prompt of `automax ctl RACK shell`: the actions of `automax ctl`, without their wait for the rack each time."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Iterable
+
+from automax_ros.cli.operate.actions import ACTIONS, add_actions
+from automax_ros.cli.operate.requests import Ask
+from automax_ros.cli.operate.session import Session, connected
+from automax_ros.cli.output.prompt import Interrupt, edit_lines, typed_lines
+from automax_ros.core.faults import Fault
+
+_QUIT = ("quit", "exit")
+_HELP = "help"
+
+
+def run_shell(arguments: argparse.Namespace) -> int:
+    """Carry out lines of standard input until it ends or one says quit; 1 where one of a script failed.
+
+    Raises:
+        UsageError: there is no such rack, several have the name, or it cannot be operated.
+    """
+    interrupt = Interrupt()
+    with interrupt.watching(), connected(arguments, interrupt.taken) as session:
+        shell = _Shell(session, arguments)
+        session.ask(_STATUS, arguments.timeout)
+        interactive = sys.stdin.isatty()
+        if interactive:
+            edit_lines(shell.completions)
+            print("help lists the actions, Ctrl-D leaves", flush=True)
+        lines: Iterable[str] = typed_lines(f"{arguments.rack}> ", interrupt) if interactive else sys.stdin
+        failed = shell.obey_all(lines)
+    return int(failed and not interactive)
+
+
+_STATUS = Ask("status", "automax_msgs/ReadStatus", {"home_only": True})
+
+
+class _Shell:
+    """Carries out lines; errors are told and do not end it."""
+
+    def __init__(self, session: Session, arguments: argparse.Namespace) -> None:
+        self._session, self._given = session, arguments
+        self._names: list[str] | None = None
+        self._parser = argparse.ArgumentParser(prog="automax ctl", usage="ACTION ...", add_help=False)
+        add_actions(self._parser)
+
+    def obey_all(self, lines: Iterable[str]) -> bool:
+        """Carry out lines until their end or quit; return whether one failed."""
+        failed = False
+        for line in lines:
+            words = self._words(line)
+            if words and words[0] in _QUIT:
+                break
+            failed |= words is None or (bool(words) and self._obeyed(words) != 0)
+            sys.stdout.flush()
+        return failed
+
+    def completions(self, text: str) -> list[str]:
+        """Return the words that begin with a text: actions, commons, tasks; in any case where none begins with it."""
+        if self._names is None:
+            self._names = self._known()
+        words = [*ACTIONS, _HELP, _QUIT[0], *self._names]
+        exact = [word for word in words if word.startswith(text)]
+        return exact or [word for word in words if word.lower().startswith(text.lower())]
+
+    def _words(self, line: str) -> list[str] | None:
+        try:
+            return shlex.split(line, comments=True)
+        except ValueError as error:
+            print(f"automax ctl: {error}: quote a name with a blank or a * in it", file=sys.stderr)
+            return None
+
+    def _obeyed(self, words: list[str]) -> int:
+        from automax_ros.ros.clients.rack_client import Interrupted
+
+        try:
+            if words[0] == _HELP:
+                self._help(words[1:])
+                return 0
+            arguments = self._parser.parse_args(words)
+            return self._session.do(ACTIONS[arguments.action], arguments)
+        except SystemExit as stop:  # argparse has said what is wrong, or shown its help
+            return int(bool(stop.code))
+        except Interrupted:
+            return 1
+        except Fault as fault:
+            print(f"automax ctl: {fault}", file=sys.stderr)
+            return 2
+
+    def _help(self, words: list[str]) -> None:
+        if words:
+            self._parser.parse_args([words[0], "--help"])
+        for name, action in ACTIONS.items():
+            print(f"  {name:10} {action.help}")
+        print("  quit       leave; so does Ctrl-D. ACTION --help says what one takes")
+
+    def _known(self) -> list[str]:
+        """Return the names of commons and tasks, as far as the rack tells them."""
+        wait_ns = self._given.timeout
+        asks = [
+            Ask("get", "automax_msgs/ReadValues", {"names": ["*"]}),
+            Ask("tasks", "automax_msgs/ReadTasks"),
+        ]
+        try:
+            commons, tasks = (self._session.ask(ask, wait_ns) for ask in asks)
+        except Fault:
+            return []
+        found = list(commons.found) if commons is not None else []
+        return [*found, *(item.task for item in tasks.tasks)] if tasks is not None else found

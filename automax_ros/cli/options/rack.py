@@ -1,0 +1,223 @@
+"""Tunables on the command line: ``--set TASK.NAME=VALUE``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from automax_ros.cli.output.screen import print_diagnostics, tell_warnings
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import count_of
+from automax_ros.core.types import Value, bare_name
+from automax_ros.language.program import Program
+from automax_ros.language.tree.task_kind import is_task_file
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.loader import LoadResult, load
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.value_names import Tuning, setting, tuning
+from automax_ros.rackfile.modules.registry import SUPPORTED
+
+DEFAULT_RACK_FILE = "rack.yaml"
+"""What a folder means where a rack file is asked for."""
+_CANNOT_BE_READ = "AMX6000"
+_NOT_A_TEXT = frozenset({"AMX6001", "AMX6002"})
+
+
+def add_set_argument(parser: argparse.ArgumentParser, *, tunables: bool = False) -> None:
+    """Add ``--set``, any number of times, as ``settings``; it may take ``tunables``, too."""
+    what = "a common variable, or tune TASK.NAME," if tunables else "a common variable"
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="settings",
+        help=f"write {what} before the tasks start; may be given again",
+    )
+
+
+def add_outside_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--allow-outside``."""
+    parser.add_argument(
+        "--allow-outside", action="store_true", help="let the rack file name task sources outside its own folder"
+    )
+
+
+def load_rack_file(path: Path, *, allow_outside: bool) -> LoadResult:
+    """Read a rack file, or the ``rack.yaml`` of a folder.
+
+    Raises:
+        UsageError: it cannot be read, or is a task.
+    """
+    path = _meant(path)
+    result = load(path, allow_outside=allow_outside)
+    for item in result.diagnostics:
+        if item.code == _CANNOT_BE_READ:
+            raise UsageError(f"{path}: {item.message}")
+    return result
+
+
+def is_rack_folder(path: Path) -> bool:
+    """Whether a path is a folder with a ``rack.yaml``."""
+    return (path / DEFAULT_RACK_FILE).is_file()
+
+
+def is_text(result: LoadResult) -> bool:
+    """Whether a rack file could be read as text; too large, or not UTF-8, it counts as unreadable."""
+    return not any(item.code in _NOT_A_TEXT for item in result.diagnostics)
+
+
+def size_of(rack: RackConfig) -> str:
+    """Return what a rack consists of, in words."""
+    modules = Counter(SUPPORTED[module.model].word for module in rack.task_modules)
+    counts = [(number, f"{word[0].upper()}{word[1:]}") for word, number in modules.items()]
+    counts += [(len(rack.placed_tasks), "task"), (len(rack.declared), "common")]
+    return ", ".join(count_of(number, thing) for number, thing in counts)
+
+
+def _meant(path: Path) -> Path:
+    """Return the rack file that an argument means.
+
+    Raises:
+        UsageError: it is a task, or a folder without a rack file.
+    """
+    if is_task_file(path):
+        hint = f"`automax trace {path} --input IN.csv` runs a task alone; `automax new {path.parent}` makes a rack file"
+        raise UsageError(f"{path} is a task, and a rack is made of its rack file (.yaml)", hint)
+    if not path.is_dir():
+        return path
+    found = path / DEFAULT_RACK_FILE
+    if not is_rack_folder(path):
+        hint = f"name the rack's YAML file; `automax new {path}` makes one from the folder's tasks"
+        raise UsageError(f"{path} is a folder without a {DEFAULT_RACK_FILE}", hint)
+    return found
+
+
+def config_of(path: Path, *, allow_outside: bool, quiet: bool = False) -> RackConfig | None:
+    """Return a rack's configuration; what is wrong with its file is printed, and None returned where it has errors.
+
+    Of a file that can be used its warnings are counted, ``quiet``: not even that, since another process has done it.
+
+    Raises:
+        UsageError: the file cannot be read.
+    """
+    result = load_rack_file(path, allow_outside=allow_outside)
+    if has_errors(result.diagnostics):
+        print_diagnostics(result.diagnostics, result.source, sys.stderr)
+    elif not quiet:
+        tell_warnings([(result.source, result.diagnostics)], path.name, path)
+    if not is_text(result):
+        raise UsageError(f"{path} cannot be used")
+    return result.config if not has_errors(result.diagnostics) else None
+
+
+def usable_config(path: Path, *, allow_outside: bool) -> RackConfig:
+    """Return a rack's configuration; its warnings are counted.
+
+    Raises:
+        RackError: the file has errors, which it holds.
+        UsageError: the file cannot be read.
+    """
+    result = load_rack_file(path, allow_outside=allow_outside)
+    if result.config is None:
+        raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
+    tell_warnings([(result.source, result.diagnostics)], path.name, path)
+    return result.config
+
+
+def namespace_of(path: Path) -> str:
+    """Return the namespace of a rack whose file may have errors.
+
+    Raises:
+        UsageError: the file cannot be read, or says no name.
+    """
+    found = load_rack_file(path, allow_outside=False).namespace
+    if found is None:
+        raise UsageError(f"{path} says no name of a rack", "the node `rack` needs one: rack: PM1")
+    return found
+
+
+def settings_of(config: RackConfig, texts: list[str]) -> list[tuple[str, Value]]:
+    """Return what the texts of ``--set`` give common variables.
+
+    Raises:
+        UsageError: one of them is at fault.
+    """
+    settings = []
+    for text in texts:
+        try:
+            settings.append(setting(config, text))
+        except Fault as error:
+            raise UsageError(f"--set: {error.message}", _tunable_hint(config, text) or error.hint) from error
+    return settings
+
+
+def _tunable_hint(config: RackConfig, text: str) -> str | None:
+    """Return what to do where NAME=VALUE, or TASK.NAME=VALUE, names a tunable of a task; None where it does not."""
+    name, _, value = (part.strip().upper() for part in text.partition("="))
+    for task, _, result in check_tasks(config):
+        symbol = result.program.symbols.get(name.removeprefix(f"{task.name}.")) if result.program is not None else None
+        if symbol is not None and symbol.tuning is not None:
+            slot = next(item.slot for item in config.task_modules if task in item.tasks)
+            full = f"{task.name}.{bare_name(symbol.name)}"
+            command = f"ros2 param set /{config.namespace}/processor_{slot} {full} {value}"
+            cure = f"`automax run` takes --set {full}={value}; while it runs: {command}"
+            return f"{symbol.name} is a tunable of task {task.name}: {cure}"
+    return None
+
+
+def print_refused(command: str, error: RackError) -> int:
+    """Print why a rack cannot be built, for a subcommand; return its exit code."""
+    for source, diagnostics in error.findings:
+        print_diagnostics(diagnostics, source, sys.stderr)
+    print(f"automax {command}: {error}", file=sys.stderr)
+    return 1
+
+
+def split_settings(config: RackConfig, texts: list[str]) -> tuple[list[tuple[str, Value]], list[Tuning]]:
+    """Return what the texts of ``--set`` give common variables, and what they give tunables.
+
+    Raises:
+        UsageError: one of them is at fault.
+    """
+    programs: dict[str, Program] = {}
+    if any("." in _name(text) for text in texts):
+        programs = {task.name: result.program for task, _, result in check_tasks(config) if result.program is not None}
+    tunings, others = [], []
+    for text in texts:
+        task, _, name = _name(text).partition(".")
+        if task in programs and name:
+            try:
+                tunings.append(tuning(programs, text))
+            except Fault as fault:
+                raise UsageError(f"--set: {fault.message}", fault.hint) from fault
+        else:
+            others.append(text)
+    return settings_of(config, others), tunings
+
+
+def begin_with(rack: Rack, tunings: Sequence[Tuning]) -> None:
+    """Give tunables what ``--set`` says, before the rack runs.
+
+    It counts more than the values kept from the last run, and more than parameters of ROS (decision: who types it means
+    this run).
+
+    Raises:
+        UsageError: a task refuses a value.
+    """
+    for item in tunings:
+        try:
+            rack.tune(rack.task(item.task), item.name, item.value)
+        except ValueError as error:
+            raise UsageError(f"--set {item.task}.{item.name}: {error}") from error
+
+
+def _name(text: str) -> str:
+    return text.partition("=")[0].strip().upper()

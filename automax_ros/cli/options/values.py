@@ -1,0 +1,116 @@
+"""The list of variables given with ``--watch``."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
+
+from automax_ros.cli.usage import UsageError
+from automax_ros.core import values
+from automax_ros.core.ticks import seconds_ns
+
+if TYPE_CHECKING:
+    from automax_ros.recordings.tables.series import Window
+
+
+_T = TypeVar("_T", int, float)
+
+
+def number(text: str) -> float:
+    """Return an argument's decimal number, for ``type=``."""
+    return _argument(values.number, text)
+
+
+def whole_number(text: str) -> int:
+    """Return an argument's whole number, for ``type=``."""
+    return _argument(values.whole_number, text)
+
+
+def option_number(option: str, text: str, low: float, high: float, what: str = "a number") -> float:
+    """Return the number that was given to an option.
+
+    Raises:
+        UsageError: it is not one from ``low`` to ``high``.
+    """
+    try:
+        found = values.number(text)
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}", f"give {what} from {low:.10g} to {high:.10g}") from None
+    if not low <= found <= high:
+        raise UsageError(f"{option}: {text} is not {what} from {low:.10g} to {high:.10g}")
+    return found
+
+
+def _argument(read: Callable[[str], _T], text: str) -> _T:
+    try:
+        return read(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def add_window_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--from`` and ``--to``."""
+    parser.add_argument(
+        "--from", dest="start", type=seconds, metavar="S", help="begin S seconds from the start of the run"
+    )
+    parser.add_argument("--to", dest="end", type=seconds, metavar="S", help="end S seconds from the start of the run")
+
+
+def add_grid_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--every``."""
+    parser.add_argument(
+        "--every", type=seconds_above_0, metavar="S", help="a row every S seconds with the values that hold then"
+    )
+
+
+def window_of(arguments: argparse.Namespace) -> Window:
+    """Return the window that the options ask for.
+
+    Raises:
+        UsageError: it ends before it begins.
+    """
+    from automax_ros.recordings.tables.series import Window
+
+    start = arguments.start or 0
+    if arguments.end is not None and arguments.end < start:
+        raise UsageError("--to lies before --from")
+    return Window(start, arguments.end, getattr(arguments, "every", None) or 0)
+
+
+def seconds(text: str) -> int:
+    """Return a time in seconds, 0 or more, in nanoseconds, rounded to the nearest: the type of an option."""
+    try:
+        return seconds_ns(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def seconds_above_0(text: str) -> int:
+    """Return a time in seconds that is not 0, in nanoseconds: the type of an option."""
+    found = seconds(text)
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text} s is too short: give more")
+    return found
+
+
+_COMMA = re.compile(r",(?![^(\[]*[)\]])")
+"""A comma that does not stand between subscripts."""
+
+
+def add_watch_argument(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add ``--watch``; ``default`` says what is watched without it."""
+    parser.add_argument(
+        "--watch",
+        action="append",
+        metavar="A%,B@",
+        help=f"variables for the output, such as REF%%,RUN@,TABLE%%(3) (default: {default})",
+    )
+
+
+def watch_list(values: list[str] | None) -> list[str] | None:
+    """Return the names in all ``--watch`` options, in their order; None if there is none."""
+    if values is None:
+        return None
+    return [name.strip() for value in values for name in _COMMA.split(value) if name.strip()]

@@ -1,0 +1,1 @@
+"""What subcommands write and show: files, the terminal, pictures; and signals."""

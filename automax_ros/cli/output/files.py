@@ -1,0 +1,147 @@
+"""The tables that a subcommand writes: opened so that what goes wrong is reported, and never over what is read."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+from automax_ros.cli.usage import UsageError
+from automax_ros.recordings.mcap.whole_file import held_open, is_direct, open_at_once, written_whole
+
+
+@contextmanager
+def opened_for_writing(path: Path | None) -> Iterator[TextIO]:
+    """Open a table for writing, standard output without a path.
+
+    Raises:
+        UsageError: it cannot be written.
+    """
+    if path is None:
+        yield sys.stdout
+        return
+    try:
+        stream = open(path, "w", encoding="utf-8", newline="", opener=open_at_once)  # noqa: SIM115
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from error
+    with stream:
+        yield stream
+
+
+def require_writable(path: Path) -> None:
+    """Refuse a file that could not be written, before the work for it begins.
+
+    Raises:
+        UsageError: it is a folder, there is no such folder for it, or one of both must not be written.
+    """
+    if not path.parent.is_dir():
+        raise UsageError(f"{path} cannot be written: there is no folder {path.parent}")
+    if path.is_dir():
+        raise UsageError(f"{path} cannot be written: it is a folder")
+    target = Path(os.path.realpath(path))
+    if not is_direct(path) and not all(
+        os.access(place, os.W_OK) for place in (target, target.parent) if place.exists()
+    ):
+        raise UsageError(f"{path} cannot be written: it, or its folder, must not be written")
+
+
+@contextmanager
+def held_for_writing(path: Path | None) -> Iterator[None]:
+    """Keep a pipe open from before the work for it until that is written; nothing to do for a regular file.
+
+    Whoever reads a pipe must do so before the work begins (decision): hours of a run are not lost at its end.
+
+    Raises:
+        UsageError: nobody reads it, or it cannot be written.
+    """
+    with ExitStack() as held:
+        if path is not None:
+            try:
+                if is_direct(path):
+                    held.enter_context(held_open(path))
+            except (OSError, ValueError) as error:
+                raise _unwritable(path, error) from error
+        yield
+
+
+def require_folder(key: str, folder: Path) -> None:
+    """Refuse a folder that could not be made or written into, before the work for it begins.
+
+    Raises:
+        UsageError: something else stands there or above it, or it must not be written.
+    """
+    try:
+        there = next(place for place in (folder, *folder.absolute().parents) if place.exists() or place.is_symlink())
+        if not there.is_dir():
+            raise UsageError(f"{key}: {there} is not a folder")
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise UsageError(f"{key}: {there} must not be written")
+    except (OSError, ValueError, RuntimeError) as error:
+        raise UsageError(f"{key}: {folder} cannot be used: {getattr(error, 'strerror', None) or error}") from error
+
+
+def write_report(path: Path, report: Mapping[str, Any]) -> None:
+    """Write data as JSON, as a whole or not at all where the file is a regular one; a link stays a link (decision).
+
+    Raises:
+        UsageError: it cannot be written.
+    """
+    write_text(path, json.dumps(report, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text, as a whole or not at all where the file is a regular one; a link stays a link.
+
+    Raises:
+        UsageError: it cannot be written.
+    """
+    try:
+        with written_whole(path) as place, open(place, "w", encoding="utf-8", opener=open_at_once) as stream:
+            stream.write(text)
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from error
+
+
+def _unwritable(path: Path, error: Exception) -> UsageError:
+    return UsageError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}")
+
+
+PICTURE_FORMATS = (".png", ".svg", ".pdf")
+
+
+def require_picture_file(path: Path) -> None:
+    """Refuse a picture that could not be written, before the work for it begins.
+
+    Raises:
+        UsageError: its suffix names no format of pictures, or there is no such folder.
+    """
+    if path.suffix.lower() not in PICTURE_FORMATS:
+        raise UsageError(f"{path} names no format of pictures", f"end it with {', '.join(PICTURE_FORMATS)}")
+    require_writable(path)
+
+
+def require_different_files(read: Mapping[str, Path], written: Mapping[str, Path | None]) -> None:
+    """Refuse to write over what is read, or twice to one file; the keys are the arguments' names.
+
+    Raises:
+        UsageError: two arguments mean one file.
+    """
+    outputs = {key: path for key, path in written.items() if path}
+    for key, path in outputs.items():
+        for other, its_path in {**read, **outputs}.items():
+            if key != other and _is_same_file(path, its_path):
+                raise UsageError(f"{key} and {other} are the same file, {path}")
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one regular file, or would if it existed; two times /dev/null does no harm."""
+    try:
+        if one.exists() and other.exists():
+            return one.is_file() and one.samefile(other)
+        return one.resolve() == other.resolve()
+    except (OSError, ValueError, RuntimeError):
+        return False

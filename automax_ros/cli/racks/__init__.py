@@ -1,0 +1,1 @@
+"""Subcommands for rack files: new, import, load, step, sweep, drive-check and others."""

@@ -1,0 +1,279 @@
+"""What the commands of `automax step` do to a rack that is stepped."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import near_or_listed, printable, quoted, table
+from automax_ros.core.ticks import seconds_ns, seconds_text
+from automax_ros.core.types import Value
+from automax_ros.core.values import number, source_text, value_of, whole_number
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.model.value_names import setting
+from automax_ros.scenario.report import STATUS_WORDS
+from automax_ros.scenario.stepping.stepper import Halt, Stepper, Why
+from automax_ros.scenario.stepping.variables import Variable
+
+MOST_CHANGES = 20
+"""How many changed variables are listed after a step (decision); ``watch`` chooses others."""
+AROUND = 3
+"""Lines shown before and after one."""
+_NUMBER = re.compile(r"\s*([0-9]{1,9})\b")
+
+
+def place_text(rack: Rack, task: str, line: int) -> str:
+    """Return where a rack is: its time, and the line before which a scan is held."""
+    place = f", {task} before line {line}" if task else ""
+    return f"{seconds_text(rack.now_ns)} s{place}"
+
+
+def halt_lines(halt: Halt) -> list[str]:
+    """Return why a rack halts, where that is news."""
+    lines = []
+    if halt.why is Why.LINE and halt.line:
+        lines.append(f"at {halt.task}:{halt.line}")
+    if halt.why is Why.STOPPED and halt.cause is not None:
+        code = f" (code {halt.cause.code})" if halt.cause.code else ""
+        lines.append(f"STOP ALL{code}: {halt.cause.reason}")
+    if halt.why is Why.INTERRUPTED:
+        lines.append("interrupted")
+    if halt.why is Why.CHANGE:
+        lines += [f"changed: {item.label}" for item in halt.changes]
+    return lines
+
+
+def change_lines(before: Mapping[str, Value], after: Mapping[str, Value], *, all_of_them: bool) -> list[str]:
+    """Return variables before and after a step: those that changed, or all of them."""
+    labels = [label for label in after if all_of_them or before.get(label, after[label]) != after[label]]
+    rows = [
+        [f"  {label}", source_text(before[label]) if label in before else "", "->", source_text(after[label])]
+        if before.get(label) != after[label]
+        else [f"  {label}", source_text(after[label])]
+        for label in labels[:MOST_CHANGES]
+    ]
+    more = [f"  ... and {len(labels) - MOST_CHANGES} more"] if len(labels) > MOST_CHANGES else []
+    return [*table(rows), *more]
+
+
+def source_lines(text: Sequence[str], line: int, around: int = AROUND) -> list[str]:
+    """Return the physical lines of a source around a BASIC line, which is marked; the first ones without it."""
+    numbers = [int(found[1]) if (found := _NUMBER.match(item)) else 0 for item in text]
+    middle = numbers.index(line) if line in numbers else around
+    first, last = max(0, middle - around), middle + around + 1
+    return [
+        f"{'->' if line and numbers[index] == line else '  '} {printable(text[index])}"
+        for index in range(first, min(last, len(text)))
+    ]
+
+
+MOST_STEPS = 1_000_000
+_DEFAULT_GO_NS = 1 << 62
+
+
+class CommandFault(Fault):
+    """A command cannot be carried out as it was typed."""
+
+
+@dataclass
+class Session:
+    """One rack under a person's hand; ``tell`` prints a line. ``over`` is TRUE after ``quit``."""
+
+    stepper: Stepper
+    tell: Callable[[str], None]
+    over: bool = False
+    _watched: dict[str, Variable] = field(default_factory=dict)
+
+    def step(self, words: list[str], one: Callable[[str], Halt]) -> None:
+        """Repeat a step of a task as often as is wanted, until something else halts the rack."""
+        task = next((word for word in words if not word.isdecimal()), "")
+        times = self._times([word for word in words if word != task])
+
+        def all_of_them() -> Halt:
+            halt = one(task)
+            for _ in range(times - 1):
+                if halt.why is not Why.DONE:
+                    break
+                halt = one(task)
+            return halt
+
+        self.move(all_of_them)
+
+    def ticks(self, words: list[str]) -> None:
+        """Go on for ticks of the first Processor."""
+        times = self._times(words)
+        self.move(lambda: self.stepper.ticks(times))
+
+    def move(self, call: Callable[[], Halt]) -> None:
+        """Let the rack go on, and say what its variables were and are."""
+        before = self.values()
+        self.told(call(), before)
+
+    def told(self, halt: Halt, before: dict[str, Value]) -> None:
+        """Say where the rack halts, and what its variables were and are."""
+        for task in self.stepper.rack.tasks:
+            while task.printed:
+                self.tell(f"{task.name}: {printable(task.printed.popleft())}")
+        self.tell(place_text(self.stepper.rack, *self.stepper.place))
+        for line in halt_lines(halt):
+            self.tell(line)
+        for line in change_lines(before, self.values(), all_of_them=bool(self._watched)):
+            self.tell(line)
+        if halt.line:
+            self.source([halt.task], around=0)
+
+    def values(self) -> dict[str, Value]:
+        """Return the watched variables, or without any all simple ones."""
+        shown = self._watched.values() or self._all()
+        return {variable.label: variable.read() for variable in shown}
+
+    def watch(self, words: list[str]) -> None:
+        """Show these after each step; without any, list them."""
+        for word in words:
+            variable = self.stepper.variables.find(word)
+            self._watched[variable.label] = variable
+        self.show(list(self._watched))
+
+    def unwatch(self, words: list[str]) -> None:
+        """Show these no longer, or none of them."""
+        labels = [self.stepper.variables.find(word).label for word in words] or list(self._watched)
+        for label in labels:
+            self._watched.pop(label, None)
+
+    def show(self, words: list[str]) -> None:
+        """Print values: of variables, or of all simple variables of a task."""
+        tasks = {task.name for task in self.stepper.rack.tasks}
+        found: list[Variable] = []
+        for word in words:
+            is_task = word.upper() in tasks
+            found += self.stepper.variables.of_task(word.upper()) if is_task else [self.stepper.variables.find(word)]
+        for line in table([[f"  {item.label}", source_text(item.read())] for item in found]):
+            self.tell(line)
+
+    def assign(self, words: list[str], write: Callable[[str, Value], None]) -> None:
+        """Carry out NAME=VALUE; forces and values take effect between scans only."""
+        text = " ".join(words)
+        own = "." in text.partition("=")[0]
+        name, value = self._of_task(text) if own else setting(self.stepper.rack.config, text)
+        self.between_scans()
+        write(name, value)
+
+    def _of_task(self, text: str) -> tuple[str, Value]:
+        """Return name and value of TASK.NAME=VALUE."""
+        name, _, given = text.partition("=")
+        meant = self.stepper.variables.find(name)
+        value = value_of(given.strip(), meant.type, meant.length)
+        if value is None:
+            raise CommandFault(f"{quoted(given.strip())} is not a value for {meant.label}, type {meant.type.word}")
+        return meant.label, value
+
+    def tune(self, words: list[str]) -> None:
+        """Carry out TASK.NAME=VALUE for a tunable."""
+        name, equals, text = " ".join(words).partition("=")
+        if not equals:
+            raise CommandFault(f"{quoted(' '.join(words))} is not TASK.NAME=VALUE")
+        self.between_scans()
+        try:
+            self.stepper.rack.adjust.tune(name.strip(), number(text))
+        except ValueError as error:
+            raise CommandFault(str(error)) from error
+
+    def unforce(self, words: list[str]) -> None:
+        """End forces."""
+        self.between_scans()
+        self.stepper.rack.adjust.unforce(None if words in (["all"], []) else words)
+
+    def between_scans(self) -> None:
+        """Refuse what must not fall into a scan (decision: values from outside come between two scans, as always)."""
+        task, line = self.stepper.place
+        if task:
+            raise CommandFault(f"{task} is held before line {line}: a scan must end first", "write: scan")
+
+    def add_break(self, words: list[str]) -> None:
+        """Add a breakpoint, and list all."""
+        task, colon, line = "".join(words).partition(":")
+        if colon:
+            self.stepper.break_at(task, self._whole(line, "a line"))
+        elif words:
+            self.stepper.break_on("".join(words))
+        for place in sorted(self.stepper.lines):
+            self.tell(f"  {place[0]}:{place[1]}")
+        for label in self.stepper.watched:
+            self.tell(f"  {label}")
+
+    def source(self, words: list[str], around: int = 5) -> None:
+        """Print the source of a task around the line at which it is held."""
+        held, line = self.stepper.place
+        sources = self.stepper.rack.sources
+        name = (words[0].upper() if words else held) or next(iter(sources))
+        if name not in sources:
+            raise CommandFault(f"the rack has no task {quoted(name)}", near_or_listed(name, sources))
+        shown = line if name == held else 0
+        if len(words) > 1:
+            shown = self._whole(words[1], "a line")
+        for text in source_lines(sources[name].lines, shown, around):
+            self.tell(text)
+
+    def tasks(self) -> None:
+        """Print the tasks with what they do."""
+        rack = self.stepper.rack
+        rows = [["  task", "module", "status", "scans", "errors"]]
+        for module in rack.task_modules:
+            for item in module.tasks:
+                status, errors = STATUS_WORDS[item.task.status], str(item.task.errors.count)
+                rows.append([f"  {item.name}", module.config.name, status, str(item.statistics.scans), errors])
+        for line in table(rows, right={3, 4}):
+            self.tell(line)
+
+    def errors(self) -> None:
+        """Print the error logs."""
+        for task in self.stepper.rack.tasks:
+            for entry in task.errors.entries:
+                self.tell(f"  {task.name}: {entry.describe()}")
+
+    def go(self, words: list[str]) -> None:
+        """Go on, for a time if one is given."""
+        for_ns = self._seconds(words[0]) if words else _DEFAULT_GO_NS
+        self.move(lambda: self.stepper.go(for_ns))
+
+    def until(self, words: list[str]) -> None:
+        """Go on to a rack time."""
+        time_ns = self._seconds(words[0])
+        if time_ns < self.stepper.rack.now_ns:
+            raise CommandFault(f"{words[0]} s has passed")
+        self.move(lambda: self.stepper.until(time_ns))
+
+    def end(self) -> None:
+        """Leave."""
+        self.over = True
+
+    def _all(self) -> Iterator[Variable]:
+        """Yield the simple commons, and the own variables of the task that is held."""
+        rack, (task, _) = self.stepper.rack, self.stepper.place
+        for variable in rack.config.declared:
+            if not variable.is_array:
+                yield self.stepper.variables.find(variable.name)
+        for name in [task] if task else [item.name for item in rack.tasks]:
+            yield from (item for item in self.stepper.variables.of_task(name) if item.task)
+
+    def _times(self, words: list[str]) -> int:
+        times = self._whole(words[0], "how often") if words else 1
+        if not 1 <= times <= MOST_STEPS:
+            raise CommandFault(f"how often is 1 to {MOST_STEPS}, not {times}")
+        return times
+
+    @staticmethod
+    def _whole(text: str, what: str) -> int:
+        try:
+            return whole_number(text)
+        except ValueError as error:
+            raise CommandFault(f"{what} must be a whole number: {error}") from error
+
+    @staticmethod
+    def _seconds(text: str) -> int:
+        try:
+            return seconds_ns(text)
+        except ValueError as error:
+            raise CommandFault(str(error)) from error

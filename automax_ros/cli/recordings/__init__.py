@@ -1,0 +1,1 @@
+"""Subcommands for recordings: record, play, replay, bag, export, plot, report."""

@@ -1,0 +1,184 @@
+"""Execute every recorded scan again and tell what differs: with the recorded tasks, or with edited ones (--task).
+
+It is an open loop: each task scans on the recorded inputs, whatever the other tasks do in the replay. Nothing is needed
+but the recording, which holds the rack's file and all sources. Exit code 0: identical; 1: something differs; 2: the
+recording cannot be read, or a new source has errors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from automax_ros.cli.options.values import add_window_arguments, option_number, whole_number, window_of
+from automax_ros.cli.options.work import add_native_arguments, add_where_arguments, native_forms, where_of
+from automax_ros.cli.output.files import require_different_files, require_picture_file
+from automax_ros.cli.output.screen import print_diagnostics, share_shown, tell_warnings
+from automax_ros.cli.output.signals import ended_by_signals
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.parallel.job import ClusterFault, Where
+from automax_ros.rackfile.reading.files import FileFault, read_task_source
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.replay.engine import DEFAULT_MAX_DIFFERENCES, Replay, ReplayOptions
+from automax_ros.replay.picture import can_be_drawn, draw, traces
+from automax_ros.replay.scans.report import ReplayReport
+from automax_ros.replay.scans.stored_rack import SourceRefused
+from automax_ros.replay.side_by_side import replay_side_by_side
+
+_TRUNCATED, _NO_RECORDING = "AMX6812", "AMX6810"
+
+
+_NS_A_BYTE = 20_000
+"""How much time a byte of a recording stands for, about: 50 kB are a second of an example rack (decision)."""
+_MOST_COUNTS = 1e19
+"""No two values of a variable lie further apart."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax replay``."""
+    parser.add_argument("bag", type=Path, metavar="BAG", help="a recording: its folder, or its .mcap file")
+    parser.add_argument(
+        "--task",
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        dest="tasks",
+        help="run this source in place of the recorded one; may be given again",
+    )
+    parser.add_argument(
+        "--only", action="append", metavar="TASK,...", help="replay these tasks only (default: all of the recording)"
+    )
+    parser.add_argument(
+        "--tolerance",
+        default="0",
+        metavar="COUNTS",
+        help="numbers that differ by at most this count as equal (default: 0, bit for bit)",
+    )
+    add_window_arguments(parser)
+    add_where_arguments(parser, "replay the files of a split recording")
+    add_native_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print the report for programs to read")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the first difference (needs matplotlib)")
+    parser.add_argument(
+        "--max-differences",
+        type=whole_number,
+        default=DEFAULT_MAX_DIFFERENCES,
+        metavar="N",
+        help=f"most variables to tell in full, by the time they first differ (default: {DEFAULT_MAX_DIFFERENCES})",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replay; 1 if something differs, 2 if the recording or a source cannot be used."""
+    options = _options(arguments)
+    files = _task_files(arguments.tasks)
+    read = {"BAG": arguments.bag, **{f"--task {name}": path for name, path in files.items()}}
+    require_different_files(read, {"--plot": arguments.plot})
+    if arguments.plot is not None:
+        require_picture_file(arguments.plot)
+    where = where_of(arguments)
+    new = {name: _source(name, path) for name, path in files.items()}
+    _require_replayed(options, new)
+    try:
+        report = _replayed(Replay(arguments.bag, new, options), where, arguments)
+    except SourceRefused as error:
+        for source, diagnostics in error.findings:
+            print_diagnostics(diagnostics, source, sys.stderr)
+        print(f"automax replay: errors in {error}; nothing is replayed", file=sys.stderr)
+        return 2
+    except ClusterFault as fault:
+        print(fault, file=sys.stderr)
+        return 2
+    except BagError as error:
+        print(_with_repair(error, arguments.bag), file=sys.stderr)
+        return 2
+    return 0 if report.identical else 1
+
+
+def _replayed(replay: Replay, where: Where, arguments: argparse.Namespace) -> ReplayReport:
+    """Replay, print the report, draw the picture."""
+    for source, diagnostics in replay.warnings:
+        tell_warnings([(source, diagnostics)], Path(source.name).name, Path(source.name))
+    with share_shown("replay") as show:
+        notes: list[str] = []
+        report = replay_side_by_side(replay, where, show, notes.append)
+    sys.stderr.writelines(f"automax replay: {note}\n" for note in notes)
+    if arguments.verbose:
+        sys.stderr.writelines(f"{text}\n" for text in replay.native)
+    if arguments.json:
+        print(json.dumps(report.as_json(), indent=2, allow_nan=False))
+    else:
+        sys.stdout.write(report.text())
+    if arguments.plot is not None:
+        if can_be_drawn(report):
+            with share_shown("picture") as show:
+                found = traces(replay, report, show)
+            with ended_by_signals():
+                draw(found, report, arguments.plot)
+        else:
+            print("automax replay: no number differs, so there is nothing to draw", file=sys.stderr)
+    return report
+
+
+def _options(arguments: argparse.Namespace) -> ReplayOptions:
+    window = window_of(arguments)
+    if arguments.max_differences < 1:
+        raise UsageError("--max-differences: at least 1")
+    only = None
+    if arguments.only is not None:
+        names = [name.strip().upper() for text in arguments.only for name in text.split(",")]
+        only = tuple(dict.fromkeys(name for name in names if name))
+        if not only:
+            raise UsageError("--only names no task")
+    return ReplayOptions(
+        only,
+        option_number("--tolerance", arguments.tolerance, 0.0, _MOST_COUNTS),
+        window.start_ns,
+        window.end_ns,
+        arguments.max_differences,
+        native=native_forms(arguments, _expected_ns(arguments.bag)),
+    )
+
+
+def _expected_ns(bag: Path) -> int:
+    """Return about how long a recording is, by its size; 0 for one that cannot be read."""
+    files = list(bag.glob("*.mcap")) if bag.is_dir() else [bag]
+    return sum(file.stat().st_size for file in files if file.is_file()) * _NS_A_BYTE
+
+
+def _task_files(texts: list[str]) -> dict[str, Path]:
+    files: dict[str, Path] = {}
+    for text in texts:
+        name, equals, file = text.partition("=")
+        name = name.strip().upper()
+        if not (name and equals and file):
+            raise UsageError(f"--task {text[:80]!r} is not NAME=FILE", "for example --task SPEED=new/SPEED.BLK")
+        if name in files:
+            raise UsageError(f"--task {name} is given twice")
+        files[name] = Path(file)
+    return files
+
+
+def _source(name: str, path: Path) -> SourceText:
+    try:
+        return read_task_source(path)
+    except FileFault as fault:
+        raise UsageError(f"--task {name}: {path} {fault}") from fault
+
+
+def _require_replayed(options: ReplayOptions, new: dict[str, SourceText]) -> None:
+    """Refuse a new source for a task that --only leaves out."""
+    for name in new:
+        if options.only is not None and name not in options.only:
+            raise UsageError(f"--task {name}: --only leaves this task out", f"--only {','.join([*options.only, name])}")
+
+
+def _with_repair(error: BagError, bag: Path) -> BagError:
+    """Point to the repair where a recording was not finished."""
+    unfinished = error.code == _TRUNCATED or (error.code == _NO_RECORDING and any(bag.glob("*.mcap")))
+    if not unfinished:
+        return error
+    return BagError(error.code, error.place, error.message, f"`automax bag repair {bag}` saves what is whole of it")

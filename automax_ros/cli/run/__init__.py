@@ -1,0 +1,1 @@
+"""`automax run` and `automax node`: a rack in this process, or distributed over several."""

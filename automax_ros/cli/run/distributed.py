@@ -1,0 +1,166 @@
+"""A run on the wall clock whose modules are processes: one is started for each seat of the rack, and watched."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeVar
+
+from automax_ros.cli.options.stimuli import stimulation
+from automax_ros.cli.output.files import write_report
+from automax_ros.cli.output.signals import StopRequest
+from automax_ros.cli.run.plan import RunPlan, warn
+from automax_ros.cli.run.process_messages import Said, Told, merged_report
+from automax_ros.cli.run.status import Person, Progress, Summary, merged_progress, merged_summary
+from automax_ros.cli.run.supervisor import Post, Supervisor
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.text import count_of
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.processes import Seat, seats_of
+from automax_ros.ros.setup.discovery import range_text
+from automax_ros.ros.setup.lock import RackLock, domain_id
+
+_Part = TypeVar("_Part")
+_SEATS, _HOME, _RECORDER = range(3)
+"""The order in which processes end: tasks first, then common memory, then what records both."""
+_RECORDER_NAME = "recorder"
+_RECORDER_WAIT_S = "60"
+"""How long the recorder waits for a rack whose processes take their time to start, s (decision)."""
+_WHOLE = "distributed"
+"""The seat in the lock of who has started all the others."""
+
+
+def run_distributed(plan: RunPlan, arguments: argparse.Namespace, stop: StopRequest) -> int:
+    """Run until all processes have ended, by themselves or asked to; return the exit code.
+
+    ``arguments`` are those of ``automax run``, from which the plan was made.
+    """
+    domain = domain_id()
+    with RackLock(plan.config.namespace, domain, _WHOLE):
+        rack = Rack(plan.config)
+        warn(rack)
+        stimulation(rack, plan.stimuli, allow_outside=plan.allow_outside)
+        seats = seats_of(plan.config, rack.operations.installation.programs.values())
+        watch = _Watch(plan, seats)
+        watch.message(_opening(plan, seats, domain))
+        posts = list(_posts(plan, seats, arguments))
+        supervisor = Supervisor(posts, watch, restart=arguments.restart)
+        supervisor.run(lambda: stop.requested)
+        return watch.conclude(supervisor)
+
+
+def _posts(plan: RunPlan, seats: Sequence[Seat], arguments: argparse.Namespace) -> Iterator[Post]:
+    # What happens to lie in the working folder is not to be imported.
+    safe = ["-P"] if sys.version_info >= (3, 11) else []
+    automax = [sys.executable, *safe, "-m", "automax_ros.cli.main"]
+    common = [str(plan.config.path), "--watched", "--run-id", str(int.from_bytes(os.urandom(8), "big") >> 1 or 1)]
+    common += ["--allow-outside"] if plan.allow_outside else []
+    common += ["--stimuli", str(plan.stimuli)] if plan.stimuli is not None else []
+    common += ["--native", arguments.native, *(["--verbose"] if arguments.verbose else [])]
+    common += ["--duration", _seconds(plan.duration_ns)] if plan.duration_ns is not None else []
+    if plan.record is not None:
+        command = [*automax, "record", str(plan.config.path), "--output", str(plan.record), "--wait", _RECORDER_WAIT_S]
+        command += [*_recording(arguments), *_ros(plan, arguments)]
+        yield Post(_RECORDER_NAME, command, _RECORDER, reports=False, begins_run=True)
+    for seat in seats:
+        own = ["--state", str(plan.state / seat.name)] if plan.state is not None else []
+        own += ["--await-recorder"] if plan.record is not None else []
+        own += _given("--set", arguments.settings) + _given("--watch", arguments.watch) if seat.is_home else []
+        command = [*automax, "node", *common, "--module", seat.name, *own, *_ros(plan, arguments)]
+        yield Post(seat.name, command, _HOME if seat.is_home else _SEATS, ends_run=seat.is_home)
+
+
+def _recording(arguments: argparse.Namespace) -> list[str]:
+    """Return the options of ``automax record`` that say what ``--record-...`` says."""
+    if arguments.record_locals:
+        raise UsageError("--record-locals is not possible with --distributed: the recorder is a process of its own")
+    split_ns = arguments.record_split_s
+    options = {
+        "--compression": arguments.record_compression,
+        "--split-mb": arguments.record_split_mb,
+        "--split-s": None if split_ns is None else _seconds(split_ns),
+        "--tasks": arguments.record_tasks,
+    }
+    return [f"{option}={value}" for option, value in options.items() if value is not None]
+
+
+def _ros(plan: RunPlan, arguments: argparse.Namespace) -> list[str]:
+    discovery = ["--range", arguments.discovery] if arguments.discovery is not None else []
+    return [*discovery, *plan.ros.command_line]
+
+
+def _given(option: str, values: Sequence[str] | None) -> list[str]:
+    return [f"{option}={value}" for value in values or ()]
+
+
+def _seconds(time_ns: int) -> str:
+    """Return a time in seconds, exactly."""
+    return f"{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d}"
+
+
+def _opening(plan: RunPlan, seats: Sequence[Seat], domain: int) -> str:
+    config = plan.config
+    return (
+        f"rack {config.name} in {count_of(len(seats), 'process')}: "
+        f"{', '.join(seat.words for seat in seats)}\n"
+        f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"
+    )
+
+
+class _Watch:
+    """What the person sees of the processes, and what they came to."""
+
+    def __init__(self, plan: RunPlan, seats: Sequence[Seat]) -> None:
+        self._plan, self._names = plan, [seat.name for seat in seats]
+        self._home = self._names[0]
+        self._screen = Person()
+        self.message = self._screen.message
+        self._progress: dict[str, Progress] = {}
+        self._summaries: dict[str, Summary] = {}
+        self._reports: dict[str, Any] = {}
+
+    def heard(self, name: str, told: Told) -> None:
+        """Show what a process says; parts are shown together."""
+        if isinstance(told, Said):
+            self.message(f"{name}: {told.text}")
+        elif isinstance(told, Progress):
+            self._progress[name] = told
+            home = self._progress.get(self._home)
+            if home is not None and home.now_ns >= NS_PER_S and self._screen.due():
+                self._screen.progress(merged_progress(_in_order(self._names, self._progress)))
+        elif isinstance(told, Summary):
+            self._summaries[name] = told
+        elif told.report:  # one that has not begun has nothing to report
+            self._reports[name] = told.report
+
+    def complained(self, name: str, line: str) -> None:
+        """Show a line that a process has written on standard error."""
+        print(f"{name}: {line}", file=sys.stderr, flush=True)
+
+    def died(self, name: str, how: str, again_s: float | None) -> None:
+        """Tell that a process has died."""
+        self._progress.pop(name, None)
+        again = f"it is started again in {again_s:.1f} s" if again_s is not None else "it is not started again"
+        self.message(f"{name} {how}: {again}")
+
+    def conclude(self, supervisor: Supervisor) -> int:
+        """Show the summary, write the report, and return the exit code: the highest of all processes."""
+        if self._home in self._summaries:
+            self._screen.summary(merged_summary(_in_order(self._names, self._summaries)))
+        for name, deaths in supervisor.deaths.items():
+            self.message(f"  {name} died {count_of(deaths, 'time')}")
+        if self._reports:
+            report = merged_report(self._reports, self._names, supervisor.deaths)
+            if self._plan.report is not None:
+                write_report(self._plan.report, report)
+            if report["stopped"] is not None:
+                print(f"automax run: STOP ALL: {report['stopped']['reason']}", file=sys.stderr)
+        codes = supervisor.codes.values()
+        return max((code if code >= 0 else 1 for code in codes), default=0)
+
+
+def _in_order(names: Sequence[str], parts: dict[str, _Part]) -> list[_Part]:
+    return [parts[name] for name in names if name in parts]

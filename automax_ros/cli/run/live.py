@@ -1,0 +1,215 @@
+"""A rack on the wall clock, from the compilation of its tasks to its summary."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+from automax_ros.cli.options.rack import begin_with
+from automax_ros.cli.options.stimuli import stimulation as stimulation_of
+from automax_ros.cli.output.signals import StopRequest
+from automax_ros.cli.run.plan import RunPlan, conclude, report_at_end, tell_forms, warn
+from automax_ros.cli.run.saving import DiskSync, RecordingWatch, StateKeeping
+from automax_ros.cli.run.status import StatusDisplay
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.base.stop_cause import StopCause
+from automax_ros.rack.rack import Rack
+from automax_ros.recordings.write.recorder import Recorder
+from automax_ros.ros.base.node import follows_clock
+from automax_ros.ros.distributed.bus import LEAD_NS, Seating
+from automax_ros.ros.nodes.rack import RackNode
+from automax_ros.ros.rack_nodes import LiveRack
+from automax_ros.ros.setup.discovery import range_text
+from automax_ros.ros.setup.process import RosProcess
+from automax_ros.scenario.operation_log import OperationLog
+
+SWITCH_S = 0.0005
+"""How long a thread that saves or sends may keep the interpreter from the scans, s (5 ms is Python's own)."""
+
+PATIENCE_NS = 5 * NS_PER_S
+"""After this time a process says for which others it waits (decision)."""
+_NEVER_NS = 1 << 63
+
+
+class LiveSession:
+    """One rack with its nodes: ``start`` it, ``run`` it any number of times, ``close`` it in any case.
+
+    Attributes:
+        live: the rack in its nodes.
+        has_begun: whether it was started.
+    """
+
+    def __init__(
+        self, plan: RunPlan, process: RosProcess, manager: RackNode | None, stop: StopRequest, domain: int
+    ) -> None:
+        """Compile the rack's tasks and create its nodes, its recording and what else the plan asks for.
+
+        Raises:
+            RackError: a task has errors.
+            StimuliRefused: the stimuli have errors, which were printed.
+            BagError, RetentionFault: the recording or the state's folder cannot be used.
+            CutShort: a signal came while tasks were compiled.
+        """
+        self.plan, self._domain = plan, domain
+        self.has_begun = False
+        with stop.cut_short():
+            self.rack = rack = Rack(plan.config, stopwatch=time.monotonic_ns, local=plan.slots, native=plan.native)
+            if not plan.is_watched:
+                warn(rack)
+            tell_forms(rack, plan)
+            self._stimulation = stimulation_of(rack, plan.stimuli, allow_outside=plan.allow_outside)
+        self._state = StateKeeping(rack, plan.state_folder)
+        self._operated = OperationLog(lambda: self._stimulation.is_acting)
+        self._told: StopCause | None = None
+        self._ending = ExitStack()
+        try:
+            self.live = LiveRack(
+                rack, plan.ros, self._seating(), process=process, manager=manager, simulated=plan.simulated
+            )
+            self._ending.callback(self.live.close)
+            begin_with(rack, plan.tunings)
+            rack.observers.add(self._operated)
+            self._display = StatusDisplay(
+                rack, plan.shown(rack), live=True, health=self.live.health, screen=plan.screen
+            )
+            self._recording = RecordingWatch(self._recorder(), self._display)
+        except BaseException:
+            self._ending.close()
+            raise
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the run's duration has passed."""
+        return self.plan.duration_ns is not None and self.rack.now_ns >= self.plan.duration_ns
+
+    def start(self, stop: StopRequest) -> bool:
+        """Put the rack into RUN for the first time; FALSE where a stop is requested first.
+
+        Raises:
+            SeatTaken: another process of a distributed run has the same modules.
+        """
+        self._ending.callback(sys.setswitchinterval, sys.getswitchinterval())
+        sys.setswitchinterval(SWITCH_S)
+        # What is there now stays: a look of the collector at all of it would hold up scans by tens of ms.
+        gc.collect()
+        gc.freeze()
+        self._ending.callback(gc.unfreeze)
+        if not self.plan.is_watched:
+            self._display.message(_opening(self.plan, self.rack, self._domain))
+        for text in self.live.notes:
+            self._display.message(f"warning: {text}")
+        if not self._all_are_there(stop):
+            return False
+        self.has_begun = True
+        self.live.start([*self._state.settings, *self.plan.settings], self._stimulation.begin)
+        if self.live.is_joining:
+            self._stimulation.begin(joining=True)
+        return True
+
+    def run(self, should_stop: Callable[[], bool]) -> None:
+        """Let the rack live until its duration has passed or something else is to be done."""
+
+        def on_idle(now_ns: int) -> None:
+            self.live.stopping = should_stop()
+            self._chores(now_ns)
+
+        self.live.stopping = False
+        self.live.run(self.plan.duration_ns, on_idle)
+
+    def close(self) -> int:
+        """Stop the rack, finish its recording and save its state; return the run's exit code."""
+        report: dict[str, Any] | None = None
+        try:
+            if self.has_begun:
+                report = report_at_end(self.rack, self._stimulation, self._operated.happened)
+            self._state.freeze()
+        finally:
+            self._ending.close()
+        if self.has_begun:
+            self._tell_end()
+        unsaved = self._state.failed and self.plan.state is not None
+        failed = self._recording.failed or unsaved or self._stimulation.refused > 0
+        return conclude(self.rack, self.plan, report, failed=failed)
+
+    def _tell_end(self) -> None:
+        self._state.end()
+        for text in self._state.news():
+            self._display.message(text)
+        self._recording.tell()
+        self._display.finish(self.plan.record, complete=not self._recording.failed)
+
+    def _recorder(self) -> Recorder | None:
+        if self.plan.record is None:
+            return None
+        recorder = Recorder(self.rack, self.live.stream, self.plan.record, self.plan.recording)
+        # Closed after the rack, whose last messages it takes.
+        rack = self._ending.pop_all()
+        self._ending.callback(recorder.sync_at_end)
+        self._ending.callback(recorder.close)
+        self._ending.callback(DiskSync(recorder.sync).stop)
+        self._ending.push(rack.__exit__)
+        return recorder
+
+    def _seating(self) -> Seating | None:
+        seat = self.plan.seat
+        if seat is None:
+            return None
+        lead_ns = LEAD_NS if seat.lead_ns is None else seat.lead_ns
+        seats = [item.slots for item in seat.seats]
+        return Seating(seats, seat.run_id, lambda: self._stimulation.is_common, lead_ns, seat.awaits_recorder)
+
+    def _all_are_there(self, stop: StopRequest) -> bool:
+        """Wait for the other processes of a distributed rack; FALSE where a stop is requested first."""
+        told_ns = time.monotonic_ns() + PATIENCE_NS
+
+        def look() -> bool:
+            nonlocal told_ns
+            if self.live.missing and time.monotonic_ns() > told_ns:
+                told_ns = _NEVER_NS
+                self._display.message(f"waiting for {', '.join(self.live.missing)}")
+            return stop.requested
+
+        return self.live.await_others(look)
+
+    def _chores(self, now_ns: int) -> None:
+        self._display.update(now_ns)
+        cause = self.rack.operations.stopped
+        if cause is not None and cause != self._told:
+            self._display.message(f"{cause.title}: {cause.reason}")
+        self._told = cause
+        self._state.update(now_ns)
+        for text in [*self._state.news(), *self._stimulation.news()]:
+            self._display.message(text)
+        self._recording.flush(now_ns)
+        self._recording.tell()
+
+
+def _opening(plan: RunPlan, rack: Rack, domain: int) -> str:
+    config = rack.config
+    modules = ", ".join(
+        f"{module.config.model} in slot {module.config.slot} ({' '.join(item.task.name for item in module.tasks)})"
+        for module in rack.task_modules
+    )
+    head = f"rack {config.name}: {modules}"
+    if plan.seat is not None:
+        head = f"{plan.seat.seat.words} of rack {config.name}"
+    return (
+        f"{head}; {len(config.declared)} common variables\n"
+        f"ROS 2 namespace /{config.namespace} in domain {domain}, seen by {range_text()}; Ctrl-C ends the run"
+        f"{_time(plan)}"
+    )
+
+
+def _time(plan: RunPlan) -> str:
+    """Return whose time the rack has, on a line of its own, where that is not the wall clock's."""
+    if plan.simulated is not None:
+        rate = plan.simulated.rate
+        pace = "as fast as it goes" if rate is None else f"{rate:g} times the wall clock"
+        return f"\nrack time is simulated, {pace}, and told on /clock"
+    if follows_clock(plan.ros, plan.config.namespace):
+        return "\nrack time follows /clock, and begins with its first message"
+    return ""

@@ -1,0 +1,144 @@
+"""What a run was asked for, and what both kinds of run tell."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from automax_ros.cli.options.work import tell_native
+from automax_ros.cli.output.files import write_report
+from automax_ros.cli.output.screen import tell_warnings
+from automax_ros.cli.run.process_messages import ToldScreen, tell_report
+from automax_ros.cli.run.status import Person, Screen
+from automax_ros.compile.native.run.forms import IN_PYTHON, NativeForms
+from automax_ros.core.types import Value
+from automax_ros.rack.operator.retention import default_folder
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.model.config import CommonElement, RackConfig
+from automax_ros.rackfile.model.value_names import Tuning, watched
+from automax_ros.rackfile.processes import Seat
+from automax_ros.recordings.write.recorder import RecordingOptions
+from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.runtime.time.simulated_pacer import SimulatedTime
+from automax_ros.scenario.report import report_of
+from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.stage import Happened
+
+
+@dataclass(frozen=True)
+class SeatPlan:
+    """The part of a run of a distributed rack that is in this process.
+
+    ``seats`` are all processes of the rack. ``run_id`` is the number of the run, 0 to take that of the processes that
+    are there, or a new one. ``watched``: another process has started this one. ``lead_ns`` is how long after all are
+    there the rack starts, None for the usual. ``awaits_recorder``: not before a recorder hears this process.
+    """
+
+    seat: Seat
+    seats: tuple[Seat, ...]
+    run_id: int = 0
+    watched: bool = False
+    lead_ns: int | None = None
+    awaits_recorder: bool = False
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """A run.
+
+    ``duration_ns`` None runs until it is stopped, ``record`` is the folder of a recording, ``state`` the one that was
+    named for values that outlive the run, if any. ``watch`` is what ``--watch`` names, None without it.
+    ``stimuli`` is the file of what happens to the rack, ``report`` that
+    in which the run's end is told; ``allow_outside`` lets stimuli name sources in other folders. ``ros`` is what the
+    command line says to ROS. ``seat`` is the part of the rack that is run, None for all of it.
+    ``simulated`` is simulated time where the rack has ROS nodes all the same. ``tunings`` is what ``--set`` tunes.
+    ``native`` says which tasks scan as machine code, ``verbose`` that a person wants to know what became of them.
+    """
+
+    config: RackConfig
+    duration_ns: int | None
+    record: Path | None
+    recording: RecordingOptions
+    settings: tuple[tuple[str, Value], ...]
+    watch: tuple[CommonElement, ...] | None
+    state: Path | None = None
+    stimuli: Path | None = None
+    report: Path | None = None
+    allow_outside: bool = False
+    ros: RosArguments = NO_ARGUMENTS
+    seat: SeatPlan | None = None
+    simulated: SimulatedTime | None = None
+    tunings: tuple[Tuning, ...] = ()
+    native: NativeForms = IN_PYTHON
+    verbose: bool = False
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether another process has started this one, and tells the person what it says."""
+        return self.seat is not None and self.seat.watched
+
+    @property
+    def slots(self) -> tuple[int, ...] | None:
+        """The slots whose modules are run, None for all."""
+        return None if self.seat is None else self.seat.seat.slots
+
+    @property
+    def state_folder(self) -> Path | None:
+        """Where a run keeps what outlives it, in simulated time only where that is said; processes have one each."""
+        if self.state is not None or self.simulated is not None:
+            return self.state
+        whole = default_folder(self.config)
+        return whole if self.seat is None else whole / self.seat.seat.name
+
+    def shown(self, rack: Rack) -> Sequence[CommonElement]:
+        """Return the commons that the status line of a rack, or of this process's part of it, shows."""
+        if self.watch is not None:
+            return self.watch
+        if self.seat is not None and not self.seat.seat.is_home:
+            return ()
+        if self.seat is None or rack.config.watch is not None:
+            return watched(rack.config, None, rack.operations.installation.programs.values())
+        programs = [item.result.program for item in check_tasks(rack.config)]  # tasks are in other processes
+        return watched(rack.config, None, [program for program in programs if program is not None])
+
+    @property
+    def screen(self) -> Screen:
+        """Where the run is shown."""
+        return ToldScreen() if self.is_watched else Person()
+
+
+def warn(rack: Rack) -> None:
+    """Say how many warnings the tasks' checks gave."""
+    tell_warnings(rack.warnings, "its tasks", rack.config.path)
+
+
+def tell_forms(rack: Rack, plan: RunPlan) -> None:
+    """Say which tasks are native, and why others are not, if that is wanted."""
+    if plan.verbose:
+        tell_native(rack.operations.installation.native.values())
+
+
+def report_at_end(rack: Rack, stimulation: Stimulation, others: Sequence[Happened] = ()) -> dict[str, Any]:
+    """Return the report of a rack as it is before anything is closed; ``others`` have operated it besides stimuli."""
+    return report_of(rack, sorted((*stimulation.happened, *others), key=lambda item: item.at_ns))
+
+
+def conclude(rack: Rack, plan: RunPlan, report: dict[str, Any] | None, *, failed: bool) -> int:
+    """Write the report, print what stopped the rack, and return the exit code.
+
+    The code is 1 after a fault, or where something has ``failed``, such as an operation of the stimuli; a STOP ALL that
+    was commanded is as good an end as any.
+    """
+    if plan.report is not None and report is not None:
+        write_report(plan.report, report)
+    stopped = rack.operations.stopped
+    if plan.is_watched:
+        tell_report(report or {})
+    elif stopped is not None:
+        print(f"automax run: STOP ALL: {stopped.reason}", file=sys.stderr)
+    fault = stopped is not None and stopped.is_fault
+    return 1 if fault or failed else 0

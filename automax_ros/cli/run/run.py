@@ -1,0 +1,263 @@
+"""Run a rack from its YAML file.
+
+On the wall clock the rack's modules are ROS 2 nodes in this process, until Ctrl-C or for --duration seconds. With
+--simulated time passes as fast as the machine can and nothing of ROS is started: the same rack gives the same bag, byte
+for byte; with --simulated --ros the nodes are there too, and the rack sends /clock. With `--ros-args -p
+use_sim_time:=true` it follows another's /clock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from automax_ros.cli.options.rack import (
+    add_outside_argument,
+    add_set_argument,
+    config_of,
+    namespace_of,
+    print_refused,
+    split_settings,
+    usable_config,
+)
+from automax_ros.cli.options.recording import add_record_arguments, recording_options
+from automax_ros.cli.options.ros import add_ros_arguments, prepare_ros, ros_arguments
+from automax_ros.cli.options.stimuli import StimuliRefused
+from automax_ros.cli.options.values import add_watch_argument, option_number, seconds_above_0, watch_list
+from automax_ros.cli.options.work import add_native_arguments, native_forms
+from automax_ros.cli.output.files import held_for_writing, require_different_files, require_folder, require_writable
+from automax_ros.cli.output.signals import CutShort, StopRequest, stop_signals
+from automax_ros.cli.run.plan import RunPlan
+from automax_ros.cli.run.simulated import run_simulated
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.faults import Fault
+from automax_ros.core.types import bare_name
+from automax_ros.rack.operator.retention import RetentionFault
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.model.config import CommonElement, RackConfig
+from automax_ros.rackfile.model.value_names import watched
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.ros.setup.arguments import NO_ARGUMENTS
+from automax_ros.runtime.time.simulated_pacer import SimulatedTime
+
+MOST_RATE = 1000.0
+"""Fastest ``--rate`` (decision: as that of `automax play`)."""
+WITHOUT_ROS = "or run with --simulated, which needs no ROS"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax run``."""
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="the rack's YAML file")
+    parser.add_argument(
+        "--simulated", action="store_true", help="simulated time, as fast as the machine can, without ROS"
+    )
+    parser.add_argument(
+        "--distributed",
+        action="store_true",
+        help="on the wall clock: each module in a process of its own (docs/distributed.md)",
+    )
+    parser.add_argument(
+        "--no-restart",
+        dest="restart",
+        action="store_false",
+        help="with --distributed: do not start a process again that has died",
+    )
+    parser.add_argument(
+        "--no-autostart",
+        dest="autostart",
+        action="store_false",
+        help="on the wall clock: wait unconfigured for a ROS 2 lifecycle manager, which configures and activates the "
+        "node `rack` (docs/ros.md)",
+    )
+    parser.add_argument(
+        "--ros",
+        action="store_true",
+        dest="with_ros",
+        help="with --simulated: with ROS nodes all the same, which send /clock and may be written",
+    )
+    parser.add_argument(
+        "--rate", metavar="R", help="with --simulated --ros: R times as fast as the wall clock (default: as it goes)"
+    )
+    parser.add_argument(
+        "--duration", type=seconds_above_0, metavar="S", help="seconds of rack time after which the run ends by itself"
+    )
+    parser.add_argument("--record", type=Path, metavar="DIR", help="record the run into a new rosbag2 folder")
+    add_set_argument(parser, tunables=True)
+    add_record_arguments(parser)
+    add_watch_argument(parser, "those of the rack file's `watch`")
+    parser.add_argument(
+        "--state",
+        type=folder,
+        metavar="DIR",
+        help="keep what outlives a power cycle in this folder from run to run (default on the wall clock: "
+        ".automax/RACK next to the rack file; simulated: nowhere)",
+    )
+    parser.add_argument(
+        "--stimuli",
+        type=Path,
+        metavar="FILE",
+        help="let happen what this YAML file says, by rack time (docs/stimuli.md)",
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE.json", help="write how the run ended: tasks, commons, forces, operations"
+    )
+    add_native_arguments(parser)
+    add_outside_argument(parser)
+    add_ros_arguments(parser)
+
+
+def folder(text: str) -> Path:
+    """Return the folder that an option names."""
+    if not text:
+        raise argparse.ArgumentTypeError("names no folder")
+    return Path(text)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the rack; 0 after a clean end, 1 where it has errors or was stopped by a fault.
+
+    A simulated run without ROS that a signal ends before it begins has the signal's code: whoever goes by it would take
+    the report of an earlier run for this one's.
+    """
+    if arguments.simulated and arguments.record is not None and arguments.duration is None:
+        raise UsageError("--record of a simulated run needs --duration: without an end it fills the disk")
+    _check_time(arguments)
+    if arguments.simulated and arguments.distributed:
+        raise UsageError("--distributed needs the wall clock, by which its processes agree", "leave out --simulated")
+    if not (arguments.distributed or arguments.restart):
+        raise UsageError("--no-restart belongs to --distributed")
+    if not arguments.autostart and (arguments.simulated or arguments.distributed):
+        raise UsageError("--no-autostart: a lifecycle manager starts racks on the wall clock, in one process")
+    check_files(arguments)
+    with stop_signals() as stop, held_for_writing(arguments.report):
+        if arguments.with_ros or not arguments.simulated:
+            prepare_ros(arguments, WITHOUT_ROS)
+        try:
+            return _run(arguments, stop)
+        except CutShort:
+            if arguments.with_ros or not arguments.simulated:
+                return 0
+            print("automax run: ended before its first scan; nothing was recorded or reported", file=sys.stderr)
+            return stop.code
+        except RackError as error:
+            return print_refused("run", error)
+        except StimuliRefused:
+            return 1
+        except (BagError, RetentionFault) as error:
+            print(error, file=sys.stderr)
+            return 2
+
+
+def _run(arguments: argparse.Namespace, stop: StopRequest) -> int:
+    if not arguments.autostart:
+        return _run_managed(arguments, stop)
+    with stop.cut_short():
+        config = config_of(arguments.config, allow_outside=arguments.allow_outside)
+    if config is None:
+        return 1
+    plan = _plan(arguments, config)
+    if arguments.simulated and not arguments.with_ros:
+        return run_simulated(plan, stop)
+    if arguments.distributed:
+        from automax_ros.cli.run.distributed import run_distributed
+
+        _check_clock(plan)
+        return run_distributed(plan, arguments, stop)
+    from automax_ros.cli.run.lifecycle import Managed, run_managed
+
+    return run_managed(Managed(plan.config.namespace, lambda: _read(arguments, stop), plan, plan.ros), stop)
+
+
+def _run_managed(arguments: argparse.Namespace, stop: StopRequest) -> int:
+    from automax_ros.cli.run.lifecycle import Managed, run_managed
+
+    ros = ros_arguments(arguments)
+    with stop.cut_short():
+        space = ros.placed(namespace_of(arguments.config))
+    return run_managed(Managed(space, lambda: _read(arguments, stop), ros=ros), stop)
+
+
+def _read(arguments: argparse.Namespace, stop: StopRequest) -> RunPlan:
+    with stop.cut_short():
+        return _plan(arguments, usable_config(arguments.config, allow_outside=arguments.allow_outside))
+
+
+def _plan(arguments: argparse.Namespace, config: RackConfig) -> RunPlan:
+    simulated = SimulatedTime(_rate(arguments.rate)) if arguments.with_ros else None
+    ros = NO_ARGUMENTS if arguments.simulated and not arguments.with_ros else ros_arguments(arguments)
+    if simulated is not None:  # whoever sends /clock does not follow it
+        ros = ros.without("use_sim_time")
+    config = replace(config, namespace=ros.placed(config.namespace))
+    settings, tunings = split_settings(config, arguments.settings)
+    if tunings and arguments.distributed:
+        text = f"{tunings[0].task}.{bare_name(tunings[0].name)}"
+        raise UsageError(f"--set: {text} is a tunable", f"of a distributed rack: --ros-args -p {text}:=VALUE")
+    return RunPlan(
+        config,
+        arguments.duration,
+        arguments.record,
+        recording_options(arguments, config),
+        tuple(settings),
+        watched_commons(config, arguments.watch),
+        arguments.state,
+        arguments.stimuli,
+        arguments.report,
+        arguments.allow_outside,
+        ros,
+        simulated=simulated,
+        tunings=tuple(tunings),
+        native=native_forms(arguments, arguments.duration, wall_clock=not arguments.simulated),
+        verbose=arguments.verbose,
+    )
+
+
+def _check_time(arguments: argparse.Namespace) -> None:
+    """Refuse options that would have no effect on a run in simulated time, or on one that is not."""
+    if arguments.with_ros and not arguments.simulated:
+        raise UsageError("--ros belongs to --simulated", "on the wall clock the rack has ROS nodes anyway")
+    if arguments.rate is not None and not arguments.with_ros:
+        raise UsageError("--rate belongs to --simulated --ros", "without ROS time passes as fast as it goes")
+    if arguments.simulated and not arguments.with_ros and arguments.ros is not None and arguments.ros.given:
+        raise UsageError("--ros-args: with --simulated nothing of ROS is started", "add --ros, or leave them out")
+
+
+def _check_clock(plan: RunPlan) -> None:
+    """Refuse ``use_sim_time`` for a rack in several processes, before they are started."""
+    from automax_ros.ros.base.node import follows_clock
+
+    if follows_clock(plan.ros, plan.config.namespace):
+        raise UsageError(
+            "use_sim_time: processes of a distributed rack agree by the wall clock", "run it without --distributed"
+        )
+
+
+def _rate(text: str | None) -> float | None:
+    rate = None if text is None else option_number("--rate", text, 0, MOST_RATE)
+    if rate == 0:
+        raise UsageError("--rate: at 0 no time would pass")
+    return rate
+
+
+def check_files(arguments: argparse.Namespace) -> None:
+    """Refuse a report that cannot be written, or that would be written over what is read, and a state's folder."""
+    if arguments.state is not None:
+        require_folder("--state", arguments.state)
+    if arguments.report is not None:
+        require_writable(arguments.report)
+        read = {"CONFIG": arguments.config, "--stimuli": arguments.stimuli}
+        given = {key: path for key, path in read.items() if path is not None}
+        require_different_files(given, {"--report": arguments.report})
+
+
+def watched_commons(config: RackConfig, texts: list[str] | None) -> tuple[CommonElement, ...] | None:
+    """Return what ``--watch`` names, None without it.
+
+    Raises:
+        UsageError: the rack has no such variable.
+    """
+    try:
+        return None if texts is None else tuple(watched(config, watch_list(texts)))
+    except Fault as error:
+        raise UsageError(f"--watch: {error.message}", error.hint) from error

@@ -1,0 +1,142 @@
+"""What `automax run` does about values that outlive a run: they come back at the start and are saved as it goes."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from automax_ros.cli.run.status import StatusDisplay
+from automax_ros.core.text import count_of
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Value
+from automax_ros.rack.operator.retention import Document, Restored, Retention, RetentionFault
+from automax_ros.rack.rack import Rack
+from automax_ros.recordings.write.recorder import Recorder
+
+SYNC_PERIOD_S = 0.4
+"""Pause between two waits for the disk itself, so that a power failure costs about a second too."""
+
+
+class RecordingWatch:
+    """Tells the person when a recording ends before its rack; without a recorder it does nothing."""
+
+    def __init__(self, recorder: Recorder | None, display: StatusDisplay) -> None:
+        self._recorder = recorder
+        self._display = display
+        self._told = False
+
+    @property
+    def failed(self) -> bool:
+        """Whether the recording broke off."""
+        return self._recorder is not None and self._recorder.failure is not None
+
+    def flush(self, now_ns: int) -> None:
+        """Let what an idle rack has recorded reach the file."""
+        if self._recorder is not None:
+            self._recorder.flush(now_ns)
+
+    def tell(self) -> None:
+        """Say on standard error, once, that the recording has broken off."""
+        if self.failed and not self._told:
+            assert self._recorder is not None
+            self._told = True
+            self._display.message("recording ended, the rack goes on")
+            print(self._recorder.failure, file=sys.stderr, flush=True)
+
+
+class DiskSync:
+    """Calls a function that waits for the disk, again and again, on a thread of its own: no scan waits with it."""
+
+    def __init__(self, sync: Callable[[], None]) -> None:
+        self._sync = sync
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="disk sync", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._ended.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._ended.wait(SYNC_PERIOD_S):
+            self._sync()
+
+
+SAVE_PERIOD_NS = 5 * NS_PER_S
+"""How often a changed state is saved while the rack runs, so that a killed run loses little (decision)."""
+
+
+class StateKeeping:
+    """Keeps a rack's state in a folder, or nowhere if that is None."""
+
+    def __init__(self, rack: Rack, folder: Path | None) -> None:
+        """Bring back what a folder holds, before anybody observes the rack: nodes and recordings begin with it.
+
+        Raises:
+            RetentionFault: the folder cannot be read or holds something else.
+        """
+        self.settings: tuple[tuple[str, Value], ...] = ()
+        self._retention = Retention(rack, folder) if folder is not None else None
+        self._news: list[str] = []
+        self._next_ns = SAVE_PERIOD_NS
+        self._failure: RetentionFault | None = None
+        self._told = False
+        self._saving: threading.Thread | None = None
+        self._last: Document | None = None
+        if self._retention is not None:
+            restored = self._retention.restore()
+            self.settings = restored.settings
+            self._news = _news(restored, self._retention.path)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the state could not be written."""
+        return self._failure is not None
+
+    def news(self) -> list[str]:
+        """Return the lines to show since the last call."""
+        if self._failure is not None and not self._told:
+            self._told = True
+            self._news.append(f"values of this run will not outlive it: {self._failure.place}: {self._failure.message}")
+        news, self._news = self._news, []
+        return news
+
+    def update(self, now_ns: int) -> None:
+        """Save what has changed if it is time to, on a thread of its own: no scan waits for the disk."""
+        busy = self._saving is not None and self._saving.is_alive()
+        if now_ns >= self._next_ns and self._retention is not None and not busy:
+            self._next_ns = now_ns + SAVE_PERIOD_NS
+            document = self._retention.present()
+            self._saving = threading.Thread(target=self._save, args=(document,), name="state", daemon=True)
+            self._saving.start()
+
+    def freeze(self) -> None:
+        """Take down what the end will save: to be called while the tasks still run, so that AUTO RUN knows them."""
+        if self._retention is not None:
+            self._last = self._retention.present()
+
+    def end(self) -> None:
+        """Save what has changed, the state of ``freeze`` if it was called."""
+        if self._saving is not None:
+            self._saving.join()
+        if self._retention is not None:
+            self._save(self._last if self._last is not None else self._retention.present())
+
+    def _save(self, document: Document) -> None:
+        if self._retention is None or self.failed:
+            return
+        try:
+            self._retention.save(document)
+        except RetentionFault as fault:
+            self._failure = fault
+
+
+def _news(restored: Restored, path: Path) -> list[str]:
+    """Return what to tell of a state that came back."""
+    counts = [count_of(restored.commons, "common"), count_of(restored.tunables, "tunable")]
+    counts += [count_of(restored.forces, "force")] if restored.forces else []
+    told = any((restored.commons, restored.tunables, restored.forces))
+    return [*([f"kept from the last run: {', '.join(counts)} ({path})"] if told else []), *restored.notes]

@@ -1,0 +1,1 @@
+"""Subcommands as data, for the reference and for completion in shells."""

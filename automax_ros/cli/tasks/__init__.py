@@ -1,0 +1,1 @@
+"""Subcommands for single tasks: check, compile, trace, response, tune-info and others."""

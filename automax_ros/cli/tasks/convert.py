@@ -1,0 +1,118 @@
+"""Make task sources of an old plant acceptable, and show what changes; files are written only when told.
+
+CR LF and CR, Ctrl-Z and what follows it, control characters, tabs, lower case, REAL constants of blocks without a
+decimal point, lengths of strings above 255, UTF-16. Line numbers stay. Exit code 1: `automax check` finds errors in
+what came out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from automax_ros.cli.options.task import Target, add_target_arguments, check_text, require_task, target_of
+from automax_ros.cli.usage import UsageError
+from automax_ros.core.diagnostics import has_errors
+from automax_ros.core.text import count_of, printable
+from automax_ros.rackfile.old_plants.sources import Converted, convert
+from automax_ros.rackfile.reading.files import FileFault, read_bytes
+from automax_ros.recordings.mcap.whole_file import written_whole
+
+KEPT_SUFFIX = ".orig"
+"""What --write adds to the name under which it keeps the old file."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``automax convert``."""
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="a task of an old plant")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--write", action="store_true", help=f"write over the files; the old ones stay as FILE{KEPT_SUFFIX}"
+    )
+    where.add_argument(
+        "--output", "-o", type=Path, metavar="DIR", help="write the converted files into this folder, made if need be"
+    )
+    add_target_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Convert all files, print what changes, and write where that was asked for."""
+    target = target_of(arguments)
+    places = _places(arguments.files, arguments.output)
+    converted = [(path, _converted(path, target)) for path in arguments.files]
+    wrong = 0
+    for path, result in converted:
+        print("\n".join(_difference(path, result)), end="\n" if result.before != result.after else "")
+        print(f"{path}: {', '.join(result.notes) or 'nothing to change'}", file=sys.stderr)
+        if has_errors(check_text(path, result.after, target).diagnostics):
+            print(f"{path}: `automax check` finds errors in what came out", file=sys.stderr)
+            wrong += 1
+    for path, result in converted:
+        if arguments.write and result.changed:
+            _write(path.with_name(path.name + KEPT_SUFFIX), read_bytes(path), over=False)
+            _write(path, result.data, over=True)
+        elif arguments.output is not None:
+            _make(arguments.output)
+            _write(places[path], result.data, over=False)
+    changed = sum(result.changed for _, result in converted)
+    if changed and not arguments.write and arguments.output is None:
+        hint = "--write or --output DIR"
+        print(f"nothing was written; {hint} writes the {count_of(changed, 'converted file')}", file=sys.stderr)
+    return 1 if wrong else 0
+
+
+def _places(files: list[Path], folder: Path | None) -> dict[Path, Path]:
+    """Return where the converted files go; two of one name, or a file in the folder's place, are refused before."""
+    if folder is None:
+        return {}
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is not a folder", "name another one")
+    places: dict[Path, Path] = {}
+    for path in files:
+        place = folder / path.name
+        if place in places.values():
+            raise UsageError(f"two files are named {path.name}", "convert them into folders of their own")
+        if place.exists() or place.is_symlink():
+            raise UsageError(f"{place} exists already", "name another folder, or remove the file")
+        places[path] = place
+    return places
+
+
+def _converted(path: Path, target: Target) -> Converted:
+    require_task(path)
+    try:
+        data = read_bytes(path)
+    except FileFault as fault:
+        raise UsageError(f"{path} {fault}") from fault
+    return convert(data, lambda text: check_text(path, text, target).diagnostics)
+
+
+def _difference(path: Path, result: Converted) -> Iterator[str]:
+    """Yield a unified diff; what cannot be printed is shown by its code."""
+    names = (str(path), f"{path} (converted)")
+    before, after = (text.split("\n") for text in (result.before, result.after))
+    for line in difflib.unified_diff(before, after, *names, lineterm=""):
+        yield printable(line)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be made: {error.strerror or error}") from error
+
+
+def _write(path: Path, data: bytes, *, over: bool) -> None:
+    try:
+        if over:
+            with written_whole(path) as temporary:
+                temporary.write_bytes(data)
+        else:
+            with path.open("xb") as stream:
+                stream.write(data)
+    except OSError as error:
+        reason = error.strerror or error
+        raise UsageError(f"{path} cannot be written: {reason}", "nothing after this file was written") from error

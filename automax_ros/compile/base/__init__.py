@@ -1,0 +1,1 @@
+"""What compiled code is made of: state, names, syntax trees, costs, functions that it calls."""

@@ -1,0 +1,195 @@
+"""The place where generated statements go: suites, temporaries, memory accesses, costs, logging.
+
+One emitter makes one function. Whatever has an effect or can fail is hoisted, in the order of the source, into
+statements before the statement that uses it; so expressions are pure and both forms of a scan come from one lowering.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from automax_ros.compile.base import build
+from automax_ros.compile.base.cost import CostModel
+from automax_ros.compile.base.pynames import variable_name
+from automax_ros.language.program import Program, Symbol
+from automax_ros.language.tree.tree import Scope
+
+OVER = "over"
+"""The local that holds the number of a statement's first overflow."""
+DROPPED = "dropped"
+"""The local that takes what is written to a held variable; nothing reads it."""
+
+
+@dataclass
+class Emitter:
+    """Collects the body of one generated function.
+
+    ``modeled`` makes the generator form, which yields the modeled cost in ns before each access to actual memory.
+    ``views`` maps the full names of commons to their views. ``in_block`` is set inside a block statement, subscripts
+    included: there a latched common is the value of the latch. ``forces`` are the latched commons that may be forced.
+    ``held`` are the task's own simple variables that a force holds: what is written to them is dropped.
+    """
+
+    program: Program
+    views: Mapping[str, int]
+    modeled: bool
+    cost_model: CostModel
+    body: list[ast.stmt] = field(default_factory=list)
+    line: int = 0
+    calls: set[str] = field(default_factory=set)
+    extra_globals: dict[str, object] = field(default_factory=dict)
+    pending_ns: int = 0
+    in_block: bool = False
+    forces: frozenset[str] = frozenset()
+    held: frozenset[str] = frozenset()
+    by_lines: bool = False
+    lines: set[int] = field(default_factory=set)
+    shown: ast.Tuple = field(default_factory=lambda: build.names(()))
+    _temporaries: int = 0
+    _overflows: bool = False
+
+    def emit(self, *statements: ast.stmt) -> None:
+        """Append statements to the current suite, as those of the present BASIC line."""
+        for statement in statements:
+            statement.lineno = self.line
+        self.body.extend(statements)
+
+    @contextmanager
+    def suite(self) -> Iterator[list[ast.stmt]]:
+        """Collect what is emitted inside into a suite of its own; its cost is booked inside it."""
+        outer, self.body = self.body, []
+        try:
+            yield self.body
+            self.book_cost()
+        finally:
+            self.body = outer
+
+    @contextmanager
+    def statement(self, line: int) -> Iterator[None]:
+        """Frame one BASIC statement: temporaries start again, its first overflow is logged at its end."""
+        self.line, self._temporaries, self._overflows = line, 0, False
+        target, position = self.body, len(self.body)
+        yield
+        if self._overflows:
+            target.insert(position, build.assign(OVER, build.constant(0)))
+            self.emit(build.when(build.name(OVER), [self.log_call(build.name(OVER))]))
+            self._overflows = False
+
+    def temporary(self) -> str:
+        """Return the name of a new temporary of this statement."""
+        self._temporaries += 1
+        return f"t{self._temporaries}"
+
+    def keep(self, value: ast.expr, changing: frozenset[str] = frozenset()) -> ast.expr:
+        """Return an expression that may be written twice: the value itself, or a temporary that holds it.
+
+        ``changing`` are Python names that get another value before the expression is used.
+        """
+        if build.is_simple(value) and not (isinstance(value, ast.Name) and value.id in changing):
+            return value
+        name = self.temporary()
+        self.emit(build.assign(name, value))
+        return build.name(name)
+
+    def member(self, name: str) -> ast.Attribute:
+        """Return a member of ``io``."""
+        return build.attribute("io", name)
+
+    def operation(self, name: str, *arguments: ast.expr) -> ast.Call:
+        """Return a call of an operation of ``runtime.functions`` or of a Python builtin."""
+        self.calls.add(name)
+        return build.call(name, *arguments)
+
+    def log_call(self, code: ast.expr) -> ast.stmt:
+        """Return the statement that logs a problem at the current BASIC line."""
+        return build.do(build.call(self.member("log"), build.constant(self.line), code))
+
+    def note_overflow(self, code: ast.expr) -> list[ast.stmt]:
+        """Return statements that remember an overflow if it is the statement's first one."""
+        self._overflows = True
+        return [build.assign(OVER, build.either(build.name(OVER), code))]
+
+    def fallible(self, call: ast.expr) -> ast.expr:
+        """Emit a call that returns a result and a problem; log the problem, return the result."""
+        result, problem = self.temporary(), self.temporary()
+        self.emit(build.assign_all([result, problem], call))
+        self.emit(build.when(build.name(problem), [self.log_call(build.name(problem))]))
+        return build.name(result)
+
+    def noting(self, call: ast.expr, *overflows: int) -> ast.expr:
+        """Emit a call that returns a result and a problem; ``overflows`` count as the statement's overflow."""
+        result, problem = self.temporary(), build.name(self.temporary())
+        self.emit(build.assign_all([result, problem.id], call))
+        tests = [build.compare(problem, "=", build.constant(code)) for code in overflows]
+        other: list[ast.stmt] = [build.when(problem, [self.log_call(problem)])]
+        self.emit(build.when(tests[0] if len(tests) == 1 else build.either(*tests), self.note_overflow(problem), other))
+        return build.name(result)
+
+    def symbol(self, name: str) -> Symbol:
+        """Return the declaration of a variable."""
+        return self.program.symbols[name]
+
+    def read(self, name: str, element: ast.expr | None = None) -> ast.expr:
+        """Return a variable's present value; a common is read from actual memory, by a block from the latch (3.3)."""
+        symbol = self.symbol(name)
+        if symbol.scope is Scope.LOCAL:
+            return build.name(variable_name(name)) if element is None else build.item(variable_name(name), element)
+        if self.in_block and symbol.latched:
+            return build.name(variable_name(name))
+        self.checkpoint()
+        arguments: list[ast.expr] = [build.constant(self.views[name])]
+        if element is not None:
+            arguments.append(element)
+        result = self.temporary()
+        self.emit(build.assign(result, build.call(self.member("read_now"), *arguments)))
+        return build.name(result)
+
+    def element_reader(self, name: str) -> Callable[[ast.expr], ast.expr]:
+        """Return what makes the expression that reads an array's element of a flat index, which must be in range."""
+        if self.symbol(name).scope is Scope.LOCAL:
+            return lambda index: build.item(variable_name(name), index)
+        view = build.constant(self.views[name])
+        return lambda index: build.call(self.member("read_now"), view, index)
+
+    def write(self, name: str, value: ast.expr, element: ast.expr | None = None) -> None:
+        """Emit the store of a value, already within the type, into a variable for a BASIC statement."""
+        symbol = self.symbol(name)
+        if symbol.scope is Scope.LOCAL:
+            if element is None:
+                self.emit(build.assign(DROPPED if name in self.held else variable_name(name), value))
+            else:
+                self.emit(build.set_item(variable_name(name), element, value))
+            return
+        value = self.keep(value)
+        self.checkpoint()
+        arguments: list[ast.expr] = [build.constant(self.views[name]), value]
+        if element is not None:
+            arguments.append(element)
+        self.emit(build.do(build.call(self.member("write_now"), *arguments)))
+
+    def mark_line(self, line: int | None) -> None:
+        """Emit the yield of a BASIC line that begins; ``shown`` gets its names when all of them are known."""
+        if self.by_lines and line is not None:
+            self.lines.add(line)
+            self.emit(build.do(ast.Yield(ast.Tuple([build.constant(line), self.shown], build.LOAD))))
+
+    def add_cost(self, nanoseconds: int) -> None:
+        """Add modeled execution time to what is not yet booked."""
+        if self.modeled:
+            self.pending_ns += nanoseconds
+
+    def book_cost(self) -> None:
+        """Emit the pending cost: before the flow of control divides or joins."""
+        if self.pending_ns:
+            self.emit(build.add_to("cost", build.constant(self.pending_ns)))
+            self.pending_ns = 0
+
+    def checkpoint(self) -> None:
+        """Emit the yield of the cost so far: before an access to actual memory."""
+        if not self.modeled:
+            return
+        self.book_cost()
+        self.emit(build.do(ast.Yield(build.name("cost"))), build.assign("cost", build.constant(0)))

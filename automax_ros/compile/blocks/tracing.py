@@ -1,0 +1,232 @@
+"""Python functions of REALs executed once on names instead of numbers: what they do with them is written down.
+
+The coefficients of the dynamic blocks are computed by plain Python, with dictionaries, loops over polynomials, and
+functions that other functions return. None of that depends on the numbers: what is left is a row of operations, and
+tests between them where a function asks how two numbers compare.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping, Sequence
+from types import CellType, FunctionType, SimpleNamespace
+from typing import Any
+
+from automax_ros.compile.base import build
+from automax_ros.compile.base.native_source import NotNative
+
+MOST_PATHS = 64
+"""Ways through one function; those of the blocks have a few."""
+_TRACED_PACKAGE = "automax_ros.blocks."
+
+
+class Traced:
+    """A REAL that has only a name yet."""
+
+    def __init__(self, recorder: Recorder, node: ast.expr) -> None:
+        """Take the recorder of what is done, and the name."""
+        self.recorder, self.node = recorder, node
+
+    def _binary(self, operator: ast.operator, left: object, right: object) -> Traced:
+        return self.recorder.kept(ast.BinOp(node_of(left), operator, node_of(right)))
+
+    def _compare(self, operator: ast.cmpop, other: object) -> Truth:
+        return Truth(self.recorder, ast.Compare(self.node, [operator], [node_of(other)]))
+
+    def __add__(self, other: object) -> Traced:
+        return self._binary(ast.Add(), self, other)
+
+    def __radd__(self, other: object) -> Traced:
+        return self._binary(ast.Add(), other, self)
+
+    def __sub__(self, other: object) -> Traced:
+        return self._binary(ast.Sub(), self, other)
+
+    def __rsub__(self, other: object) -> Traced:
+        return self._binary(ast.Sub(), other, self)
+
+    def __mul__(self, other: object) -> Traced:
+        return self._binary(ast.Mult(), self, other)
+
+    def __rmul__(self, other: object) -> Traced:
+        return self._binary(ast.Mult(), other, self)
+
+    def __truediv__(self, other: object) -> Traced:
+        return self._binary(ast.Div(), self, other)
+
+    def __rtruediv__(self, other: object) -> Traced:
+        return self._binary(ast.Div(), other, self)
+
+    def __pow__(self, exponent: int) -> Traced | float:
+        """Return a power with a whole exponent; the powers 0 and 1 are exact in every C library."""
+        if exponent == 0:
+            return 1.0
+        return self if exponent == 1 else self.recorder.kept(build.call("raised", self.node, node_of(float(exponent))))
+
+    def __abs__(self) -> Traced:
+        return self.recorder.kept(build.call("abs", self.node))
+
+    def __neg__(self) -> Traced:
+        return self.recorder.kept(ast.UnaryOp(ast.USub(), self.node))
+
+    def __lt__(self, other: object) -> Truth:
+        return self._compare(ast.Lt(), other)
+
+    def __le__(self, other: object) -> Truth:
+        return self._compare(ast.LtE(), other)
+
+    def __gt__(self, other: object) -> Truth:
+        return self._compare(ast.Gt(), other)
+
+    def __ge__(self, other: object) -> Truth:
+        return self._compare(ast.GtE(), other)
+
+    def __eq__(self, other: object) -> Truth:  # type: ignore[override]
+        return self._compare(ast.Eq(), other)
+
+    def __ne__(self, other: object) -> Truth:  # type: ignore[override]
+        return self._compare(ast.NotEq(), other)
+
+    def __bool__(self) -> bool:
+        return bool(self != 0.0)
+
+    def __float__(self) -> float:
+        raise NotNative("a function of Python's that needs a number")
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Truth:
+    """How two numbers compare; whoever asks takes one way, the other is gone another time."""
+
+    def __init__(self, recorder: Recorder, test: ast.expr) -> None:
+        """Take the recorder and the test."""
+        self.recorder, self.test = recorder, test
+
+    def __bool__(self) -> bool:
+        return self.recorder.decided(self.test)
+
+
+class _Fork(Exception):
+    def __init__(self, test: ast.expr) -> None:
+        super().__init__()
+        self.test = test
+
+
+class Recorder:
+    """Writes down what one run of a function does after the last answer that it was given."""
+
+    def __init__(self, prefix: str, answers: Sequence[bool] = ()) -> None:
+        """Take what begins the names of results, and which way to go at each test."""
+        self._prefix, self._answers = prefix, answers
+        self._made, self._asked = 0, 0
+        self.statements: list[ast.stmt] = []
+
+    def kept(self, node: ast.expr) -> Traced:
+        """Write an operation down; return its result."""
+        self._made += 1
+        name = f"{self._prefix}{self._made}"
+        self.statements.append(build.assign(name, node))
+        return Traced(self, build.name(name))
+
+    def decided(self, test: ast.expr) -> bool:
+        """Return which way to go at a test."""
+        if self._asked == len(self._answers):
+            raise _Fork(test)
+        self._asked += 1
+        self.statements = []
+        return self._answers[self._asked - 1]
+
+
+def node_of(value: object) -> ast.expr:
+    """Return a traced value, or a number."""
+    if isinstance(value, Traced):
+        return value.node
+    if isinstance(value, Truth):
+        return value.test
+    assert isinstance(value, (bool, int, float))
+    return build.constant(value)
+
+
+def traced(
+    function: Callable[..., Any],
+    before: Sequence[object],
+    numbers: Mapping[str, object],
+    results: Sequence[str],
+    prefix: str,
+    keys: Sequence[str] = (),
+) -> list[ast.stmt]:
+    """Return what a function does as statements that set ``results``.
+
+    Args:
+        function: it is called with what stands ``before`` and a dictionary, and returns a value for each result in
+            order, or the one alone, or a dictionary that has them under ``keys``.
+        before: arguments that are known.
+        numbers: what the dictionary holds: numbers, and names as trees.
+        results: names.
+        prefix: begins the names of what lies between.
+        keys: see above.
+
+    Raises:
+        NotNative: the function needs the numbers themselves, or has too many ways through it.
+    """
+    carried_out = _with_traced_functions(function, {})
+    paths = 0
+
+    def way(answers: tuple[bool, ...]) -> list[ast.stmt]:
+        nonlocal paths
+        paths += 1
+        if paths > MOST_PATHS:
+            raise NotNative("coefficients that depend on too many tests")
+        recorder = Recorder(prefix, answers)
+        given = {key: Traced(recorder, item) if isinstance(item, ast.expr) else item for key, item in numbers.items()}
+        try:
+            found = carried_out(*before, given)
+        except _Fork as fork:
+            return [*recorder.statements, build.when(fork.test, way((*answers, True)), way((*answers, False)))]
+        found = tuple(found[key] for key in keys) if keys else found
+        values = found if isinstance(found, tuple) else (found,)
+        sets = [build.assign(name, node_of(value)) for name, value in zip(results, values, strict=True)]
+        return [*recorder.statements, *sets]
+
+    return way(())
+
+
+def _of_number(name: str, value: object) -> object:
+    """Return a function of the library, of a number at once."""
+    if isinstance(value, Traced):
+        return value.recorder.kept(build.call(build.attribute("math", name), value.node))
+    return getattr(math, name)(value)
+
+
+_MATH = SimpleNamespace(
+    **{name: value for name, value in vars(math).items() if not name.startswith("_")}
+    | {name: (lambda value, name=name: _of_number(name, value)) for name in ("tan", "sqrt", "log", "exp", "cos", "sin")}
+)
+"""``math`` with the functions that the blocks call on numbers and on names alike."""
+
+
+def _with_traced_functions(value: Any, made: dict[int, Any]) -> Any:
+    """Return a function of the blocks, and all that it calls, with ``_MATH`` in the place of ``math``."""
+    if not isinstance(value, FunctionType) or not value.__module__.startswith(_TRACED_PACKAGE):
+        return value
+    if id(value) in made:
+        return made[id(value)]
+    scope: dict[str, Any] = {}
+    cells = tuple(CellType() for _ in value.__closure__ or ())
+    copy = made[id(value)] = FunctionType(value.__code__, scope, value.__name__, value.__defaults__, cells)
+    copy.__kwdefaults__ = value.__kwdefaults__
+    copy.__module__ = value.__module__
+    for cell, old in zip(cells, value.__closure__ or (), strict=True):
+        cell.cell_contents = _with_traced_functions(old.cell_contents, made)
+    names = set(_names(value.__code__))
+    scope.update({name: item for name, item in value.__globals__.items() if name in names or name == "__builtins__"})
+    for name in names & scope.keys():
+        scope[name] = _MATH if scope[name] is math else _with_traced_functions(scope[name], made)
+    return copy
+
+
+def _names(code: Any) -> list[str]:
+    """Return the names that a function, and those written inside it, look up."""
+    return [*code.co_names, *(name for inner in code.co_consts if hasattr(inner, "co_names") for name in _names(inner))]

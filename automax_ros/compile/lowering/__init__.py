@@ -1,0 +1,1 @@
+"""BASIC statements, CALLs and expressions as Python syntax trees."""

@@ -1,0 +1,238 @@
+"""Many scans of a native task in one call: latched values by columns in, values at END by columns out.
+
+What scans by columns are given and what they give.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from automax_ros.compile.base.scan_io import StateValues
+from automax_ros.compile.native.run.slots import REAL, Misfit, Slots, StateSlots
+
+Whole = npt.NDArray[np.int64]
+Real = npt.NDArray[np.float64]
+Column = npt.NDArray[np.int64] | npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BesideLatch:
+    """What scans read and wrote in actual memory: scan k has the rows ``offsets[k]`` to ``offsets[k + 1]``.
+
+    Values are doubles, which hold integers of 32 bits and REALs exactly. Without ``write_offsets`` what scans write is
+    not compared.
+    """
+
+    read_offsets: Whole
+    read_views: Whole
+    read_elements: Whole
+    read_values: Real
+    write_offsets: Whole | None = None
+    write_views: Whole | None = None
+    write_elements: Whole | None = None
+    write_values: Real | None = None
+
+
+@dataclass(frozen=True)
+class Written:
+    """What scans wrote in actual memory, in order, a row for each write."""
+
+    scans: Whole
+    views: Whole
+    elements: Whole
+    values: Real
+
+
+@dataclass(frozen=True)
+class Executed:
+    """What scans by columns came to.
+
+    Attributes:
+        done: scans executed whole. Where that is less than was asked for, the next one stopped, was too long, or did
+            something else than was recorded; the state is that before it.
+        outputs: for each of ``CompiledTask.written`` its values at END of each scan that was done.
+        errors: a row for each logged error, in order: scan, line, code.
+        written: what the scans wrote in actual memory.
+    """
+
+    done: int
+    outputs: list[Column]
+    errors: Whole
+    written: Written
+
+
+_FULL = 4
+"""AUTOMAX_FULL: the room for errors or writes is used up."""
+_ROOM = 4
+"""Errors and writes of a scan that there is room for at first; more is tried where that is not enough."""
+
+
+class _Rows(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_void_p) for name in ("offsets", "views", "elements", "values")]
+
+
+class _Call(ctypes.Structure):
+    """``automax_columns_call``."""
+
+    _fields_ = [
+        ("count", ctypes.c_int64),
+        ("latched", ctypes.c_void_p),
+        ("outputs", ctypes.c_void_p),
+        ("reads", _Rows),
+        ("writes", _Rows),
+        ("error_room", ctypes.c_int64),
+        ("errors", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("error_scans", "error_lines", "error_codes")),
+        ("written_room", ctypes.c_int64),
+        ("written", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("written_scans", "written_views", "written_elements", "written_values")),
+        ("done", ctypes.c_int64),
+        ("ended", ctypes.c_int),
+    ]
+
+
+class Columns:
+    """The scans of one library by columns."""
+
+    def __init__(self, path: Path, slots: StateSlots, latched_kinds: Sequence[int], written: Sequence[int]) -> None:
+        """Take the library, and which of the latched commons are written.
+
+        Raises:
+            OSError: the library cannot be loaded.
+        """
+        self._function = ctypes.CDLL(str(path)).automax_columns
+        self._function.argtypes, self._function.restype = (ctypes.c_void_p, ctypes.c_void_p), None
+        self._slots = slots
+        self._kinds, self._written = tuple(latched_kinds), tuple(written)
+
+    def execute(
+        self, state: StateValues, latched: Sequence[Column], count: int, actual: BesideLatch | None
+    ) -> Executed:
+        """Execute ``count`` scans on these columns; the state is changed in place (see ``Executed``).
+
+        Raises:
+            ValueError: the columns do not fit the task or the count.
+        """
+        columns = self._checked(latched, count)
+        _require_rows(actual, count)
+        try:
+            before = self._slots.taken(state)
+        except Misfit:
+            return self._run(np.empty(0, np.int64), columns, 0, None).executed()
+        slots = before.copy()
+        run = self._run(slots, columns, count, actual)
+        if run.done < count:
+            # The state is that of no scan: the scans that were whole are executed again, from the state before.
+            slots = before.copy()
+            run = self._run(slots, columns, run.done, actual)
+        self._slots.put(slots, before, state)
+        return run.executed()
+
+    def _run(self, slots: Slots, columns: Sequence[Column], count: int, actual: BesideLatch | None) -> _Run:
+        room = _ROOM * count + 64
+        while True:
+            run = _Run(columns, [self._kinds[place] for place in self._written], count, actual, room)
+            if not count:
+                return run
+            kept = slots.copy()
+            self._function(slots.ctypes.data, ctypes.addressof(run.call))
+            if run.call.ended != _FULL:
+                return run
+            slots[:] = kept
+            room *= 8
+
+    def _checked(self, latched: Sequence[Column], count: int) -> list[Column]:
+        if len(latched) != len(self._kinds):
+            raise ValueError(f"{len(latched)} columns where the task latches {len(self._kinds)} commons")
+        columns: list[Column] = []
+        for kind, column in zip(self._kinds, latched, strict=True):
+            if len(column) < count:
+                raise ValueError(f"a column of {len(column)} values for {count} scans")
+            columns.append(_as_column(column, kind))
+        return columns
+
+
+def _require_rows(actual: BesideLatch | None, count: int) -> None:
+    """Refuse rows that the C text would read past their end."""
+    if actual is None:
+        return
+    for offsets, *arrays in (
+        (actual.read_offsets, actual.read_views, actual.read_elements, actual.read_values),
+        (actual.write_offsets, actual.write_views, actual.write_elements, actual.write_values),
+    ):
+        if offsets is None:
+            continue
+        ordered = len(offsets) > count and offsets[0] >= 0 and bool(np.all(np.diff(offsets) >= 0))
+        if not ordered or any(array is None or len(array) < offsets[-1] for array in arrays):
+            raise ValueError(f"rows of reads or writes that do not fit {count} scans")
+
+
+class _Run:
+    """One call: its arguments, alive as long as it is, and what came of it."""
+
+    def __init__(
+        self, columns: Sequence[Column], kinds: Sequence[int], count: int, actual: BesideLatch | None, room: int
+    ) -> None:
+        self._kept: list[Column] = [*columns]
+        self._outputs: list[Column] = [_as_column(np.empty(count, np.int64), kind) for kind in kinds]
+        self._errors = [np.empty(room, np.int64) for _ in range(3)]
+        self._places = [np.empty(room, np.int64) for _ in range(3)]
+        self._values = np.empty(room, np.float64)
+        self._tables = [_table(columns), _table(self._outputs)]
+        call = _Call(count=count, error_room=room, written_room=room)
+        call.latched, call.outputs = (ctypes.addressof(table) for table in self._tables)
+        call.error_scans, call.error_lines, call.error_codes = (item.ctypes.data for item in self._errors)
+        call.written_scans, call.written_views, call.written_elements = (item.ctypes.data for item in self._places)
+        call.written_values = self._values.ctypes.data
+        if actual is not None:
+            call.reads = self._rows(actual.read_offsets, actual.read_views, actual.read_elements, actual.read_values)
+            if actual.write_offsets is not None:
+                call.writes = self._rows(
+                    actual.write_offsets,
+                    actual.write_views,
+                    actual.write_elements,
+                    actual.write_values,
+                )
+        self.call = call
+
+    @property
+    def done(self) -> int:
+        """The scans that were whole."""
+        return int(self.call.done)
+
+    def executed(self) -> Executed:
+        """Return what came of it."""
+        done, errors, written = self.done, self.call.errors, self.call.written
+        scans, views, elements = (item[:written].copy() for item in self._places)
+        return Executed(
+            done,
+            [column[:done] for column in self._outputs],
+            np.column_stack([item[:errors] for item in self._errors]),
+            Written(scans, views, elements, self._values[:written].copy()),
+        )
+
+    def _rows(self, offsets: Whole, views: Whole | None, elements: Whole | None, values: Real | None) -> _Rows:
+        assert views is not None
+        assert elements is not None
+        assert values is not None
+        whole = [np.ascontiguousarray(array, np.int64) for array in (offsets, views, elements)]
+        real = np.ascontiguousarray(values, np.float64)
+        self._kept += [*whole, real]
+        return _Rows(*(array.ctypes.data for array in whole), real.ctypes.data)
+
+
+def _as_column(values: Column, kind: int) -> Column:
+    """Return values of a kind as C takes them: 64 bits each, one after the other."""
+    if kind == REAL:
+        return np.ascontiguousarray(values, np.float64)
+    return np.ascontiguousarray(values, np.int64)
+
+
+def _table(columns: Sequence[Column]) -> ctypes.Array[ctypes.c_void_p]:
+    return (ctypes.c_void_p * (len(columns) + 1))(*(column.ctypes.data for column in columns), None)

@@ -1,0 +1,154 @@
+"""What is known of each name that has a value, at one place of a function.
+
+What the translation of expressions asks of the function that they stand in.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
+
+from automax_ros.compile.native.translate.ranges import Range
+from automax_ros.compile.native.translate.typed import Typed
+
+_MOST_CHANGES = 128
+"""Changes after which a base of its own is made: a copy costs as many, a base costs all the names of a task."""
+
+
+class Environment:
+    """Ranges by name. A copy shares what it does not change: a branch sets few names of the whole task.
+
+    Whoever sets a name must have made the environment, by ``copy`` or as a new one.
+    """
+
+    __slots__ = ("_base", "_changes")
+
+    def __init__(self, base: Mapping[str, Range], changes: dict[str, Range | None] | None = None) -> None:
+        """Take what is known, which is not changed any more, and what is otherwise: None for a name without value."""
+        self._base = base
+        self._changes: dict[str, Range | None] = {} if changes is None else changes
+
+    def get(self, name: str) -> Range | None:
+        """Return what is known of a name, None where it has no value."""
+        changes = self._changes
+        return changes[name] if name in changes else self._base.get(name)
+
+    def __getitem__(self, name: str) -> Range:
+        """Return what is known of a name that has a value."""
+        found = self.get(name)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __setitem__(self, name: str, known: Range) -> None:
+        self._changes[name] = known
+
+    def __contains__(self, name: str) -> bool:
+        return self.get(name) is not None
+
+    def copy(self) -> Environment:
+        """Return another one that can be changed."""
+        if len(self._changes) > _MOST_CHANGES:
+            return Environment(dict(self.items()))
+        return Environment(self._base, self._changes.copy())
+
+    def setting(self, name: str, known: Range) -> Environment:
+        """Return another one in which one name has this range."""
+        made = self.copy()
+        made[name] = known
+        return made
+
+    def without(self, names: set[str]) -> Environment:
+        """Return another one in which some names have no value."""
+        made = self.copy()
+        changes = made._changes
+        for name in names:
+            if name in made._base:
+                changes[name] = None
+            else:
+                changes.pop(name, None)
+        return made
+
+    def items(self) -> Iterator[tuple[str, Range]]:
+        """Yield each name that has a value, with what is known of it."""
+        changes = self._changes
+        for name, known in self._base.items():
+            if name not in changes:
+                yield name, known
+        for name, changed in changes.items():
+            if changed is not None:
+                yield name, changed
+
+    def differing(self, other: Environment) -> Iterator[tuple[str, Range | None, Range | None]]:
+        """Yield each name of which the two know different things, and what; None where it has no value."""
+        if self._base is not other._base:
+            yield from self._differing_throughout(other)
+            return
+        base, first, second = self._base, self._changes, other._changes
+        for name, there in second.items():
+            here = first[name] if name in first else base.get(name)
+            if here is not there:
+                yield name, here, there
+        for name, here in first.items():
+            if name not in second and here is not base.get(name):
+                yield name, here, base.get(name)
+
+    def _differing_throughout(self, other: Environment) -> Iterator[tuple[str, Range | None, Range | None]]:
+        for name, here in self.items():
+            there = other.get(name)
+            if here is not there:
+                yield name, here, there
+        for name, there in other.items():
+            if name not in self:
+                yield name, None, there
+
+    def joined(self, other: Environment) -> Environment:
+        """Return what is known where two paths meet: a name that has no value on one of them has none."""
+        changes = self._changes.copy()
+        for name, here, there in self.differing(other):
+            changes[name] = None if here is None or there is None else here.joined(there)
+        return Environment(self._base, changes)
+
+
+def joined(first: Environment | None, second: Environment | None) -> Environment | None:
+    """Return what is known where two paths meet; None: no path."""
+    if first is None or second is None:
+        return second if first is None else first
+    return first.joined(second)
+
+
+class Context(Protocol):
+    """A function under translation."""
+
+    def value(self, node: ast.expr, known: Environment) -> Typed:
+        """Return an expression in C."""
+        ...
+
+    def refined(self, test: ast.expr, known: Environment, *, truth: bool) -> Environment | None:
+        """Return what is known where a test came out as ``truth``; None where it cannot."""
+        ...
+
+    def read(self, name: str, known: Environment) -> Typed:
+        """Return a variable, or a constant of the module."""
+        ...
+
+    def attribute(self, node: ast.Attribute) -> object:
+        """Return a constant of a module, such as ``math.pi``."""
+        ...
+
+    def element(self, name: str, index: ast.expr, known: Environment) -> Typed:
+        """Return an element of an array or of a named tuple of constants."""
+        ...
+
+    def constants(self, values: Sequence[object], index: ast.expr, known: Environment) -> Typed:
+        """Return an element of a tuple of constants."""
+        ...
+
+    def call(self, node: ast.Call, known: Environment) -> list[Typed]:
+        """Return the results of a call."""
+        ...
+
+    def ended(self) -> str:
+        """Return the argument by which a function says that the scan ends here; the statement then asks for it."""
+        ...

@@ -1,0 +1,112 @@
+"""Pieces of C with the range of their value: literals, conversions, names."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+
+from automax_ros.compile.base.native_source import NotNative
+from automax_ros.compile.native.translate.ranges import INT64_MAX, Kind, Range, exactly
+
+WIDE = "__int128"
+INT128_MAX = 2**127 - 1
+_PARENTHESES = re.compile("[()]")
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """A C expression without effects that may stand anywhere an operand may, and what is known of its value.
+
+    Of ``mixed`` Python gives an integer or a REAL, as it happens; as a REAL it is the same number.
+    """
+
+    text: str
+    range: Range
+    mixed: bool = False
+
+    @property
+    def whole(self) -> Typed:
+        """The same as an integer's operand: a boolean counts as 0 and 1."""
+        if self.range.kind is Kind.INT:
+            return self
+        return replace(self, text=f"(int64_t){self.text}", range=replace(self.range, kind=Kind.INT))
+
+    @property
+    def signed(self) -> str:
+        """The text of an integer in 64 bits or more: C would take a literal, or a boolean, for 32."""
+        is_literal = self.text.strip("(-)").isdigit()
+        return f"(int64_t){self.text}" if is_literal or self.range.kind is Kind.BOOL else self.text
+
+
+def literal(value: object) -> Typed:
+    """Return a Python literal.
+
+    Raises:
+        NotNative: it is none of a number.
+    """
+    if isinstance(value, bool):
+        return Typed("true" if value else "false", exactly(value))
+    if isinstance(value, int):
+        return Typed(whole_text(value), exactly(value))
+    if isinstance(value, float):
+        return Typed(real_text(value), exactly(value))
+    raise NotNative("a string" if isinstance(value, str) else f"a value {value!r}")
+
+
+def whole_text(value: int) -> str:
+    """Return an integer as C writes it."""
+    if abs(value) > INT64_MAX:
+        raise NotNative("an integer beyond 64 bits")
+    text = f"{abs(value)}" if abs(value) < 2**31 else f"{abs(value)}LL"
+    return f"(-{text})" if value < 0 else text
+
+
+def real_text(value: float) -> str:
+    """Return a double as C writes it: the shortest decimals that give its bits."""
+    if math.isnan(value):
+        return "NAN"
+    text = "INFINITY" if math.isinf(value) else repr(abs(value))
+    return f"(-{text})" if math.copysign(1.0, value) < 0 else text
+
+
+def c_type(known: Range) -> str:
+    """Return the type in C that holds a range.
+
+    Raises:
+        NotNative: none does, or the kind differs from path to path.
+    """
+    if known.kind is None:
+        raise NotNative("a value that is an integer on one path and a REAL on another")
+    if not known.is_wide:
+        return known.kind.c_type
+    if known.low < -INT128_MAX or known.high > INT128_MAX:
+        raise NotNative("an integer that cannot be shown to fit 128 bits")
+    return WIDE
+
+
+def as_real(value: Typed) -> Typed:
+    """Return a value as Python's arithmetic with a REAL takes it."""
+    if value.range.kind is Kind.REAL:
+        return value
+    low, high = float(value.range.low), float(value.range.high)
+    return Typed(f"(double){value.text}", Range(Kind.REAL, low, high, never_nan=True))
+
+
+def widened(value: Typed) -> str:
+    """Return an integer's text in 128 bits."""
+    return value.text if value.range.is_wide else f"({WIDE}){value.text}"
+
+
+def bare(text: str) -> str:
+    """Return an expression without the parentheses around all of it."""
+    if not (text.startswith("(") and text.endswith(")")):
+        return text
+    if text.find(")") == len(text) - 1:
+        return text[1:-1]
+    depth = 0
+    for found in _PARENTHESES.finditer(text):
+        depth += 1 if found[0] == "(" else -1
+        if depth == 0:
+            return text[1:-1] if found.end() == len(text) else text
+    return text

@@ -1,0 +1,1 @@
+"""Judges how a drive is set up, by the manual's formulas."""

@@ -1,0 +1,1 @@
+"""The current minor loop of DC_DRIVE_CML (section 52)."""

@@ -1,0 +1,1 @@
+"""The PMI of an SD3000 drive on a UDC."""

@@ -1,0 +1,1 @@
+"""Checks of CALL: the block, its parameters, what its rules say of them."""

@@ -1,0 +1,1 @@
+"""Checks of everything else: declarations, statements, expressions, the flow of a task."""

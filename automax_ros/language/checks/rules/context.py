@@ -1,0 +1,157 @@
+"""What the parts of the checker share: the symbols found so far and where findings go.
+
+What stands on lines that the parser could not read, so that one broken line causes no second error elsewhere.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from automax_ros.blocks.declare.declaration import Block, Platform
+from automax_ros.core.diagnostics import Diagnostic, Note, SourceText, Span
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.problems.problem import Severity
+from automax_ros.core.text import Suggester
+from automax_ros.language.program import BoundCall, CommonSpec, DataStructure, OpenedFile, Symbol
+from automax_ros.language.text.reporter import DIAGNOSTIC_LIMIT, TooManyProblemsError
+from automax_ros.language.tree.task_kind import TaskKind
+from automax_ros.language.tree.tree import Data, Event
+
+_WORD = re.compile(r"[A-Z_][A-Z0-9_]*[%!@$]?")
+_NUMBER = re.compile(r"\s*([0-9]{1,9})(?![0-9])")
+_BLOCK_WORDS = frozenset({"IF", "ELSE", "END_IF", "FOR", "NEXT"})
+_DECLARING = frozenset({"LOCAL", "COMMON", "GLOBAL", "EVENT"})
+
+
+@dataclass(frozen=True)
+class BrokenLines:
+    """The logical lines with a syntax error.
+
+    ``words`` stand on any of them, ``declared`` on those that declare something; ``numbers`` are their line numbers.
+    """
+
+    words: frozenset[str] = frozenset()
+    declared: frozenset[str] = frozenset()
+    numbers: frozenset[int] = frozenset()
+
+    @property
+    def blocks(self) -> bool:
+        """TRUE where an IF or FOR may begin or end on a broken line, so that blocks are not where they seem to be."""
+        return not _BLOCK_WORDS.isdisjoint(self.words)
+
+    def may_declare(self, name: str) -> bool:
+        """Return whether a broken declaration mentions a variable of this full name."""
+        return name in self.declared
+
+
+def broken_lines(source: SourceText, diagnostics: Iterable[Diagnostic]) -> BrokenLines:
+    """Return what stands on the lines on which the parser reported errors, physical lines joined by ``&``."""
+    lines = source.lines
+    begins = _beginnings(lines)
+    words: set[str] = set()
+    declared: set[str] = set()
+    numbers: set[int] = set()
+    faulty = {begins[item.span.line - 1] for item in diagnostics if _stops(item) and item.span.line <= len(lines)}
+    for index, line in enumerate(lines):
+        if begins[index] not in faulty:
+            continue
+        found = _WORD.findall(line.upper())
+        words.update(found)
+        logical = begins[index]
+        if any(word in _DECLARING for word in _WORD.findall(lines[logical].upper())):
+            declared.update(found)
+        number = _NUMBER.match(line)
+        if index == logical and number:
+            numbers.add(int(number.group(1)))
+    return BrokenLines(frozenset(words), frozenset(declared), frozenset(numbers))
+
+
+def _stops(diagnostic: Diagnostic) -> bool:
+    return diagnostic.severity is Severity.ERROR and diagnostic.span.line >= 1
+
+
+def _beginnings(lines: list[str]) -> list[int]:
+    """Return for each physical line the index of the first line of its logical line."""
+    begins: list[int] = []
+    for index in range(len(lines)):
+        continued = index > 0 and lines[index - 1].rstrip().endswith("&")
+        begins.append(begins[-1] if continued else index)
+    return begins
+
+
+@dataclass
+class Context:
+    """One check of one task.
+
+    ``lines`` are the physical lines of its text; ``line`` is the BASIC line number in force, None before the first.
+    ``files`` are what the numbers after # of a BASIC task are. ``scan_block`` is the block that begins its scans, "" as
+    long as none is found. ``structures`` are the data structures by name, with the
+    span of the name where its SHIFT block makes it.
+    """
+
+    target: Platform
+    tick_ns: int
+    catalogue: Mapping[str, Block]
+    commons: Mapping[str, CommonSpec] | None = None
+    lines: Sequence[str] = ()
+    broken: BrokenLines = field(default_factory=BrokenLines)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    symbols: dict[str, Symbol] = field(default_factory=dict)
+    events: dict[str, Event] = field(default_factory=dict)
+    data: list[tuple[int, Data]] = field(default_factory=list)
+    calls: dict[Span, BoundCall] = field(default_factory=dict)
+    structures: dict[str, tuple[DataStructure, Span]] = field(default_factory=dict)
+    suggest: Suggester = field(default_factory=Suggester)
+    kind: TaskKind = TaskKind.CONTROL_BLOCK
+    files: dict[int, OpenedFile] = field(default_factory=dict)
+    line: int | None = None
+    ticks: int | None = None
+    scan_block: str = ""
+
+    def report(
+        self, code: str, message: str, span: Span, hint: str | None = None, notes: tuple[Note, ...] = ()
+    ) -> None:
+        """Add a finding in the line in force.
+
+        Raises:
+            TooManyProblemsError: there are DIAGNOSTIC_LIMIT findings already.
+        """
+        if len(self.diagnostics) >= DIAGNOSTIC_LIMIT:
+            raise TooManyProblemsError
+        self.diagnostics.append(Diagnostic(code, message, span, self.line, hint, notes))
+
+    @property
+    def task_words(self) -> str:
+        """The kind of task, for messages: ``an AUTOMAX task``."""
+        article = "an" if self.target is Platform.AUTOMAX else "a"
+        return f"{article} {self.target.value.upper()} task"
+
+    @property
+    def errors(self) -> int:
+        """The number of errors found so far, warnings left out."""
+        return sum(PROBLEMS[item.code].severity is Severity.ERROR for item in self.diagnostics)
+
+    def place_of(self, word: str, span: Span) -> Span:
+        """Return where a word stands in a stretch of the text, the stretch itself where it is not on its first line."""
+        if not 1 <= span.line <= len(self.lines):
+            return span
+        pattern = re.compile(rf"(?<![A-Z0-9_]){re.escape(word)}(?![A-Z0-9_])", re.IGNORECASE)
+        found = pattern.search(self.lines[span.line - 1], span.column - 1, span.end_column - 1)
+        return span if found is None else Span(span.line, found.start() + 1, found.end() + 1)
+
+    @property
+    def period_s(self) -> float | None:
+        """The scan period T in seconds, None as long as TICKS is not known to be good."""
+        return None if self.ticks is None else self.ticks * self.tick_ns / 1e9
+
+    def is_broken(self, blocks: Iterable[Block]) -> bool:
+        """Return whether a line that could not be read mentions one of some blocks."""
+        return any(block.name in self.broken.words for block in blocks)
+
+    def is_input_point(self, name: str) -> bool:
+        """Return whether the rack defines a common as an input, which nothing but the rack writes."""
+        spec = self.commons.get(name) if self.commons is not None else None
+        symbol = self.symbols.get(name)
+        return spec is not None and spec.is_input and symbol is not None and symbol.scope.value == "COMMON"

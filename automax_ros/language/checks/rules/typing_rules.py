@@ -1,0 +1,116 @@
+"""Types of expressions: purely syntactic, from type characters, constants and the function table (J-3675 chapter 5).
+
+Integers of both widths are worked in 32 bits, so every integer operation gives DOUBLE; REAL wins over integers; a
+boolean counts as 0 or 1 next to an arithmetic operator or next to an integer, and two booleans give a boolean only with
+AND, OR, XOR and NOT. Nothing turns into a string or a boolean by itself.
+"""
+
+from __future__ import annotations
+
+from automax_ros.core.numbers import INT16_MAX
+from automax_ros.core.types import DataType
+from automax_ros.language.tree.functions import FUNCTIONS
+from automax_ros.language.tree.tree import (
+    Binary,
+    BooleanLiteral,
+    Element,
+    Expression,
+    FunctionCall,
+    IntegerLiteral,
+    RealLiteral,
+    Reference,
+    StringLiteral,
+)
+
+RELATIONAL = frozenset({"=", "<>", "<", ">", "<=", ">="})
+LOGICAL = frozenset({"AND", "OR", "XOR"})
+
+
+def type_of(expression: Expression) -> DataType:
+    """Return the type of a checked expression.
+
+    A decimal or hex constant is INTEGER up to 32767, above that DOUBLE; a variable or element has the type of its name.
+
+    Raises:
+        ValueError: an operator has operands that it cannot take, which the checker refuses.
+        KeyError: a function is not in the table, which the checker refuses too.
+    """
+    if isinstance(expression, Binary):
+        return _type_of_chain(expression)
+    if isinstance(expression, (Reference, Element)):
+        return expression.type
+    if isinstance(expression, IntegerLiteral):
+        return literal_integer_type(expression)
+    if isinstance(expression, RealLiteral):
+        return DataType.REAL
+    if isinstance(expression, BooleanLiteral):
+        return DataType.BOOLEAN
+    if isinstance(expression, StringLiteral):
+        return DataType.STRING
+    if isinstance(expression, FunctionCall):
+        return FUNCTIONS[expression.name].result.of(tuple(type_of(argument) for argument in expression.arguments))
+    return _known(unary_type(expression.operator, type_of(expression.operand)), expression.operator)
+
+
+def literal_integer_type(literal: IntegerLiteral) -> DataType:
+    """Return INTEGER for a constant of 0 to 32767, DOUBLE for a larger one."""
+    return DataType.INTEGER if 0 <= literal.value <= INT16_MAX else DataType.DOUBLE
+
+
+def unary_type(operator: str, operand: DataType) -> DataType | None:
+    """Return the type of ``-``, ``+`` or ``NOT`` before an operand, None where it cannot stand there.
+
+    A sign keeps REAL and makes DOUBLE of an integer; NOT complements a boolean or, bit by bit, an integer.
+    """
+    if operator == "NOT":
+        return DataType.BOOLEAN if operand is DataType.BOOLEAN else DataType.DOUBLE if operand.is_integer else None
+    if operand is DataType.REAL:
+        return DataType.REAL
+    return DataType.DOUBLE if operand.is_integer else None
+
+
+def binary_type(operator: str, left: DataType, right: DataType) -> DataType | None:
+    """Return the type of an operation on two operands, None where the operator cannot join them.
+
+    * ``+ - * / **``: REAL if an operand is REAL, else DOUBLE; booleans count as 0 or 1. ``+`` joins two strings.
+    * relational: BOOLEAN, for two numbers; two strings or two booleans only with ``=`` and ``<>``.
+    * AND, OR, XOR: BOOLEAN for two booleans, DOUBLE (bit by bit) for integers or an integer and a boolean.
+    """
+    types = (left, right)
+    if operator in RELATIONAL:
+        alike = left is right and operator in {"=", "<>"}
+        return DataType.BOOLEAN if alike or (left.is_numeric and right.is_numeric) else None
+    if DataType.STRING in types:
+        return DataType.STRING if operator == "+" and left is right else None
+    if operator in LOGICAL:
+        if DataType.REAL in types:
+            return None
+        return DataType.BOOLEAN if left is right is DataType.BOOLEAN else DataType.DOUBLE
+    return DataType.REAL if DataType.REAL in types else DataType.DOUBLE
+
+
+def spine(expression: Binary) -> tuple[Expression, list[Binary]]:
+    """Return the leftmost operand of a chain ``a + b + c ...`` and its operations from left to right.
+
+    A chain of one level leans to the left as deep as it is long; walking it so keeps the recursion flat.
+    """
+    operations = []
+    first: Expression = expression
+    while isinstance(first, Binary):
+        operations.append(first)
+        first = first.left
+    return first, operations[::-1]
+
+
+def _type_of_chain(expression: Binary) -> DataType:
+    first, operations = spine(expression)
+    result = type_of(first)
+    for operation in operations:
+        result = _known(binary_type(operation.operator, result, type_of(operation.right)), operation.operator)
+    return result
+
+
+def _known(result: DataType | None, operator: str) -> DataType:
+    if result is None:
+        raise ValueError(f"operator {operator} has operands that it cannot take")
+    return result

@@ -1,0 +1,72 @@
+"""Forms of the language that no source confirms: their spelling or meaning is ours (decision).
+
+``automax check --json`` marks what it says about them, so that a user of a real rack knows where to be careful.
+
+Finds the forms of a task that no source confirms, so that ``automax check --json`` can mark them.
+"""
+
+from __future__ import annotations
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.language.tree.basic_tree import Get, InputFile, PrintFile, Put
+from automax_ros.language.tree.functions import FUNCTIONS
+from automax_ros.language.tree.task_kind import TaskKind
+from automax_ros.language.tree.tree import (
+    Call,
+    Declaration,
+    Expression,
+    FunctionCall,
+    IoWrite,
+    Module,
+    SetEvent,
+    Statement,
+)
+from automax_ros.language.tree.walk import arguments_of, expressions_of, jumps_of, parts, statements_in_order
+
+UNCONFIRMED_STATEMENTS: dict[str, str] = {
+    "CALL": "CALL after `\\` or THEN: section 3.1 wants a line number",
+    "IOWRITE": "IOWRITE slot, register, value: the name and the order of the operands",
+    "EMPTY": "EMPTY= and FULL=: where the number of the channel or port stands",
+    "GET": "GET #n, variable and PUT #n, string: the operands",
+    "SET": "SET in a control-block task: no source lists it there",
+    "TUNABLE": "LOCAL NAME [CURRENT=..., HIGH=..., LOW=..., STEP=...]: the bracket and its keys",
+}
+"""Statements and parts of statements, with what is not confirmed of them."""
+
+UNCONFIRMED_FUNCTIONS: dict[str, str] = {
+    name: f"{name}: the name and its arguments" for name, function in FUNCTIONS.items() if function.unconfirmed
+}
+"""Functions, with what is not confirmed of them."""
+
+
+def find_unconfirmed(module: Module, kind: TaskKind) -> list[tuple[Span, str]]:
+    """Return the places of unconfirmed forms in the order of the text, each with what is not confirmed of it."""
+    found: list[tuple[Span, str]] = []
+    for statement, _ in statements_in_order(module.statements):
+        found += _of_statement(statement, kind)
+        arguments = tuple(argument.value for argument in arguments_of(statement))
+        for expression in (*expressions_of(statement), *arguments):
+            found += _of_expression(expression)
+    return found
+
+
+def _of_statement(statement: Statement, kind: TaskKind) -> list[tuple[Span, str]]:
+    if isinstance(statement, Call) and statement.number is None:
+        return [(statement.span, UNCONFIRMED_STATEMENTS["CALL"])]
+    if isinstance(statement, IoWrite):
+        return [(statement.span, UNCONFIRMED_STATEMENTS["IOWRITE"])]
+    if isinstance(statement, (InputFile, Get, PrintFile)) and jumps_of(statement):
+        return [(statement.span, UNCONFIRMED_STATEMENTS["EMPTY"])]
+    if isinstance(statement, (Get, Put)):
+        return [(statement.span, UNCONFIRMED_STATEMENTS["GET"])]
+    if isinstance(statement, SetEvent) and kind is not TaskKind.BASIC:
+        return [(statement.span, UNCONFIRMED_STATEMENTS["SET"])]
+    if isinstance(statement, Declaration):
+        tunings = [item.tuning for item in statement.variables if item.tuning is not None]
+        return [(tuning.span, UNCONFIRMED_STATEMENTS["TUNABLE"]) for tuning in tunings]
+    return []
+
+
+def _of_expression(expression: Expression) -> list[tuple[Span, str]]:
+    calls = [part for part in parts(expression) if isinstance(part, FunctionCall)]
+    return [(call.span, UNCONFIRMED_FUNCTIONS[call.name]) for call in calls if call.name in UNCONFIRMED_FUNCTIONS]

@@ -1,0 +1,1 @@
+"""Logical lines to the syntax tree."""

@@ -1,0 +1,215 @@
+"""How the statements of events, times, channels and ports are read after their first word (J-3675 6.6 to 6.8).
+
+No source shows where the number stands in the EMPTY= and FULL= forms; ours is INPUT:EMPTY=line #n, list (decision).
+The number after # is a constant, so that a check knows what each one is (decision).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from automax_ros.core.text import did_you_mean
+from automax_ros.core.types import DataType
+from automax_ros.language.parse.cursor import Cursor
+from automax_ros.language.parse.declarations import event_word
+from automax_ros.language.parse.expressions import expression, target
+from automax_ros.language.parse.statements import line_number, print_items
+from automax_ros.language.text.tokens import Kind, Token
+from automax_ros.language.tree.basic_tree import (
+    ITEM_TYPES,
+    Close,
+    Delay,
+    Direction,
+    Get,
+    InputFile,
+    OpenChannel,
+    OpenPort,
+    PrintFile,
+    Put,
+    StartEvery,
+    Unit,
+    WaitOn,
+)
+from automax_ros.language.tree.tree import Expression, Statement, Target
+
+_FORM = "AMX4110"
+ACCESSES = ("EXCLUSIVE", "NON_EXCLUSIVE")
+WAITING_KEYS = frozenset(
+    {"EVERY", "CHANNEL", "AS", "FILE", "TYPE", "DEPTH", "SETUP", "ACCESS", "EMPTY", "FULL", *ACCESSES, *ITEM_TYPES}
+    | {unit.value for unit in Unit}
+)
+"""Words inside these statements; none is reserved."""
+_OPEN_CHANNEL = "OPEN CHANNEL FOR INPUT AS FILE #1, TYPE = (I, R), DEPTH = 8"
+_OPEN_PORT = 'OPEN "PORTB" AS FILE #1, SETUP = 0D00H, 9600'
+
+
+def _wait(cursor: Cursor, start: Token) -> WaitOn:
+    _word(cursor, "ON", f"ON is missing after {start.text}", "WAIT ON event")
+    return WaitOn(event_word(cursor))
+
+
+def _delay(cursor: Cursor, start: Token) -> Delay:
+    return Delay(expression(cursor), _unit(cursor, start.text))
+
+
+def _start(cursor: Cursor, start: Token) -> StartEvery:
+    _word(cursor, "EVERY", f"EVERY is missing after {start.text}", "START EVERY 10 SECONDS")
+    return StartEvery(expression(cursor), _unit(cursor, "START EVERY"))
+
+
+def _unit(cursor: Cursor, word: str) -> Unit:
+    units = [unit.value for unit in Unit]
+    if cursor.current.text not in units:
+        hint = did_you_mean(cursor.current.text, units) or f"write {word} 10 TICKS; units are plural"
+        cursor.fail(_FORM, f"{word} needs TICKS, SECONDS, MINUTES or HOURS, not {cursor.found()}", hint)
+    return Unit(cursor.advance().text)
+
+
+def _word(cursor: Cursor, word: str, message: str, form: str) -> None:
+    near = did_you_mean(cursor.current.text, (word,)) if cursor.current.kind is Kind.WORD else None
+    cursor.expect(word, _FORM, f"{message}: {cursor.found()} stands there", near or form)
+
+
+def _file(cursor: Cursor, word: str) -> int:
+    """Read # and the number of a channel or port."""
+    if not cursor.accept("#"):
+        cursor.fail(_FORM, f"{word} needs # and a number, not {cursor.found()}", f"{word} #1, ...")
+    token = cursor.current
+    if token.kind is not Kind.INTEGER or not token.text.isdigit() or not isinstance(token.value, int):
+        cursor.fail(_FORM, f"the number after # is an integer constant, not {cursor.found()}")
+    cursor.advance()
+    cursor.reporter.report_token(token)
+    return token.value
+
+
+def _comma(cursor: Cursor, form: str) -> None:
+    cursor.expect(",", "AMX0071", f"a comma is missing before {cursor.found()}", form)
+
+
+def _open(cursor: Cursor, start: Token) -> Statement:
+    if cursor.current.kind is Kind.STRING:
+        return _open_port(cursor)
+    _word(cursor, "CHANNEL", f"{start.text} needs CHANNEL or the name of a port", f"{_OPEN_CHANNEL}, or {_OPEN_PORT}")
+    _word(cursor, "FOR", "FOR is missing after CHANNEL", _OPEN_CHANNEL)
+    if not cursor.at("INPUT", "OUTPUT"):
+        cursor.fail(_FORM, f"a channel is opened FOR INPUT or FOR OUTPUT, not {cursor.found()}", _OPEN_CHANNEL)
+    direction = Direction(cursor.advance().text)
+    file = _as_file(cursor, _OPEN_CHANNEL)
+    _comma(cursor, _OPEN_CHANNEL)
+    _key(cursor, "TYPE", _OPEN_CHANNEL)
+    types = _types(cursor)
+    depth: Expression | None = None
+    if direction is Direction.INPUT:
+        _comma(cursor, _OPEN_CHANNEL)
+        _key(cursor, "DEPTH", _OPEN_CHANNEL)
+        depth = expression(cursor)
+    return OpenChannel(direction, file, types, depth)
+
+
+def _open_port(cursor: Cursor) -> OpenPort:
+    port = str(cursor.advance().value)
+    file = _as_file(cursor, _OPEN_PORT)
+    _comma(cursor, _OPEN_PORT)
+    if cursor.at("ACCESS"):
+        _key(cursor, "ACCESS", _OPEN_PORT)
+        if not cursor.at(*ACCESSES):
+            hint = did_you_mean(cursor.current.text, ACCESSES)
+            cursor.fail(_FORM, f"ACCESS is EXCLUSIVE or NON_EXCLUSIVE, not {cursor.found()}", hint)
+        return OpenPort(port, file, access=cursor.advance().text)
+    _key(cursor, "SETUP", _OPEN_PORT)
+    setup = expression(cursor)
+    return OpenPort(port, file, setup, expression(cursor) if cursor.accept(",") else None)
+
+
+def _as_file(cursor: Cursor, form: str) -> int:
+    _word(cursor, "AS", "AS FILE is missing", form)
+    _word(cursor, "FILE", "FILE is missing after AS", form)
+    return _file(cursor, "AS FILE")
+
+
+def _key(cursor: Cursor, key: str, form: str) -> None:
+    _word(cursor, key, f"{key} is missing", form)
+    cursor.expect("=", "AMX0035", f"`=` is missing after {key}", form)
+
+
+def _types(cursor: Cursor) -> tuple[DataType, ...]:
+    hint = "TYPE = (I, D, R, S, B): INTEGER, DOUBLE INTEGER, REAL, string, BOOLEAN"
+    cursor.expect("(", _FORM, f"the list of TYPE stands in parentheses, {cursor.found()} does not", hint)
+    types = [_type(cursor, hint)]
+    while cursor.accept(","):
+        types.append(_type(cursor, hint))
+    cursor.expect(")", _FORM, f"`)` is missing before {cursor.found()}", hint)
+    return tuple(types)
+
+
+def _type(cursor: Cursor, hint: str) -> DataType:
+    if cursor.current.text not in ITEM_TYPES:
+        cursor.fail(_FORM, f"{cursor.found()} is not a type of a channel", hint)
+    return ITEM_TYPES[cursor.advance().text]
+
+
+def _close(cursor: Cursor, start: Token) -> Close:
+    return Close(_file(cursor, start.text))
+
+
+def _branch_line(cursor: Cursor, word: str, key: str) -> int | None:
+    """Read the :EMPTY=line or :FULL=line of a statement, None where there is none."""
+    if not cursor.accept(":"):
+        return None
+    form = f"{word}:{key}=100 #1, ..."
+    _word(cursor, key, f"{key} is missing after {word}:", form)
+    cursor.expect("=", "AMX0035", f"`=` is missing after {key}", form)
+    line = line_number(cursor, key)
+    cursor.accept(",")
+    return line
+
+
+def _input(cursor: Cursor, start: Token) -> InputFile:
+    empty = _branch_line(cursor, start.text, "EMPTY")
+    if not cursor.at("#"):
+        hint = "open a channel or a port and write INPUT #1, A%"
+        cursor.fail(_FORM, f"{start.text} needs # and the number of a channel or port, not {cursor.found()}", hint)
+    file = _file(cursor, start.text)
+    _comma(cursor, "INPUT #1, A%, B%")
+    targets: list[Target] = [target(cursor, start.text)]
+    while cursor.accept(","):
+        targets.append(target(cursor, start.text))
+    return InputFile(file, tuple(targets), empty)
+
+
+def _get(cursor: Cursor, start: Token) -> Get:
+    empty = _branch_line(cursor, start.text, "EMPTY")
+    file = _file(cursor, start.text)
+    _comma(cursor, "GET #1, A$")
+    return Get(file, target(cursor, start.text), empty)
+
+
+def _put(cursor: Cursor, start: Token) -> Put:
+    file = _file(cursor, start.text)
+    _comma(cursor, "PUT #1, A$")
+    return Put(file, expression(cursor))
+
+
+def _print(cursor: Cursor, start: Token) -> Statement:
+    if not cursor.at("#", ":"):
+        return print_items(cursor)
+    full = _branch_line(cursor, start.text, "FULL")
+    file = _file(cursor, start.text)
+    if not cursor.accept(","):
+        return PrintFile(file, full=full)
+    printed = print_items(cursor)
+    return PrintFile(file, printed.items, printed.separators, full)
+
+
+WAITING_STATEMENTS: dict[str, Callable[[Cursor, Token], Statement]] = {
+    "WAIT": _wait,
+    "DELAY": _delay,
+    "START": _start,
+    "OPEN": _open,
+    "CLOSE": _close,
+    "INPUT": _input,
+    "GET": _get,
+    "PUT": _put,
+    "PRINT": _print,
+}
+"""How each statement that only a BASIC task has is read after its first word; PRINT has more forms there."""

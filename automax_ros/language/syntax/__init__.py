@@ -1,1 +1,0 @@
-"""Text to tree: lexer, parser, syntax tree, printer."""

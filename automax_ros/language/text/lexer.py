@@ -1,0 +1,226 @@
+"""Characters to tokens, one physical line at a time.
+
+Linear in the length of the line whatever it holds. A `!` glued to a preceding name is its type character, otherwise
+it begins a remark; lower case is read as upper case (decisions).
+"""
+
+from __future__ import annotations
+
+import re
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.text import printable
+from automax_ros.language.text.constants import hexadecimal_fault, integer_value, real_fault, string_fault
+from automax_ros.language.text.tokens import Kind, SourceFault, Token
+
+BLANKS = " \t\f"
+_TOKEN = re.compile(
+    r"""
+      (?P<blank>[ \t\f]+)
+    | (?P<name>[A-Za-z_][A-Za-z0-9_]*[%!@$]?)
+    | (?P<hex>[0-9][0-9A-Fa-f]*[Hh](?![A-Za-z0-9_.]))
+    | (?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[Ee][+-]?[0-9]+)?)
+    | (?P<string>"[^"]*"|'[^']*')
+    | (?P<foreign>==|=[ \t]*[<>]|&&|\|\||:=|\^|\+\+|<<|>>)
+    | (?P<operator>\*\*|<[ \t]*[>=]|>[ \t]*[<=]|[-+*/=<>])
+    | (?P<mark>[()\[\],;:\#])
+    | (?P<separator>\\)
+    """,
+    re.VERBOSE,
+)
+_WORD_TAIL = re.compile(r"[A-Za-z0-9_.]*")
+_STRANGE = re.compile(r"[^\x20-\x7e\t\f]+")
+_FOREIGN = {
+    "==": "equality is written `=`",
+    "=<": "write `<=`",
+    "=>": "write `>=`",
+    "&&": "write AND",
+    "||": "write OR",
+    ":=": "an assignment is written `=`",
+    "^": "a power is written `**`, an exclusive or XOR",
+    "++": "write A% = A% + 1",
+    "<<": "write SHIFTL%(value, places)",
+    ">>": "write SHIFTR%(value, places)",
+    "!=": "`not equal` is written `<>`",
+}
+_PLAIN = {"mark": Kind.MARK, "separator": Kind.SEPARATOR}
+TYPE_CHARACTERS = "%!@$"
+BROKEN_END = "&!"
+"""Text of an ERROR token after which the statement goes on in the next line all the same."""
+
+
+class LineLexer:
+    """Turns physical lines into tokens and remembers the first lower-case letter of the text."""
+
+    def __init__(self) -> None:
+        self.lower_case: Span | None = None
+
+    def tokens(self, text: str, line: int, start: int, offset: int) -> list[Token]:
+        """Return the tokens of ``text`` from index ``start`` on.
+
+        ``line`` counts from 1; ``offset`` is the number of characters that the logical line has before this line.
+        A ``&`` at the end becomes a CONTINUE token; the ``&`` that ends a remark stays in the remark's value.
+        """
+        result: list[Token] = []
+        position, length = start, len(text)
+        match_at = _TOKEN.match
+        while position < length:
+            match = match_at(text, position)
+            if match is None:
+                token = self._other(text, Span(line, position + 1, position + 2), result)
+                result.append(token._replace(offset=offset + position))
+                position = token.end_column - 1
+                continue
+            group, end = match.lastgroup, match.end()
+            kind = _PLAIN.get(group or "")
+            if kind is not None:
+                result.append(Token(kind, match.group(), line, position + 1, end + 1, offset + position))
+            elif group != "blank":
+                token = self._token(match, line, result)
+                result.append(token._replace(offset=offset + position))
+                end = token.end_column - 1
+            position = end
+        return result
+
+    def remark(self, text: str, line: int, start: int, mark: str) -> Token:
+        """Return the remark that goes from index ``start`` to the end of the line; its text begins after ``mark``."""
+        body = text[start + len(mark) :].strip(BLANKS)
+        end = len(text.rstrip(BLANKS))
+        return Token(Kind.REMARK, mark.upper(), line, start + 1, max(end, start + 1) + 1, value=body)
+
+    def _token(self, match: re.Match[str], line: int, before: list[Token]) -> Token:
+        group, text = match.lastgroup, match.group()
+        column, end_column = match.start() + 1, match.end() + 1
+        if group == "name":
+            return self._name(match, line, before)
+        if group == "operator":
+            sign = text if len(text) == 1 else text[0] + text[-1]
+            return Token(Kind.OPERATOR, "<>" if sign == "><" else sign, line, column, end_column)
+        if group == "string":
+            return Token(Kind.STRING, text, line, column, end_column, value=text[1:-1], fault=string_fault(text[1:-1]))
+        if group == "foreign":
+            return _foreign(text[0] + text[-1] if len(text) > 1 else text, Span(line, column, end_column))
+        return self._number(match, Span(line, column, end_column))
+
+    def _name(self, match: re.Match[str], line: int, before: list[Token]) -> Token:
+        text = match.group()
+        upper = text.upper()
+        column, end_column = match.start() + 1, match.end() + 1
+        if upper != text:
+            self._saw_lower(text, Span(line, column, end_column))
+        if upper == "REM" and _begins_statement(before):
+            return self.remark(match.string, line, match.start(), text)
+        return Token(Kind.NAME if upper[-1] in TYPE_CHARACTERS else Kind.WORD, upper, line, column, end_column)
+
+    def _number(self, match: re.Match[str], span: Span) -> Token:
+        text, source, end = match.group(), match.string, match.end()
+        place = (span.line, span.column, span.end_column)
+        tail = _WORD_TAIL.match(source, end)
+        if tail is not None and tail.group():
+            return _bad_number(text, tail.group(), Span(span.line, span.column, tail.end() + 1))
+        upper = text.upper()
+        if upper != text:
+            self._saw_lower(text, span)
+        if match.lastgroup == "hex":
+            value, fault = hexadecimal_fault(upper)
+            return Token(Kind.INTEGER, upper, *place, value=value, fault=fault)
+        if upper.isdigit():
+            value, fault = integer_value(upper)
+            return Token(Kind.INTEGER, upper, *place, value=value, fault=fault)
+        return Token(Kind.REAL, upper, *place, value=float(upper), fault=real_fault(upper))
+
+    def _other(self, text: str, here: Span, before: list[Token]) -> Token:
+        position = here.column - 1
+        char = text[position]
+        if char == "!":
+            unequal = text[position : position + 2] == "!=" and text[position + 2 : position + 3] != "="
+            if unequal and not _begins_statement(before):
+                return _foreign("!=", Span(here.line, position + 1, position + 3))
+            return self.remark(text, here.line, position, "!")
+        if char == "&":
+            return _ampersand(text, here)
+        if char in "\"'":
+            return _open_string(text, here)
+        if char in "%@$" and before and before[-1].is_name:
+            name = before[-1]
+            hint = f"write {name.text[:40]}{char} without a blank" if name.kind is Kind.WORD else None
+            return _error(char, here, "AMX0029", f"the type character `{char}` is apart from its name", hint)
+        strange = _STRANGE.match(text, position)
+        if strange is not None:
+            here = Span(here.line, position + 1, strange.end() + 1)
+        return _unknown_character(char, here)
+
+    def _saw_lower(self, text: str, span: Span) -> None:
+        if self.lower_case is None:
+            first = next(index for index, char in enumerate(text) if char.islower())
+            self.lower_case = Span(span.line, span.column + first, span.end_column)
+
+
+def _begins_statement(before: list[Token]) -> bool:
+    return not before or before[-1].kind is Kind.SEPARATOR or before[-1].text in ("THEN", "ELSE")
+
+
+def _error(text: str, span: Span, code: str, message: str, hint: str | None) -> Token:
+    return Token(Kind.ERROR, text, span.line, span.column, span.end_column, fault=SourceFault(code, message, hint))
+
+
+def _foreign(text: str, span: Span) -> Token:
+    return _error(text, span, "AMX0038", f"`{text}` is not an operator of this language", _FOREIGN[text])
+
+
+def _bad_number(text: str, tail: str, span: Span) -> Token:
+    word = printable(text[:40] + tail[:40])
+    word = word if len(word) <= 40 else word[:40] + "..."
+    hint = "put a blank between a number and a word"
+    if all(char in "0123456789ABCDEFabcdef" for char in text + tail):
+        hint = "a hexadecimal constant ends with H: " + (text + tail)[:40].upper() + "H"
+    elif tail[0] == ".":
+        hint = "a constant has one decimal point"
+    return _error(word, span, "AMX0023", f"`{word}` is not a number", hint)
+
+
+def _ampersand(text: str, here: Span) -> Token:
+    rest = text[here.column : here.column + 200].strip(BLANKS) or text[here.column :].strip(BLANKS)
+    if not rest:
+        return Token(Kind.CONTINUE, "&", here.line, here.column, here.end_column)
+    remark = rest[0] == "!"
+    hint = "a remark may stand on the statement's first or last line" if remark else "`and` is written AND"
+    if rest[0] in "Hh":
+        hint = "a hexadecimal constant is written 0FFH"
+    # A remark after the `&` shows that a continuation was meant: the statement goes on, with this one fault.
+    end = len(text) + 1 if remark else here.end_column
+    span = Span(here.line, here.column, end)
+    return _error(BROKEN_END if remark else "&", span, "AMX0015", "`&` is not the last character of its line", hint)
+
+
+def _open_string(text: str, here: Span) -> Token:
+    quote = text[here.column - 1]
+    continues = text.rstrip(BLANKS).endswith("&")
+    span = Span(here.line, here.column, len(text) + 1)
+    hint = f"end it with {quote} on the same line; a remark begins with `!`"
+    return _error(BROKEN_END if continues else quote, span, "AMX0020", "the string is not closed", hint)
+
+
+def _unknown_character(char: str, span: Span) -> Token:
+    shown = f"`{char}`" if char.isprintable() else f"with the code {ord(char):02X} hex"
+    return _error(char, span, "AMX0004", f"character {shown} has no meaning here", _CHARACTER_HINTS.get(char))
+
+
+_CHARACTER_HINTS = {
+    "%": "`%` is the type character of an INTEGER and stands directly after a name",
+    "@": "`@` is the type character of a BOOLEAN and stands directly after a name",
+    "$": "`$` is the type character of a STRING and stands directly after a name",
+    "?": "write PRINT",
+    "|": "write OR",
+    "~": "write NOT",
+    "{": "subscripts stand in ( ) or [ ]",
+    "}": "subscripts stand in ( ) or [ ]",
+    ".": "a real constant needs a digit: 0.5",
+    "`": "strings stand in \" or '",
+    "\N{LEFT DOUBLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{RIGHT DOUBLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{LEFT SINGLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{RIGHT SINGLE QUOTATION MARK}": "strings stand in \" or '",
+    "\N{EN DASH}": "a minus sign is `-`",
+    "\N{MINUS SIGN}": "a minus sign is `-`",
+}

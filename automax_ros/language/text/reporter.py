@@ -1,0 +1,44 @@
+"""Collects the problems of one text."""
+
+from __future__ import annotations
+
+from automax_ros.core.diagnostics import Diagnostic, Note, Span
+from automax_ros.language.text.tokens import SourceFault, Token
+
+DIAGNOSTIC_LIMIT = 200
+"""Most problems reported of one source; one more says that there are others (decision: nobody reads more)."""
+
+
+class TooManyProblemsError(Exception):
+    """Ends the parse of a text that has more problems than anybody reads."""
+
+
+class SyntaxFaultError(Exception):
+    """Ends the parse of one statement; carries what is wrong and where."""
+
+    def __init__(self, fault: SourceFault, span: Span, notes: tuple[Note, ...] = ()) -> None:
+        super().__init__(fault.message)
+        self.fault = fault
+        self.span = span
+        self.notes = notes
+
+
+class Reporter:
+    """The list of diagnostics; ``statement`` is the BASIC line number in force."""
+
+    def __init__(self) -> None:
+        self.diagnostics: list[Diagnostic] = []
+        self.statement: int | None = None
+
+    def report(self, fault: SourceFault, span: Span, notes: tuple[Note, ...] = ()) -> None:
+        """Add a problem; raises TooManyProblemsError at the limit."""
+        if len(self.diagnostics) >= DIAGNOSTIC_LIMIT:
+            message = f"more than {DIAGNOSTIC_LIMIT} problems: the rest of the text is not looked at"
+            self.diagnostics.append(Diagnostic("AMX0002", message, span, self.statement))
+            raise TooManyProblemsError
+        self.diagnostics.append(Diagnostic(fault.code, fault.message, span, self.statement, fault.hint, notes))
+
+    def report_token(self, token: Token) -> None:
+        """Add the fault that a token carries, if any."""
+        if token.fault is not None:
+            self.report(token.fault, token.span)

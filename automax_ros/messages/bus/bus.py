@@ -1,0 +1,183 @@
+"""What processes of one rack exchange, as messages and back. Both ends hold the same rack file: variables are numbers.
+
+Times are instants of rack time on the wire, too: all processes of a run share its beginning.
+
+What of a message between processes can be true: seats and slots are the rack's, times lie where a run's can.
+
+Whoever can publish on the bus can send any numbers. What cannot be true is refused where it comes in, here alone: a
+time that no later one can exceed, for example, would decide for ever who is right (decision: limits as below).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Value
+from automax_ros.messages.cdr.parts import CdrError
+from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Values, values_of
+from automax_ros.messages.types.topics import QosProfile
+from automax_ros.rack.base.stop_cause import StopCause
+from automax_ros.rack.distributed.link import Batch, HeldForce, Picture, Standing
+from automax_ros.rack.distributed.versions import Held
+
+AHEAD_NS = 60 * NS_PER_S
+"""So far ahead of this process's time another's may be: clocks of hosts differ, and a process may have been held up."""
+LONGEST_RUN_NS = 10 * 366 * 24 * 3600 * NS_PER_S
+"""The longest run of a rack, where its start is not known."""
+LARGEST_SEQUENCE = 1 << 62
+LAST_STATE = 3
+"""The last of the states of a process, LEAVING."""
+INSTALLED_NS = -1
+"""The time of what a rack has as it is installed."""
+
+
+class BusLimits:
+    """Judges messages. ``seats`` are the slots of all processes of the rack, by the slot that names each."""
+
+    def __init__(self, seats: Mapping[int, tuple[int, ...]]) -> None:
+        """Take the processes of the rack."""
+        self._seats = {seat: tuple(sorted(slots)) for seat, slots in seats.items()}
+        self._slots = {0}.union(*seats.values())  # 0 stands with what is as installed
+
+    def of_presence(self, presence: Presence, wall_ns: int, latest_ns: int) -> str:
+        """Return what of a process's word cannot be true, "" where all can.
+
+        Args:
+            presence: the word.
+            wall_ns: the wall clock here.
+            latest_ns: the latest rack time that there can be.
+        """
+        slots = self._seats.get(presence.seat)
+        if slots is None:
+            return f"a process in slot {presence.seat}, which is none of the rack"
+        if tuple(sorted(presence.slots)) != slots:
+            return f"a process of slot {presence.seat} with other slots than the rack's"
+        if presence.epoch_ns and not wall_ns - LONGEST_RUN_NS <= presence.epoch_ns <= wall_ns + AHEAD_NS:
+            return "a start of the run that cannot be"
+        if presence.standing_seat not in self._slots:
+            return f"a stop by slot {presence.standing_seat}, which is none of the rack"
+        if not 0 <= presence.standing_ns <= latest_ns:
+            return "a time of a stop that cannot be"
+        if presence.state > LAST_STATE or presence.sequence > LARGEST_SEQUENCE:
+            return "a state or a number that no process has"
+        return ""
+
+    def of_write(self, message: BusWrite, latest_ns: int) -> str:
+        """Return what of a write cannot be true, "" where all can."""
+        if message.seat not in self._seats:
+            return f"a write by slot {message.seat}, which is none of the rack"
+        if not 0 <= message.stamp <= latest_ns:
+            return "a write at a time that cannot be"
+        return "a write with a number that none has" if message.sequence > LARGEST_SEQUENCE else ""
+
+    def of_image(self, message: BusImage, latest_ns: int) -> str:
+        """Return what of an image cannot be true, "" where all can."""
+        times = (*message.since_ns, *message.force_since_ns)
+        if not all(INSTALLED_NS <= time_ns <= latest_ns for time_ns in times):
+            return "an image with a time that cannot be"
+        if not self._are_seats((*message.seat, *message.force_seat)):
+            return "an image with a slot that is none of the rack"
+        most = max((message.sequence, *message.order, *message.force_order))
+        return "an image with a number that none has" if most > LARGEST_SEQUENCE else ""
+
+    def _are_seats(self, seats: Iterable[int]) -> bool:
+        return self._slots.issuperset(seats)
+
+
+BUS = QosProfile("reliable", "volatile", "keep_last", 1000)
+"""Writes and images between processes: every message counts."""
+
+
+def write_message(batch: Batch, run_id: int, process: int) -> BusWrite:
+    """Return a batch as a message of one process in one run."""
+    values = values_of(batch.entries)
+    return BusWrite(batch.time_ns, run_id, process, batch.seat, batch.sequence, batch.writer, int(batch.kind), values)
+
+
+def batch_of(message: BusWrite, texts: Collection[int]) -> Batch:
+    """Return the writes of a message; ``texts`` are the views of STRING variables.
+
+    Raises:
+        CdrError: it is not one that a process of a rack sends.
+    """
+    try:
+        kind = WriteKind(message.kind)
+    except ValueError:
+        raise CdrError(f"{message.kind} is not a kind of write") from None
+    entries = tuple(_entries(message.values, texts))
+    return Batch(message.seat, message.sequence, message.stamp, message.writer, kind, entries)
+
+
+def image_message(picture: Picture, now_ns: int, run_id: int, process: int, asked_by: int) -> BusImage:
+    """Return what a process holds as a message for the one that has asked."""
+    values, forces = picture.values, picture.forces
+    return BusImage(
+        now_ns,
+        run_id,
+        process,
+        picture.sequence,
+        asked_by,
+        values_of([(held.view, held.element, held.value) for held in values]),
+        [held.mask for held in values],
+        [held.version[0] for held in values],
+        [held.version[1] for held in values],
+        [held.version[2] for held in values],
+        [force.view for force in forces],
+        [force.element for force in forces],
+        [float(force.value) for force in forces],
+        [force.held for force in forces],
+        [force.version[0] for force in forces],
+        [force.version[1] for force in forces],
+        [force.version[2] for force in forces],
+    )
+
+
+def picture_of(message: BusImage, texts: Collection[int]) -> Picture:
+    """Return what a process holds; ``texts`` are the views of STRING variables.
+
+    Raises:
+        CdrError: it is not one that a process of a rack sends.
+    """
+    try:
+        since = zip(message.since_ns, message.seat, message.order, strict=True)
+        values = zip(_entries(message.values, texts), message.mask, since, strict=True)
+        held = tuple(Held(view, element, value, mask, version) for (view, element, value), mask, version in values)
+        keys = (message.force_variable, message.force_element, message.force_value, message.force_held)
+        since = zip(message.force_since_ns, message.force_seat, message.force_order, strict=True)
+        forces = tuple(HeldForce(*force) for force in zip(*keys, since, strict=True))
+    except ValueError:
+        raise CdrError("an image whose parts differ in length") from None
+    return Picture(message.sequence, held, forces)
+
+
+def standing_of(presence: Presence) -> Standing:
+    """Return how the rack stands by the word of a process."""
+    cause = None
+    if presence.stopped:
+        code = presence.stopped_code or None
+        cause = StopCause(presence.standing_ns, presence.stopped_reason, code, presence.stopped_task)
+    return Standing(presence.standing_ns, presence.standing_seat, cause)
+
+
+def with_standing(presence: Presence, standing: Standing) -> Presence:
+    """Return a process's word with how the rack stands."""
+    cause = standing.cause
+    return presence._replace(
+        stopped=cause is not None,
+        standing_ns=standing.at_ns,
+        standing_seat=standing.seat,
+        stopped_code=(cause.code or "") if cause else "",
+        stopped_task=cause.task if cause else "",
+        stopped_reason=cause.reason[:500] if cause else "",
+    )
+
+
+def _entries(values: Values, texts: Collection[int]) -> Iterator[tuple[int, int, Value]]:
+    """Yield view, element and value; strings stand apart, in order, with a 0 for each among the numbers."""
+    if not len(values.variable) == len(values.element) == len(values.value):
+        raise CdrError("values whose parts differ in length")
+    strings = iter(values.text)
+    for view, element, value in zip(values.variable, values.element, values.value, strict=True):
+        yield view, element, next(strings, "") if view in texts else value

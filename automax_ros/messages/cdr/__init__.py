@@ -1,0 +1,1 @@
+"""CDR, the byte form of ROS 2 messages."""

@@ -1,0 +1,1 @@
+"""What a running rack sends, as messages and as their bytes."""

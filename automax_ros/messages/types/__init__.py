@@ -1,0 +1,1 @@
+"""The messages as Python tuples, their topics and their definitions."""

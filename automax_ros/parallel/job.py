@@ -1,0 +1,117 @@
+"""What is wrong with a cluster, as errors that say what to do.
+
+A piece of work, what became of it, and where pieces are done.
+"""
+
+from __future__ import annotations
+
+import os
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import printable
+
+MOST_TRIES = 2
+"""How often a piece is begun whose worker dies under it (decision: whatever kills workers shall not kill them all)."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One piece: ``work``, a function of a module, called with ``arguments``; all of it, and the result, is pickled.
+
+    ``name`` is what the person is told; it should be unlike that of every other piece.
+    """
+
+    name: str
+    work: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class PieceFault:
+    """Why a piece has no result: the piece's name, the error of its work with its kind, and the worker that told it.
+
+    ``died`` says that the work told nothing: each worker that began it has died. ``trace`` is for developers.
+    """
+
+    piece: str
+    kind: str
+    message: str
+    worker: str = ""
+    trace: str = ""
+    died: bool = False
+
+    def __str__(self) -> str:
+        where = f" (on {self.worker})" if self.worker else ""
+        return f"{self.piece}: {self.message or self.kind}{where}"
+
+
+@dataclass(frozen=True)
+class Done:
+    """A piece that is over: with its result, or with its fault."""
+
+    piece: Piece
+    result: Any | None = None
+    fault: PieceFault | None = None
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where pieces are done: by the cluster of a Dask ``scheduler``, else by ``jobs`` processes of this machine.
+
+    ``jobs`` of 1 is this process itself, None as many as there are cores for it.
+    """
+
+    jobs: int | None = 1
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse less than one job.
+
+        Raises:
+            ValueError: there are none.
+        """
+        if self.jobs is not None and self.jobs < 1:
+            raise ValueError(f"{self.jobs} jobs: at least 1")
+
+    @property
+    def processes(self) -> int:
+        """How many processes of this machine work side by side."""
+        return self.jobs if self.jobs is not None else usable_cores()
+
+
+def usable_cores() -> int:
+    """Return how many cores of this machine the process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def fault_of(name: str, error: Exception, worker: str = "") -> PieceFault:
+    """Return what an error of a piece's work tells."""
+    trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    return PieceFault(name, type(error).__name__, str(error), worker, trace)
+
+
+def death_of(name: str, what: str, worker: str = "") -> PieceFault:
+    """Return the fault of a piece whose workers died under it as often as it may be tried."""
+    return PieceFault(name, "WorkerDied", f"{what}, {MOST_TRIES} times; it is not tried again", worker, died=True)
+
+
+def result_of(piece: Piece, worker: str = "") -> Done:
+    """Do a piece here and now."""
+    try:
+        return Done(piece, piece.work(*piece.arguments))
+    except Exception as error:
+        return Done(piece, fault=fault_of(piece.name, error, worker))
+
+
+class ClusterFault(Fault):
+    """Pieces cannot be handed to a cluster: ``place`` is the scheduler's address.
+
+    ``code`` is AMX6851 to AMX6854, AMX6857 or AMX6858.
+    """
+
+    def __init__(self, code: str, place: str, message: str, hint: str) -> None:
+        super().__init__(printable(message), printable(hint), code=code, place=printable(place))

@@ -1,0 +1,228 @@
+"""Pieces done by processes of this machine, each of which gets one piece after the other.
+
+Not by concurrent.futures: when one process dies its pool gives up all of them and cannot say which piece it was.
+
+The processes that do pieces on this machine: copies of this one where that is safe, else fresh interpreters.
+
+A copy (fork) is ready after some milliseconds with all that is imported and prepared here; a fresh interpreter imports
+it again for a second. A copy is safe only where nothing else runs in this process, which could hold a lock for ever in
+the copy: no other thread of Python, and none of a library (decision). Threads of numerical libraries that end before a
+fork by themselves, as OpenBLAS's do, do not count.
+"""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import multiprocessing.connection
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import NoReturn, Protocol
+
+from automax_ros.parallel.job import MOST_TRIES, Done, Piece, PieceFault, death_of
+from automax_ros.parallel.worker import work
+
+_THREADS = Path("/proc/self/task")
+"""A name for each thread of this process; where it is missing, processes are fresh."""
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_PROGRAM = (
+    "import sys; sys.path[:] = sys.argv[2:]; from multiprocessing.connection import Connection; "
+    "from automax_ros.parallel.worker import work; work(Connection(int(sys.argv[1])))"
+)
+"""What a fresh one executes: nothing is imported from the folder in which it begins, only from where we import."""
+
+
+class Process(Protocol):
+    """A process that was begun."""
+
+    def kill(self) -> int:
+        """End it at once; return its exit code, negative for a signal."""
+        ...
+
+
+def begin(end: Connection, ours: Iterable[Connection]) -> Process:
+    """Begin a process that does the pieces that come over ``end``; ``ours`` are connections that it shall not keep.
+
+    It is in a session of its own: Ctrl-C at the terminal comes to us alone, and we end it.
+    """
+    return _copy(end, ours) or _Fresh(end)
+
+
+class _Fresh:
+    """An interpreter of its own."""
+
+    def __init__(self, end: Connection) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM, str(end.fileno()), *sys.path],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            pass_fds=(end.fileno(),),
+            start_new_session=True,
+        )
+
+    def kill(self) -> int:
+        self._process.kill()
+        return self._process.wait()
+
+
+class _Copy:
+    """A copy of this process."""
+
+    def __init__(self, pid: int) -> None:
+        self._pid = pid
+
+    def kill(self) -> int:
+        try:
+            os.kill(self._pid, signal.SIGKILL)
+            return os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
+        except (ProcessLookupError, ChildProcessError):
+            return 0  # nobody is told how it has ended where a program ignores SIGCHLD
+
+
+def _copy(end: Connection, ours: Iterable[Connection]) -> Process | None:
+    """Begin a copy; None where it would not be safe, or the machine does not make one."""
+    if threading.active_count() != 1 or not _THREADS.is_dir():
+        return None
+    # A copy shall not be interrupted as if it were this process.
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
+    try:
+        pid = os.fork()
+        if not pid:
+            _work_and_end(end, ours, held)
+    except OSError:
+        return None
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)
+    copy = _Copy(pid)
+    if len(list(_THREADS.iterdir())) == 1:
+        return copy
+    copy.kill()  # threads that Python does not know ran at the fork: the copy has done nothing yet
+    return None
+
+
+def _work_and_end(end: Connection, ours: Iterable[Connection], held: Iterable[int]) -> NoReturn:
+    """Be a worker, and never come back: what the process does at its end is done by the one that was copied."""
+    try:
+        os.setsid()
+        for number in _ENDING:
+            signal.signal(number, signal.SIG_DFL)
+        signal.set_wakeup_fd(-1)
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)
+        for other in ours:
+            other.close()
+        null = os.open(os.devnull, os.O_RDWR)
+        os.dup2(null, 0)
+        os.dup2(null, 1)
+        gc.freeze()  # what came with the copy is never looked through, so its memory stays shared
+        work(end)
+    finally:
+        os._exit(1)
+
+
+_POLL_S = 0.1
+"""How often ``should_stop`` is asked."""
+
+
+def in_processes(
+    pieces: Sequence[Piece], count: int, take: Callable[[int, Done], None], should_stop: Callable[[], bool]
+) -> None:
+    """Do pieces by ``count`` processes; the arguments and the end are those of ``run_pieces``."""
+    todo = deque((number, 1) for number in range(len(pieces)))
+    workers: dict[Connection, _Worker] = {}
+    try:
+        for _ in range(count):
+            _begin(workers)
+        while True:
+            for worker in workers.values():
+                if todo and worker.task is None:
+                    worker.give(pieces, *todo.popleft())
+            busy = [end for end, worker in workers.items() if worker.task is not None]
+            if not busy or should_stop():
+                return
+            for end in multiprocessing.connection.wait(busy, _POLL_S):
+                assert isinstance(end, Connection)
+                _take_from(workers, end, pieces, todo, take)
+    finally:
+        for worker in workers.values():
+            worker.kill()
+
+
+def _take_from(
+    workers: dict[Connection, _Worker],
+    end: Connection,
+    pieces: Sequence[Piece],
+    todo: deque[tuple[int, int]],
+    take: Callable[[int, Done], None],
+) -> None:
+    """Take what a worker tells, or put another one in the place of one that has died."""
+    worker = workers[end]
+    assert worker.task is not None
+    number, tries = worker.task
+    try:
+        result, fault = worker.answer()
+    except (EOFError, OSError):
+        code = worker.kill()
+        del workers[end]
+        if tries < MOST_TRIES:
+            todo.appendleft((number, tries + 1))
+        else:
+            piece = pieces[number]
+            take(number, Done(piece, fault=death_of(piece.name, f"its process has died ({_ending(code)})")))
+        if todo:
+            _begin(workers)
+        return
+    worker.task = None
+    take(number, Done(pieces[number], result, fault))
+
+
+def _begin(workers: dict[Connection, _Worker]) -> None:
+    worker = _Worker(list(workers))
+    workers[worker.end] = worker
+
+
+class _Worker:
+    """A process that does one piece after the other; ``task`` is the piece under way and its try."""
+
+    def __init__(self, ends: list[Connection]) -> None:
+        """Begin it; ``ends`` are those of the connections to others."""
+        self.end, other = multiprocessing.Pipe()
+        self.task: tuple[int, int] | None = None
+        with other:
+            self._process = begin(other, [self.end, *ends])
+
+    def give(self, pieces: Sequence[Piece], number: int, tries: int) -> None:
+        """Let it do a piece; one that has died by now is found out when it is listened to."""
+        self.task = number, tries
+        payload = pickle.dumps(pieces[number])
+        try:
+            self.end.send_bytes(payload)
+        except OSError:
+            return
+
+    def answer(self) -> tuple[object, PieceFault | None]:
+        """Return what came of the piece: its result, or its fault.
+
+        Raises:
+            EOFError: the process has died.
+            OSError: likewise, within its answer.
+        """
+        answer: tuple[object, PieceFault | None] = pickle.loads(self.end.recv_bytes())
+        return answer
+
+    def kill(self) -> int:
+        """End it at once; return its exit code, negative for a signal."""
+        code = self._process.kill()
+        self.end.close()
+        return code
+
+
+def _ending(code: int) -> str:
+    return f"signal {-code}" if code < 0 else f"exit code {code}"

@@ -1,0 +1,1 @@
+"""What the parts of a running rack share: observers, views of memory, why it stopped."""

@@ -1,0 +1,111 @@
+"""The part of a rack that is in one process: all of it, or some modules of a rack that is distributed.
+
+Tasks, plants and modules of the part live here; of the others there are the registers, which the bus fills
+(``rack/bus``). Variables, writers and everything else that has numbers are those of the whole rack in every process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.driven import DrivenPlant, driven_plants
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.model.plants import PlantConfig
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.registers import Backplane
+
+
+@dataclass(frozen=True)
+class RackPart:
+    """The modules in ``slots`` of a rack."""
+
+    config: RackConfig
+    slots: frozenset[int]
+
+    @classmethod
+    def of(cls, config: RackConfig, slots: Collection[int] | None) -> RackPart:
+        """Return the part with the modules of some slots, the whole rack for None.
+
+        Raises:
+            ValueError: a slot is empty.
+        """
+        there = frozenset(module.slot for module in config.modules)
+        chosen = there if slots is None else frozenset(slots)
+        if not chosen <= there:
+            raise ValueError(f"rack {config.name} has no module in slot {min(chosen - there)}")
+        return cls(config, chosen)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all modules are in this process."""
+        return len(self.slots) == len(self.config.modules)
+
+    @property
+    def is_home(self) -> bool:
+        """Whether common memory is in this process: it serves the rack's commons, tables and operators."""
+        return self.config.home_slot in self.slots
+
+    @property
+    def modules(self) -> list[ModuleConfig]:
+        """Its modules, by slot."""
+        return [module for module in self.config.modules if module.slot in self.slots]
+
+    @property
+    def tasks(self) -> list[str]:
+        """The names of its tasks."""
+        return [task.name for module in self.modules for task in module.tasks]
+
+    def is_elsewhere(self, what: str | int) -> bool:
+        """Whether a task or a plant by its name, or a module by its slot, is in another process."""
+        return what in self._elsewhere
+
+    @cached_property
+    def _elsewhere(self) -> frozenset[str | int]:
+        return RackPart.of(self.config, None)._names - self._names
+
+    @property
+    def _names(self) -> frozenset[str | int]:
+        """What is here: tasks and plants by name, modules by slot."""
+        return frozenset[str | int]([*self.slots, *self.tasks, *(plant.name for plant in self.plants)])
+
+    @cached_property
+    def driven(self) -> tuple[DrivenPlant, ...]:
+        """The plants that its drives turn, by slot and drive."""
+        return tuple(item for item in driven_plants(self.config) if item.slot in self.slots)
+
+    @property
+    def plants(self) -> list[PlantConfig]:
+        """The plants that its drives turn with all that is coupled to them, in the order of the file.
+
+        Those that no drive turns are where common memory is (decision).
+        """
+        coupled = _coupled(self.config.plants)
+        slots = {item.name: item.slot for item in driven_plants(self.config)}
+        found = []
+        for plant in self.config.plants:
+            driving = {slots[name] for name in coupled[plant.name] if name in slots} or {self.config.home_slot}
+            if driving & self.slots:
+                found.append(plant)
+        return found
+
+    def elsewhere(self, memory: CommonMemory, backplane: Backplane) -> frozenset[tuple[int, int]]:
+        """Return the views and elements of modules in other processes: what becomes of them is decided there."""
+        found: set[tuple[int, int]] = set()
+        for module in self.config.modules:
+            bank = backplane.bank(module.slot)
+            if bank is not None and module.slot not in self.slots:
+                found |= memory.registers.showing(bank.view, range(bank.registers))
+        return frozenset(found)
+
+
+def _coupled(plants: Sequence[PlantConfig]) -> dict[str, set[str]]:
+    """Return, for each plant, those whose shafts turn with its own, itself among them."""
+    groups = {plant.name: {plant.name} for plant in plants}
+    for plant in plants:
+        if plant.couple is not None:
+            joined = groups[plant.name] | groups[plant.couple.to]
+            groups.update(dict.fromkeys(joined, joined))
+    return groups

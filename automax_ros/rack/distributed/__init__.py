@@ -1,0 +1,1 @@
+"""One process's part of a rack tied to the others."""

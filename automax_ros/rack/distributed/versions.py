@@ -1,0 +1,120 @@
+"""From when each value of common memory counts, so that images of several processes come to hold the same.
+
+A value counts from (rack time, seat of the process that wrote it, number of its message): the greatest wins, wherever
+and in whatever order writes arrive (decision). The bits of a module's register count one by one, since a point may be
+one of them; a REAL or DOUBLE INTEGER point is two registers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from automax_ros.core.types import Value
+from automax_ros.runtime.memory.registers import WORD, Part, RegisterMap
+
+Version = tuple[int, int, int]
+"""Rack time (ns), seat, number of the message."""
+AS_INSTALLED: Version = (-1, 0, 0)
+"""What presets count from: every process writes them by itself, and whatever is written wins over them."""
+Key = tuple[int, int]
+"""View and element."""
+
+
+class Held(NamedTuple):
+    """A value and from when it counts; of a register, the bits of ``mask``."""
+
+    view: int
+    element: int
+    value: Value
+    mask: int
+    version: Version
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What an image makes of a write: ``whole`` to be taken as it is; else ``rest`` is what to write in its place.
+
+    ``rest`` are the registers (view of the bank, register, bits, mask) that are newer than what is held.
+    """
+
+    whole: bool
+    rest: tuple[Part, ...] = ()
+
+
+TAKEN = Fit(whole=True)
+REFUSED = Fit(whole=False)
+
+
+class Versions:
+    """From when the values of one image count. What was never written counts from nothing."""
+
+    def __init__(self, registers: RegisterMap) -> None:
+        """Begin with an image as installed."""
+        self._registers = registers
+        self._plain: dict[Key, tuple[Version, Value]] = {}
+        self._bits: dict[Key, list[tuple[int, int, Version]]] = {}
+
+    def settle(self, view: int, element: int, value: Value, version: Version) -> Fit:
+        """Compare a write with what is held, and note it as far as it is newer or as new."""
+        if view not in self._registers.views:
+            held = self._plain.get((view, element))
+            if held is not None and held[0] > version:
+                return REFUSED
+            self._plain[view, element] = version, value
+            return TAKEN
+        parts = self._registers.parts(view, element, value)
+        rest = [part._replace(mask=self._settle_bits(part, version)) for part in parts]
+        if all(new.mask == part.mask for new, part in zip(rest, parts, strict=True)):
+            return TAKEN
+        return Fit(whole=False, rest=tuple(part for part in rest if part.mask))
+
+    def settle_bits(self, held: Held) -> tuple[Part, ...]:
+        """Note what another image holds of a register, as far as it is newer; return what to write, if anything."""
+        part = Part(held.view, held.element, int(held.value) & WORD, held.mask & WORD)
+        mask = self._settle_bits(part, held.version)
+        return (part._replace(mask=mask),) if mask else ()
+
+    def newest(self, view: int, element: int, value: Value) -> Iterator[Part | Held]:
+        """Yield what is held where a write of this process came too late, to be put back."""
+        if view not in self._registers.views:
+            version, held = self._plain[view, element]
+            yield Held(view, element, held, WORD, version)
+            return
+        for part in self._registers.parts(view, element, value):
+            for mask, bits, _ in self._bits.get((part.bank, part.register), ()):
+                if mask & part.mask:
+                    yield Part(part.bank, part.register, bits, mask & part.mask)
+
+    def all(self) -> Iterator[Held]:
+        """Yield everything that was written, for an image that another process takes over."""
+        for (view, element), (version, value) in self._plain.items():
+            yield Held(view, element, value, WORD, version)
+        for (view, element), pieces in self._bits.items():
+            for mask, bits, version in pieces:
+                yield Held(view, element, bits, mask, version)
+
+    def _settle_bits(self, part: Part, version: Version) -> int:
+        """Note the bits of a register that are newer; return which."""
+        key, mask = (part.bank, part.register), part.mask
+        kept: list[tuple[int, int, Version]] = []
+        for own, bits, since in self._bits.get(key, ()):
+            both = own & mask
+            if since > version:
+                mask &= ~both
+                kept.append((own, bits, since))
+            elif own != both:
+                kept.append((own & ~both, bits, since))
+        if mask:
+            kept.append((mask, part.bits, version))
+        self._bits[key] = kept
+        return mask
+
+
+def merged(before: int, parts: Sequence[Part]) -> int:
+    """Return a register's word, with its sign, after bits of it were replaced."""
+    word = before & WORD
+    for part in parts:
+        word = word & ~part.mask | part.bits & part.mask
+    return word - 0x10000 if word & 0x8000 else word

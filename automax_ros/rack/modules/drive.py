@@ -1,0 +1,459 @@
+"""Modules that count how their interrupts keep their time. A file of its own: compiled code has no such protocols.
+
+The interrupts of a 57C406: when they come, and the scan that each of them makes due.
+
+The switches on the front of a 57C406 (52.1.6): a test switch A, centre, B, and a fault reset switch.
+
+Both are momentary: they go back when they are let go. A person holds the test switch where it was moved to until it is
+moved to the centre; the fault reset switch is pressed for half a second, or as long as ``false`` says (decision). They
+only tell: what they do is the application's business.
+
+The drive I/O controller 57C406 of a running rack: it interrupts, measures the drive, fires its gates (52.0, 52.7).
+
+It is the ``DrivePort`` of the current minor loop (CML) task that names its slot. While that task runs it interrupts six
+times per line cycle, measures its plant at that instant and makes a scan of the task due; what the scan commands it
+carries out: gates, the contactor's relay, the outputs of the drive digital I/O module. Without such a task gates and
+relays are off. The plant goes on in any case, whether the rack runs, is stopped or has no power (decision).
+
+Its registers are outputs: the task's initialisation gives them their defaults, STOP ALL and a loss of power 0 (2.4.5).
+The contactor follows what the task commands; a force on the point of a relay only changes what the point shows
+(decision).
+
+Each access to it delays the microprocessor on it (52.7). Its firing circuit goes on by itself meanwhile, so what is
+late is what the microprocessor has to do: to take the loop's command. In modeled execution a command takes effect later
+by ``ACCESS_NS`` for each common on its registers that a scan of any task has latched, read or written since the
+interrupt, at most until the next one; what comes after the command delays nothing. The loop's own dealings with it, and
+what comes from outside, count not, nor do accesses that a distributed rack makes in another process (decision).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Protocol, runtime_checkable
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.text import count_of
+from automax_ros.drive.current_loop.signals import (
+    RESET_SWITCH,
+    SWITCH_A,
+    SWITCH_B,
+    VOLTAGE,
+    VOLTS,
+    Command,
+    Measured,
+    Pulse,
+)
+from automax_ros.drive.plant.controller import DriveController
+from automax_ros.drive.plant.plant import DrivePlant
+from automax_ros.rack.modules.drive_io import DriveDigital
+from automax_ros.rack.modules.module import ModuleState, Parts
+from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.modules.drive import ACCESS_NS, DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
+
+USUAL_NS = 2_777_778
+"""Time between two interrupts until a task says otherwise, ns: a sixth of a cycle at 60 Hz (decision)."""
+LATE_NS = 1_000_000
+"""From how late on an interrupt counts as late, ns."""
+
+
+@dataclass
+class InterruptTiming:
+    """How interrupts kept their time on the wall clock; in simulated time none is late.
+
+    Attributes:
+        interrupts: how many there were.
+        late: how many came more than ``LATE_NS`` after their instant.
+        greatest_ns: the greatest lateness, ns.
+    """
+
+    interrupts: int = 0
+    late: int = 0
+    greatest_ns: int = 0
+
+    def describe(self) -> str:
+        """Return the counts in words."""
+        late = f"{self.late} later than {LATE_NS / 1e6:g} ms"
+        return f"{count_of(self.interrupts, 'interrupt')}, {late}, the latest by {self.greatest_ns / 1e6:.3g} ms"
+
+    def note(self, late_ns: int) -> None:
+        """Count an interrupt that was as late as that; one that was not has 0 or less."""
+        self.interrupts += 1
+        self.greatest_ns = max(self.greatest_ns, late_ns)
+        if late_ns > LATE_NS:
+            self.late += 1
+
+
+class DriveInterrupts:
+    """Interrupts from ``arm`` to ``disarm``. One that a late host missed is carried out late, in order (decision).
+
+    Attributes:
+        at_ns: when the last one was, ns.
+        interval_ns: the time from one to the next, ns, as the last command has it.
+    """
+
+    def __init__(self, scheduler: Scheduler, slot: int, measure: Callable[[int], None]) -> None:
+        """Begin without; ``measure`` is called at each with its instant, before the scan that it makes due."""
+        self._scheduler, self._measure = scheduler, measure
+        self._key = EventKey(EventClass.IO, slot, "interrupt")
+        self._event: ScheduledEvent | None = None
+        self._event_ns = 0
+        self._scan: ScheduledEvent | None = None
+        self._scan_key = self._key
+        self._due: PeriodicAction = _nothing
+        self.armed = False
+        self.at_ns = 0
+        self.interval_ns = USUAL_NS
+        self.timing = InterruptTiming()
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next one comes, None while it is not armed."""
+        return None if self._event is None else self._event_ns
+
+    def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
+        """Interrupt at an instant, and from then on each interval; ``due`` has its place ``key`` among the scans."""
+        self.disarm()
+        self._scan_key, self._due, self.armed = key, due, True
+        self._post(first_ns, ScheduledEvent(self._key, self._happen))
+
+    def disarm(self) -> None:
+        """Interrupt no more."""
+        self.armed = False
+        for event in (self._event, self._scan):
+            if event is not None:
+                event.cancel()
+        self._event = self._scan = None
+
+    def follow(self, next_ns: int) -> None:
+        """Let the next one come as long after the last as a command says, ns; now where that has passed."""
+        self.interval_ns = max(1, next_ns)
+        if self._event is None:
+            return
+        at_ns, now_ns = self.at_ns + self.interval_ns, self._scheduler.now_ns
+        at_ns = max(at_ns, now_ns)
+        if at_ns != self._event_ns:
+            self._event.cancel()
+            self._post(at_ns, ScheduledEvent(self._key, self._happen))
+
+    def state(self) -> dict[str, int]:
+        """Return when the last one was, and the interval; who arms it keeps when the next one comes."""
+        return {"at_ns": self.at_ns, "interval_ns": self.interval_ns}
+
+    def load(self, state: ModuleState) -> None:
+        """Take over a state."""
+        self.at_ns, self.interval_ns = state["at_ns"], state["interval_ns"]
+
+    def _post(self, at_ns: int, event: ScheduledEvent) -> None:
+        self._event, self._event_ns = self._scheduler.post(at_ns, event), at_ns
+
+    def _happen(self, now_ns: int, _: int) -> None:
+        scheduler, event = self._scheduler, self._event
+        assert event is not None
+        self.at_ns = now_ns
+        self.timing.note(scheduler.wall_ns - now_ns)
+        # Before the scan: time passes in a modeled one, and in what follows it, at most to the next interrupt.
+        self._post(now_ns + self.interval_ns, event)
+        self._measure(now_ns)
+        if scheduler.advance_to(now_ns, self._scan_key):
+            self._due(now_ns, 0)
+        else:
+            self._scan = scheduler.at(now_ns, self._scan_key, self._scan_now)
+
+    def _scan_now(self, now_ns: int) -> None:
+        self._scan = None
+        self._due(now_ns, 0)
+
+
+def _nothing(now_ns: int, skipped: int) -> None:
+    """Make no scan due: nobody has armed the interrupts."""
+
+
+PRESSED_NS = 500_000_000
+"""How long the fault reset switch is pressed, ns (decision)."""
+TEST_SWITCH, FAULT_RESET_SWITCH = "test_switch", "fault_reset_switch"
+CONTROLS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {TEST_SWITCH: ("A", "B", "centre"), FAULT_RESET_SWITCH: ("true", "false")}
+)
+"""The switches with their positions, as stimuli files and commands write them."""
+_TEST_BITS = {"A": SWITCH_A, "B": SWITCH_B, "centre": 0}
+
+
+class FrontSwitches:
+    """The switches of one module."""
+
+    def __init__(self, scheduler: Scheduler, slot: int) -> None:
+        """Begin with nobody at them."""
+        self._scheduler = scheduler
+        self._key = EventKey(EventClass.IO, slot, "switch")
+        self._test = "centre"
+        self._release: ScheduledEvent | None = None
+
+    def status(self) -> int:
+        """Return the bits of ``Measured.status`` that they set."""
+        return _TEST_BITS[self._test] | (RESET_SWITCH if self._release is not None else 0)
+
+    def move(self, switch: str, position: str) -> None:
+        """Move a switch to one of its positions in ``CONTROLS``."""
+        if switch == TEST_SWITCH:
+            self._test = position
+        else:
+            self._let_go(0)
+            if position == "true":
+                self._press(self._scheduler.now_ns + PRESSED_NS)
+
+    def state(self) -> dict[str, object]:
+        """Return how they stand, and when the fault reset switch is let go, ns."""
+        until_ns = None if self._release is None else self._scheduler.due_ns(self._release)
+        return {"test": self._test, "pressed_until_ns": until_ns}
+
+    def load(self, state: ModuleState) -> None:
+        """Take over a state."""
+        self._let_go(0)
+        self._test = state["test"]
+        if state["pressed_until_ns"] is not None:
+            self._press(state["pressed_until_ns"])
+
+    def _press(self, until_ns: int) -> None:
+        self._release = self._scheduler.at(until_ns, self._key, self._let_go)
+
+    def _let_go(self, _: int) -> None:
+        if self._release is not None:
+            self._release.cancel()
+            self._release = None
+
+
+_new = tuple.__new__
+"""Makes a named tuple as tuples are made: its own way takes twice the time, and there is one at each interrupt."""
+REST_NS = 5_500_000
+"""How often a plant whose drive rests is looked at, ns: the system clock tick (decision)."""
+
+
+class DriveControllerModule:
+    """A 57C406 with the plant that it drives, if it has one."""
+
+    kept: frozenset[tuple[int, int]] = frozenset()
+    tasks: Sequence[ScheduledTask] = ()
+
+    def __init__(
+        self, config: ModuleConfig, parts: Parts, plant: DrivePlant | None, full_rpm: float | None = None
+    ) -> None:
+        """Attach itself to the rack's drives; nothing happens before a task arms it.
+
+        ``full_rpm`` is the speed that the plant's tachometer shows as 4095, None for the motor's base speed.
+        """
+        bank = parts.backplane.bank(config.slot)
+        assert bank is not None
+        self.config, self._parts, self._view, self._plant = config, parts, bank.view, plant
+        self._memory, self._scheduler = parts.memory, parts.scheduler
+        self._writer = parts.writer(config.name)
+        self._controller = DriveController(plant, full_rpm)
+        self._interrupts = DriveInterrupts(parts.scheduler, config.slot, self._measure)
+        self._switches = FrontSwitches(parts.scheduler, config.slot)
+        self._digital = DriveDigital(parts.memory, parts.backplane, parts.scheduler, self._writer)
+        self._measured = Measured(0)
+        self._rest_key = EventKey(EventClass.IO, config.slot, "rest")
+        self._rest: ScheduledEvent | None = None
+        self._accesses = 0
+        self._command_key = EventKey(EventClass.IO, config.slot, "command")
+        self._delayed: tuple[Command, ScheduledEvent] | None = None
+        parts.drives.attach(config.slot, self)
+        parts.memory.watch_accesses(bank.view, self._accessed)
+
+    @property
+    def timing(self) -> InterruptTiming:
+        """How the interrupts kept their time."""
+        return self._interrupts.timing
+
+    # As a module
+
+    def power_on(self) -> None:
+        """Let the plant's time pass; gates stay off until a task arms the module."""
+        if not self._interrupts.armed:
+            self._rest_from(self._scheduler.now_ns + REST_NS)
+
+    def power_off(self) -> None:
+        """Forget the overspeed circuit; the task that has armed it was stopped, or has not begun."""
+        self.disarm()
+        self._controller.overspeed.unpower()
+
+    def stopped_all(self) -> None:
+        """Nothing more: the task that has armed it was stopped."""
+        self.disarm()
+
+    def state(self) -> ModuleState:
+        """Return what was measured last, how the switches stand, and when it interrupts; the plant keeps its own."""
+        rest_ns = None if self._rest is None else self._scheduler.due_ns(self._rest)
+        return {
+            "interrupts": self._interrupts.state(),
+            "switches": self._switches.state(),
+            "measured": list(self._measured),
+            "firing": self._controller.state(),
+            "digital": self._digital.slot,
+            "rest_ns": rest_ns,
+            "accesses": self._accesses,
+            "delayed": self._delayed_state(),
+        }
+
+    def load(self, state: ModuleState) -> None:
+        """Take over a state; the task that has armed it arms it again."""
+        self._interrupts.load(state["interrupts"])
+        self._switches.load(state["switches"])
+        self._measured = Measured(*state["measured"])
+        self._controller.load(state["firing"])
+        self._digital.serve(state["digital"])
+        self._end_rest()
+        if state["rest_ns"] is not None:
+            self._rest_from(state["rest_ns"])
+        self._forget_accesses()
+        self._accesses = state["accesses"]
+        if state["delayed"] is not None:
+            due_ns, (next_ns, relays, pulses, level, block, ok) = state["delayed"]
+            self._delay(Command(next_ns, relays, tuple(Pulse(*pulse) for pulse in pulses), level, block, ok), due_ns)
+
+    # As something that a person operates
+
+    @property
+    def controls(self) -> Mapping[str, tuple[str, ...]]:
+        """The switches on its front, with their positions."""
+        return CONTROLS
+
+    def operate(self, verb: str, value: str) -> None:
+        """Move a switch."""
+        self._switches.move(verb, value)
+
+    # As the port of a CML task
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next interrupt comes, None while it is not armed."""
+        return self._interrupts.next_ns
+
+    def initialise(self) -> None:
+        """Give the registers their defaults."""
+        memory = self._memory
+        memory.now_ns = self._scheduler.now_ns
+        for register, value in DEFAULTS.items():
+            memory.write_now(self._view, value, self._writer, register, WriteKind.OUTSIDE)
+
+    def watch_speed(self, counts: int) -> None:
+        """Set up the overspeed circuit: it stays so when the task ends."""
+        self._controller.overspeed.counts = counts
+
+    def arm(self, first_ns: int, key: EventKey, due: PeriodicAction) -> None:
+        """Interrupt at ``first_ns`` and from then on."""
+        self._end_rest()
+        self._interrupts.arm(first_ns, key, due)
+
+    def disarm(self) -> None:
+        """Interrupt no more: gates, relays and drive OK are off at once."""
+        if not self._interrupts.armed:
+            return
+        self._interrupts.disarm()
+        self._forget_accesses()
+        self._controller.off(self._scheduler.now_ns)
+        self._digital.show(0, ok=False)
+        self._rest_from(self._scheduler.now_ns + REST_NS)
+
+    def measure(self, dig_slot: int) -> Measured:
+        """Return what was measured at the last interrupt, with registers, inputs and switches as they are now."""
+        digital = self._digital
+        digital.serve(dig_slot)
+        memory, view, last = self._memory, self._view, self._measured
+        values = (
+            last.status | digital.status() | self._switches.status(),
+            last.current,
+            last.zero_us,
+            last.tail_us,
+            last.since_sync_ns,
+            last.voltage,
+            int(memory.read_now(view, TACH_THRESHOLD)),
+            int(memory.read_now(view, PHASE_STEP)),
+            int(memory.read_now(view, PERIOD_STEP)),
+            int(memory.read_now(view, OPTIONS)),
+            last.line,
+        )
+        return _new(Measured, values)
+
+    def command(self, command: Command) -> None:
+        """Carry out what shall happen up to the next interrupt; its times count from the last one."""
+        at_ns, now_ns = self._interrupts.at_ns, self._scheduler.now_ns
+        due_ns = min(now_ns + self._accesses * ACCESS_NS, at_ns + command.next_ns - 1)
+        if due_ns > now_ns:
+            self._delay(command, due_ns)
+        else:
+            self._controller.command(command, at_ns, now_ns)
+        tripped = self._controller.overspeed.tripped
+        self._digital.show(0 if tripped else command.relays, ok=command.ok and not tripped)
+        self._interrupts.follow(command.next_ns)
+
+    def _accessed(self) -> None:
+        self._accesses += 1
+
+    def _delay(self, command: Command, due_ns: int) -> None:
+        """Let a command take effect at an instant."""
+        self._delayed = command, self._scheduler.at(due_ns, self._command_key, self._carry_out)
+
+    def _carry_out(self, now_ns: int) -> None:
+        """Carry out the command that was delayed."""
+        delayed, self._delayed = self._delayed, None
+        if delayed is not None:
+            self._controller.command(delayed[0], self._interrupts.at_ns, now_ns)
+
+    def _forget_accesses(self) -> None:
+        """Nothing is delayed any more."""
+        delayed, self._delayed, self._accesses = self._delayed, None, 0
+        if delayed is not None:
+            delayed[1].cancel()
+
+    def _delayed_state(self) -> list[Any] | None:
+        """Return when a command takes effect that is delayed, and the command; None without one."""
+        if self._delayed is None:
+            return None
+        command, event = self._delayed
+        return [self._scheduler.due_ns(event), [*command[:2], [list(pulse) for pulse in command.pulses], *command[3:]]]
+
+    def _measure(self, now_ns: int) -> None:
+        """Measure at an interrupt; a 57C405 that is wired to the armature shows its voltage."""
+        self._accesses = 0
+        feedback = self._parts.drives.voltage(self.config.slot)
+        self._measured = self._controller.measure(now_ns, VOLTAGE if feedback is not None else 0)
+        if self._controller.overspeed.tripped:
+            # A loop that hangs commands nothing: the hardware needs none.
+            self._digital.show(0, ok=False)
+        if feedback is not None and self._plant is not None:
+            line_v = self._plant.data.parameters.line_v
+            feedback(self._measured.voltage * line_v / VOLTS, line_v)
+
+    def _rest_from(self, first_ns: int) -> None:
+        if self._plant is not None:
+            self._end_rest()
+            self._rest = self._scheduler.at(first_ns, self._rest_key, self._look)
+
+    def _end_rest(self) -> None:
+        if self._rest is not None:
+            self._rest.cancel()
+            self._rest = None
+
+    def _look(self, now_ns: int) -> None:
+        """Let the plant's time pass while nobody drives it; no look is left out where the host is late."""
+        self._rest_from(now_ns + REST_NS)
+        plant = self._plant
+        if plant is not None:
+            plant.advance(now_ns)
+            self._controller.watch()
+            feedback = self._parts.drives.voltage(self.config.slot)
+            if feedback is not None:
+                feedback(plant.circuit.armature_v, plant.data.parameters.line_v)
+                self._parts.tell_writes()
+
+
+@runtime_checkable
+class Timed(Protocol):
+    """A module that counts how its interrupts keep their time."""
+
+    @property
+    def timing(self) -> InterruptTiming: ...  # noqa: D102

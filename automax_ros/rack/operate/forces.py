@@ -1,0 +1,161 @@
+"""The forces of a rack: which variables may be held, how many, and which are (J2-3106-1 p. 18-10).
+
+A force holds a simple variable of any type but STRING against every write, until it is released; it survives STOP ALL
+and power. Commons are known by their names, a task's own variables with the task: ``SPEED.COUNT%``. A tunable cannot be
+forced, since nothing but the operator writes it (decision), and no output of a drive's current minor loop (52.0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from automax_ros.core.names import PREDEFINED, NameFault
+from automax_ros.core.types import DataType, Value
+from automax_ros.language.tree.tree import Scope
+from automax_ros.rack.base.local_names import LocalElement, local_named
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.reading.executive import most_forces, version_text
+from automax_ros.runtime.memory.memory import FORCING, CommonMemory
+from automax_ros.runtime.memory.views import MemoryValueError, ViewSpec, fitting
+from automax_ros.runtime.tasks.task import Task
+
+
+@dataclass(frozen=True)
+class Force:
+    """A line of the force table: a variable and the value at which it is held.
+
+    ``under`` is what was written last, which the force hides; None for a local, of which none is kept.
+    """
+
+    name: str
+    value: Value
+    under: Value | None = None
+
+
+class Forcing:
+    """Forces the variables of one rack, within what its Executive allows."""
+
+    def __init__(self, config: RackConfig, memory: CommonMemory, tasks: Callable[[], Sequence[Task]]) -> None:
+        """Take a rack's common memory, and what tells its tasks."""
+        self._config, self._memory, self._tasks = config, memory, tasks
+        self.most = most_forces(config.executive)
+
+    def table(self) -> list[Force]:
+        """Return what is forced: commons in the order of the rack file, then locals, task by task."""
+        memory = self._memory
+        held = sorted(memory.forced)
+        under = {(view, element): value for view, element, value in memory.under_forces}
+        commons = [Force(memory.specs[key[0]].name, memory.read_now(*key), under.get(key)) for key in held]
+        return commons + [
+            Force(f"{task.name}.{name}", value) for task in self._tasks() for name, value in task.forces.items()
+        ]
+
+    def local(self, name: str) -> LocalElement:
+        """Return the task's own variable that a name with a point means.
+
+        Raises:
+            NameFault: there is none.
+        """
+        return local_named(self._tasks(), name)
+
+    def force(self, name: str, value: Value, writer: int) -> None:
+        """Hold a variable at a value; one that is held already gets the new value.
+
+        Raises:
+            KeyError: the rack has no such variable.
+            MemoryValueError: the value does not fit, the variable cannot be forced, or as many are forced as may be.
+        """
+        if "." in name:
+            self._force_local(self._known(name), value, writer)
+            return
+        view = self._memory.view(name)
+        self._require(name, self._why_not(view) or self._too_many(again=self._memory.is_forced(view)))
+        self._memory.force(view, value, writer=writer)
+
+    def release(self, name: str, writer: int) -> None:
+        """End a force; the value stays until the next write.
+
+        Raises:
+            KeyError: the rack has no such variable.
+        """
+        if "." not in name:
+            self._memory.release(self._memory.view(name), writer=writer)
+            return
+        meant = self._known(name)
+        held = {known: value for known, value in meant.task.forces.items() if known != meant.symbol.name}
+        self._hold(meant.task, held, writer)
+
+    def release_all(self, writer: int) -> None:
+        """End all forces."""
+        for task in self._tasks():
+            task.hold({})
+        self._memory.note_locals(writer, forced=False)
+        for view, element in sorted(self._memory.forced):
+            self._memory.release(view, element, writer)
+
+    def hold_again(self, task: Task, forces: Mapping[str, Value], writer: int) -> list[str]:
+        """Hold the locals of a task that was installed as before; return those that it has not, which are released."""
+        symbols = task.compiled.program.symbols
+        kept = {name: value for name, value in forces.items() if name in symbols and _may_be_held(task, name)}
+        self._hold(task, kept, writer)
+        return [f"{task.name}.{name}" for name in forces if name not in kept]
+
+    def load(self) -> None:
+        """Take over what tasks hold that went on from a state."""
+        self._memory.note_locals(forced=self._any_local(), told=False)
+
+    def _force_local(self, meant: LocalElement, value: Value, writer: int) -> None:
+        symbol, forces = meant.symbol, meant.task.forces
+        reason = meant.why_not_forced or meant.task.why_not_forced(symbol.name, symbol.scope)
+        self._require(meant.label, reason or self._too_many(again=symbol.name in forces))
+        fit = fitting(ViewSpec(meant.label, symbol.type), value)
+        self._hold(meant.task, {**forces, symbol.name: fit}, writer)
+
+    def _hold(self, task: Task, forces: Mapping[str, Value], writer: int) -> None:
+        task.hold(forces)
+        self._memory.note_locals(writer, forced=self._any_local())
+
+    def _any_local(self) -> bool:
+        return any(task.forces for task in self._tasks())
+
+    def _known(self, name: str) -> LocalElement:
+        try:
+            return self.local(name)
+        except NameFault as fault:
+            raise KeyError(name) from fault
+
+    def _require(self, name: str, reason: str | None) -> None:
+        if reason is not None:
+            raise MemoryValueError(f"{name} cannot be forced: {reason}")
+
+    def _why_not(self, view: int) -> str | None:
+        memory = self._memory
+        spec = memory.specs[view]
+        if spec.is_array or spec.type is DataType.STRING:
+            return "it is an array" if spec.is_array else "it is a string"
+        if spec.name == FORCING:
+            return "it shows whether anything is forced"
+        if spec.name in PREDEFINED:
+            return "the rack itself writes it"
+        for task in self._tasks():
+            reason = task.why_not_forced(spec.name, Scope.COMMON)
+            if reason is not None:
+                return reason
+        others = memory.registers.others(view)
+        return f"{memory.specs[others[0]].name} is part of the same register" if others else None
+
+    def _too_many(self, *, again: bool) -> str | None:
+        """Return the reason where one more is too many; a variable that is forced ``again`` is no more than before."""
+        if again or len(self.table()) < self.most:
+            return None
+        version = version_text(self._config.executive)
+        return f"{self.most} variables are forced, the most with executive {version}: release one first"
+
+
+def _may_be_held(task: Task, name: str) -> bool:
+    try:
+        meant = local_named([task], f"{task.name}.{name}")
+    except NameFault:
+        return False
+    return meant.why_not_forced is None and task.why_not_forced(name, meant.symbol.scope) is None

@@ -1,0 +1,144 @@
+"""The drive faults that stand in the current minor loops of a rack, in words, with the time at which each came.
+
+What the displays of a rack's Processors show: the code of a fault or of a status, or nothing.
+
+A code of a STOP ALL is shown by the Processor whose task has caused it; where no Processor's task has (a UDC's has, a
+module was lost, two drive the common clock) by all of them, since the tasks of all have stopped, until the rack runs
+again (decision). A code that stands in the error log of a task, which 87 for a shorted SCR does without a STOP ALL
+(52.3.1), is shown until that log is cleared (decision: J2-3106-1 names both in one step). A Processor that has
+nothing to tell, and one without power, shows nothing (decision). The codes d0 and E0 are of an installation, which
+takes no time here and is refused with the errors' own words: no rack that answers shows them (decision).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.drive.current_loop.faults import KINDS
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.modules.processor import ProcessorConfig
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.scan.error_log import ErrorLog
+from automax_ros.runtime.tasks.cml_task import CmlTask
+from automax_ros.runtime.tasks.task import ScanRecord, Task
+
+MEANINGS = {
+    "14": "overlap: a scan was not finished when the next one was due",
+    "31": "bus error: a register or a module does not answer",
+    "38": "two modules drive the common clock",
+    "87": "shorted SCR",
+    "95": "the tasks of a UDC have unequal TICKS",
+    "C": "four receive time-outs in a row on the network",
+    "E0": "a task and the configuration do not agree",
+    "d0": "tasks are being installed",
+}
+"""The codes of which the meaning is known, in words; the whole table of the manuals is not."""
+
+
+@dataclass(frozen=True)
+class Display:
+    """The display of one Processor: ``code`` is "" where it is blank, ``meaning`` says in words what it shows."""
+
+    module: str
+    code: str
+    meaning: str
+
+
+def displays_of(rack: Rack) -> list[Display]:
+    """Return what the displays of a rack's Processors show now, as far as they are in this process, by slot."""
+    return [
+        _display(rack, module.config.name, [item.name for item in module.tasks])
+        for module in rack.modules
+        if isinstance(module.config, ProcessorConfig)
+    ]
+
+
+def meaning_of(code: str) -> str:
+    """Return what a code means in words."""
+    return MEANINGS.get(code, "a code of which the meaning is not known")
+
+
+def _display(rack: Rack, module: str, tasks: list[str]) -> Display:
+    if not rack.operations.powered:
+        return Display(module, "", "the power is off")
+    for code in _codes(rack, tasks):
+        return Display(module, code, meaning_of(code))
+    return Display(module, "", "no fault")
+
+
+def _codes(rack: Rack, tasks: list[str]) -> Iterator[str]:
+    """Yield the codes that concern a Processor with these tasks, the one that it shows first."""
+    cause = rack.operations.stopped
+    if cause is not None and cause.code and _concerns(rack, cause.task, tasks):
+        yield cause.code
+    for name in tasks:
+        yield from _logged(rack.task(name).errors)
+
+
+def _concerns(rack: Rack, task: str, tasks: list[str]) -> bool:
+    """Return whether a stop that a task has caused ("" is none) is shown by the Processor with these tasks."""
+    if not _is_on_processor(rack, task):
+        return True
+    return task in tasks and rack.task(task).errors.count > 0
+
+
+def _is_on_processor(rack: Rack, task: str) -> bool:
+    placed = rack.config.placed_tasks
+    return any(item.name == task and isinstance(module, ProcessorConfig) for module, item in placed)
+
+
+def _logged(log: ErrorLog) -> Iterator[str]:
+    """Yield the codes that a log holds, the newest first."""
+    return (entry.hardware for entry in reversed(log.entries) if entry.hardware)
+
+
+_PROBLEMS = frozenset(kind.problem for kind in KINDS)
+
+
+class DriveTrips:
+    """Observes one rack and notes when drive faults come; a fault from before is told without its time."""
+
+    def __init__(self, rack: Rack) -> None:
+        """Begin to observe."""
+        self._rack = rack
+        self._times: dict[tuple[str, int], int] = {}
+        rack.observe(self)
+
+    def lines(self) -> list[str]:
+        """Return a line for each fault that is latched: ``CML: tach loss at 188.9 s, not cleared``."""
+        return [
+            f"{task.name}: {_words(kind.problem)}{self._time(task.name, kind.problem)}, not cleared"
+            for task in self._rack.tasks
+            if isinstance(task, CmlTask)
+            for kind in KINDS
+            if task.loop.faults.active & kind.bit
+        ]
+
+    # RackObserver
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
+        """Note when a drive fault was logged."""
+        for _, code in record.errors:
+            if code in _PROBLEMS:
+                self._times[task.name, code] = record.time_ns
+
+    def written(self, writes: list[WriteGroup]) -> None:
+        """Writes from outside are not drive faults."""
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """A tunable that is set is not a drive fault."""
+
+    def operated(self, operation: Operation) -> None:
+        """An operation is not a drive fault."""
+
+    def _time(self, task: str, problem: int) -> str:
+        at_ns = self._times.get((task, problem))
+        return "" if at_ns is None else f" at {at_ns / NS_PER_S:.1f} s"
+
+
+def _words(problem: int) -> str:
+    return PROBLEMS[f"AMX{problem:04d}"].title.removeprefix("drive fault: ")

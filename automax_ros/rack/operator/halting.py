@@ -1,0 +1,169 @@
+"""A rack that keeps pace with the wall clock is halted, goes on by scans and ticks, and resumes.
+
+While it is halted rack time stands still: no scan, no plant and no timeout goes on, and nothing is late afterwards.
+Operations and writes are carried out at the instant at which it stands. A step lets single events happen at their
+instants, as simulated time does, and halts again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NoReturn, Protocol, runtime_checkable
+
+from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.rack.base.observers import HALT, RESUME, STEP, Operation
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.rack import Rack
+from automax_ros.runtime.tasks.task import Status
+
+LONGEST_STEP_NS = NS_PER_S
+"""Most rack time of one step (decision: whoever waits for the rack meanwhile does not wait long)."""
+DONE, TIME_OVER, STOPPED = "done", "the time is over", "STOP ALL"
+"""Why a step ends."""
+
+
+@runtime_checkable
+class Haltable(Protocol):
+    """What keeps pace and can let time stand still; it calls ``while_halted`` every now and then meanwhile."""
+
+    halted: bool
+    while_halted: Callable[[], object]
+
+    def halt(self) -> None:
+        """Let time stand still."""
+        ...
+
+    def resume(self) -> None:
+        """Let time go on from where it stands."""
+        ...
+
+
+def is_halted(pace: object) -> bool:
+    """Return whether what keeps a rack's pace lets its time stand still."""
+    return isinstance(pace, Haltable) and pace.halted
+
+
+@dataclass(frozen=True)
+class Stepped:
+    """How a step ended: why, at which rack time, and how many scans all tasks have ended in it."""
+
+    why: str
+    at_ns: int
+    scans: int
+
+
+class Halting:
+    """Halts, steps and resumes one rack.
+
+    Raises:
+        OperationRefused: all methods, where that cannot be done now; observers are told so.
+    """
+
+    def __init__(self, rack: Rack, pace: object) -> None:
+        """Take a rack and what keeps its pace."""
+        self._rack, self._pace = rack, pace
+
+    @property
+    def halted(self) -> bool:
+        """Whether rack time stands still."""
+        return is_halted(self._pace)
+
+    def halt(self) -> None:
+        """Let rack time stand still.
+
+        A rack of which this process holds a part is not halted: the others would go on (decision). One that follows
+        another's clock is halted by that clock alone.
+        """
+        if not self._rack.part.is_whole:
+            self._refuse(HALT, "the rack runs in several processes, which do not halt together")
+        pace = self._haltable(HALT)
+        if pace.halted:
+            self._refuse(HALT, "the rack is halted already")
+        pace.halt()
+        self._tell(HALT)
+
+    def resume(self) -> None:
+        """Let rack time go on from where it stands."""
+        pace = self._haltable(RESUME)
+        if not pace.halted:
+            self._refuse(RESUME, "the rack is not halted")
+        pace.resume()
+        self._tell(RESUME)
+
+    def step(self, what: str, task: str = "", count: int = 1, until_ns: int = 0) -> Stepped:
+        """Go on by scans or ticks, or until a rack time: ``scan``, ``tick``, ``until``.
+
+        A ``task`` is whose scan is meant, or whose Processor's tick; "" is any, and the first module with tasks.
+        """
+        steps: Mapping[str, Callable[[], Stepped]] = {
+            "scan": lambda: self._scans(task, count),
+            "tick": lambda: self._ticks(task, count),
+            "until": lambda: self._until(until_ns),
+        }
+        if what not in steps:
+            self._refuse(STEP, f"{quoted(what)} is not a step: {near_or_listed(what, list(steps))}")
+        if not self.halted:
+            self._refuse(STEP, "the rack is not halted: pause it first")
+        if count < 1:
+            self._refuse(STEP, f"{count} steps cannot be made")
+        self._tell(STEP, detail=f"until {until_ns / NS_PER_S:.9g} s" if what == "until" else f"{count} {what} {task}")
+        return steps[what]()
+
+    def _scans(self, task: str, count: int) -> Stepped:
+        items = [item for item in self._rack.scheduled if task in ("", item.name)]
+        if not items:
+            known = [item.name for item in self._rack.scheduled]
+            self._refuse(STEP, f"the rack has no task {quoted(task)}: {near_or_listed(task, known)}")
+        if all(item.task.status is not Status.RUNNING for item in items):
+            self._refuse(STEP, f"{f'task {task} does not run' if task else 'no task runs'}: put it into RUN first")
+        wanted = sum(item.statistics.scans for item in items) + count
+        return self._go(LONGEST_STEP_NS, lambda: sum(item.statistics.scans for item in items) >= wanted)
+
+    def _ticks(self, task: str, count: int) -> Stepped:
+        modules = self._rack.task_modules
+        if task:
+            modules = [module for module in modules if task in {item.name for item in module.tasks}]
+        if not modules:
+            self._refuse(STEP, f"the rack has no task {quoted(task)}" if task else "the rack has no module with tasks")
+        for_ns = count * modules[0].config.tick_ns
+        if for_ns > LONGEST_STEP_NS:
+            self._refuse(STEP, f"{count} ticks are {for_ns / NS_PER_S:g} s: a step lasts at most 1 s")
+        return self._go(for_ns, None)
+
+    def _until(self, until_ns: int) -> Stepped:
+        for_ns = until_ns - self._rack.now_ns
+        if not 0 < for_ns <= LONGEST_STEP_NS:
+            now_s = self._rack.now_ns / NS_PER_S
+            self._refuse(STEP, f"{until_ns / NS_PER_S:.9g} s is not within 1 s after {now_s:.9g} s, which it is now")
+        return self._go(for_ns, None)
+
+    def _go(self, for_ns: int, is_done: Callable[[], bool] | None) -> Stepped:
+        """Let events happen for a time at most; without ``is_done`` the end of the time is what was wanted."""
+        rack = self._rack
+        ran, before, end_ns = rack.operations.stopped is None, self._all_scans(), rack.now_ns + for_ns
+        why = DONE if is_done is None else TIME_OVER
+        while rack.scheduler.step(end_ns):
+            if ran and rack.operations.stopped is not None:
+                why = STOPPED
+                break
+            if is_done is not None and is_done():
+                why = DONE
+                break
+        return Stepped(why, rack.now_ns, self._all_scans() - before)
+
+    def _all_scans(self) -> int:
+        return sum(item.statistics.scans for item in self._rack.scheduled)
+
+    def _haltable(self, what: str) -> Haltable:
+        if not isinstance(self._pace, Haltable):
+            self._refuse(what, "the rack follows another's clock: halt that")
+        return self._pace
+
+    def _tell(self, what: str, detail: str = "") -> None:
+        self._rack.observers.operated(Operation(self._rack.now_ns, what, detail=detail.strip()))
+
+    def _refuse(self, what: str, reason: str) -> NoReturn:
+        self._rack.observers.operated(Operation(self._rack.now_ns, what, ok=False, reason=reason))
+        raise OperationRefused(reason)

@@ -1,0 +1,51 @@
+"""The plants of a running rack: what becomes of them at power-up, in snapshots and when somebody works on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from automax_ros.drive.base.errors import DriveError
+from automax_ros.drive.base.state import SavedState
+from automax_ros.drive.plant.coupling import CoupledPlants
+from automax_ros.drive.plant.plant import DrivePlant
+from automax_ros.rackfile.model.plant_data import build_plants, couple_plants
+from automax_ros.rackfile.model.plants import PlantConfig
+
+
+class RackPlants(Mapping[str, DrivePlant]):
+    """The plants with a motor, by name. They go on whatever becomes of the rack's power."""
+
+    def __init__(self, configs: Sequence[PlantConfig]) -> None:
+        """Make all plants, at rest, and couple them."""
+        self._plants = build_plants(configs)
+        self._parts: dict[str, DrivePlant | CoupledPlants] = {
+            **self._plants,
+            **couple_plants(self._plants, configs),
+        }
+
+    def __getitem__(self, name: str) -> DrivePlant:
+        return self._plants[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._plants)
+
+    def __len__(self) -> int:
+        return len(self._plants)
+
+    def state(self) -> dict[str, SavedState]:
+        """Return all that their future depends on, by name; what is between two plants by the names of both."""
+        return {name: part.state() for name, part in self._parts.items()}
+
+    def load(self, state: Mapping[str, SavedState]) -> None:
+        """Take a state over.
+
+        Raises:
+            ValueError: it is not that of these plants.
+        """
+        if set(state) != set(self._parts):
+            raise ValueError("the state is that of a rack with other plants")
+        try:
+            for name, part in self._parts.items():
+                part.restore(state[name])
+        except DriveError as error:
+            raise ValueError(f"the state of a plant does not fit: {error}") from error

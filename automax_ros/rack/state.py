@@ -1,0 +1,46 @@
+"""A number for what a rack runs.
+
+What a rack's future depends on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.types import Value
+from automax_ros.drive.base.state import SavedState
+from automax_ros.rack.base.stop_cause import OperationsState
+from automax_ros.rack.modules.module import ModuleState
+
+
+@dataclass(frozen=True)
+class RackState:
+    """All that the future of a rack depends on, apart from its configuration and sources.
+
+    ``image`` is (view, element, value) of all of memory, ``forced`` what is held, ``events`` those that are kept
+    for the next who waits, ``clock_since_ns`` since when the common clock runs, ``modules`` by slot, ``plants`` by
+    name: a module's state has nothing of its plant. ``under_forces`` is what ``forced`` would hold without the forces.
+    """
+
+    now_ns: int
+    image: tuple[tuple[int, int, Value], ...]
+    forced: frozenset[tuple[int, int]]
+    events: tuple[str, ...]
+    channels: tuple[Any, ...]
+    operations: OperationsState
+    clock_since_ns: int | None
+    modules: Mapping[int, ModuleState]
+    plants: Mapping[str, SavedState] = field(default_factory=dict)
+    under_forces: tuple[tuple[int, int, Value], ...] = ()
+
+
+def digest_of(text: str, sources: Mapping[str, SourceText]) -> int:
+    """Return a number of 63 bits that a rack's file and its sources determine."""
+    digest = hashlib.sha256(text.encode())
+    for name, source in sorted(sources.items()):
+        digest.update(name.encode() + b"\0" + source.text.encode() + b"\0")
+    return int.from_bytes(digest.digest()[:8], "big") >> 1

@@ -1,0 +1,216 @@
+"""A task of a running rack: what makes it scan, what executes it, and its statistics.
+
+What comes right after each scan of a rack: it is told, waiting inputs follow the process, a fault stops all.
+
+A file of its own since every scan goes through it: see ``tools/compiled_groups.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from automax_ros.compile.compiler import CompiledTask
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.rack.base.observers import Observers
+from automax_ros.rack.tasks.statistics import TaskStatistics
+from automax_ros.rack.tasks.triggers import Due, MakeTrigger
+from automax_ros.runtime.memory.process_inputs import ProcessInputs
+from automax_ros.runtime.scan.execution import Execution, Ideal, Steps
+from automax_ros.runtime.scan.scan_under_way import Progress
+from automax_ros.runtime.tasks.task import OVERLAP, ScanRecord, Status, Task
+from automax_ros.runtime.time.scheduler import Scheduler
+
+_FAULTED: Final = Status.FAULTED
+"""A name of its own, since it is asked for after each scan and an enumeration's member is slow to get."""
+StopAll = Callable[[str, str | None, str], None]
+"""Stops the rack: is told the reason, the hardware's code where there is one, and the task."""
+
+
+class ScanEnd:
+    """Ends the scans of one rack."""
+
+    def __init__(self, observers: Observers, inputs: ProcessInputs, stop_all: StopAll) -> None:
+        """Take who is told, the inputs, and what stops the rack after a fault."""
+        self._observers, self._inputs, self._stop_all = observers, inputs, stop_all
+
+    def ended(self, task: Task, record: ScanRecord | None) -> None:
+        """Do what comes after a scan, or after what stands before SCAN_LOOP."""
+        if record is not None:
+            self._observers.scanned(task, record)
+        inputs = self._inputs
+        if inputs.frozen and inputs.scanned(task.name):
+            self._observers.tell_writes()
+        if task.status is _FAULTED:
+            last = task.errors.last
+            reason = f"task {task.name}: {last.describe() if last else 'fault'}"
+            self._stop_all(reason, last.hardware if last else None, task.name)
+
+
+_LONGEST_NS = 2**32 - 1
+"""Longest execution time that a message of a scan can hold."""
+_RUNNING = Status.RUNNING
+"""A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
+After = Callable[[Task, ScanRecord | None], None]
+"""Is told of each scan, and of what stands before SCAN_LOOP, right after it."""
+
+
+class ScheduledTask:
+    """Puts a task into RUN and STOP, any number of times: between the two its trigger says when a scan is due."""
+
+    def __init__(
+        self,
+        task: Task,
+        source: SourceText,
+        *,
+        scheduler: Scheduler,
+        trigger: MakeTrigger,
+        execution: Execution,
+        after: After,
+        stopwatch: Callable[[], int] | None = None,
+    ) -> None:
+        """Take an installed task; nothing is scheduled yet."""
+        self.task = task
+        self.source = source
+        self.statistics = TaskStatistics()
+        self._scheduler, self._execution = scheduler, execution
+        self._after, self._stopwatch = after, stopwatch
+        self._make_trigger = trigger
+        self._began_ns: int | None = None
+        self._late_ns = 0
+        self.trigger = trigger(task)
+        self.due: Due = self.whole if isinstance(execution, Ideal) else self._begin
+
+    @property
+    def name(self) -> str:
+        """The task's name."""
+        return self.task.name
+
+    @property
+    def priority(self) -> int:
+        """The task's priority: 4 (first) to 11."""
+        return self.task.priority
+
+    def start_up(self) -> None:
+        """Execute what stands before SCAN_LOOP, at the present; no scan is scheduled yet."""
+        self.stop()
+        record = self.task.run(self._scheduler.now_ns)
+        self._after(self.task, record)
+
+    def scan_from(self, first_ns: int) -> None:
+        """Scan whenever it is due from ``first_ns`` on, if the task is in RUN."""
+        self.trigger.disarm()
+        if self.task.status is Status.RUNNING:
+            self.trigger.arm(first_ns, self.due)
+
+    def stop(self) -> None:
+        """Stop the task: no scan happens until it is put into RUN again; one under way is given up."""
+        self.trigger.disarm()
+        self._execution.drop(self)
+        self.task.heed_forces()
+        self.task.stop()
+
+    def install(self, compiled: CompiledTask, source: SourceText) -> None:
+        """Replace what the task executes; its state is as at installation, and it is stopped."""
+        self.stop()
+        self.task.install(compiled)
+        self.trigger = self._make_trigger(self.task)
+        self.source = source
+
+    def state(self) -> dict[str, Any]:
+        """Return what the task keeps, when its next scan is due (ns), and how far one is that is under way."""
+        task = self.task
+        return {
+            "source": task.compiled.program.source_hash,
+            "status": task.status.name,
+            "scan": task.scan_number,
+            "values": task.snapshot(),
+            "held": sorted(task.compiled.held),
+            "forced": dict(task.forces),
+            "waiting": task.waiting(),
+            "next_ns": self.trigger.next_ns,
+            "place": self._execution.place(self),
+            "progress": task.progress,
+        }
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Take over a state; a task that ran goes on with the scan that was under way, or with its next one.
+
+        Raises:
+            ValueError: the state does not fit the task, or another source ran.
+        """
+        if state["source"] != self.task.compiled.program.source_hash:
+            raise ValueError(f"task {self.task.name} had another source: reload it first")
+        if state["status"] not in Status.__members__:
+            raise ValueError(f"task {self.task.name} cannot be {state['status']!r}")
+        self.stop()
+        self.task.restore(list(state["values"]))
+        values = {name: self.task.value(name) for name in state["held"]}
+        self.task.hold({name: value for name, value in values.items() if not isinstance(value, list)})
+        self.task.wait_again(state["waiting"])
+        self.task.status, self.task.scan_number = Status[state["status"]], state["scan"]
+        if state["next_ns"] is not None:
+            self.scan_from(state["next_ns"])
+        place, progress = state["place"], state["progress"]
+        if place is not None:
+            self._execution.resume(self, place, None if progress is None else self._resumed(progress))
+            self.task.wait_again(state["waiting"])
+        self.task.hold(state["forced"])
+
+    def whole(self, now_ns: int, skipped: int) -> None:
+        """Execute a scan at one instant."""
+        task, statistics, stopwatch = self.task, self.statistics, self._stopwatch
+        if task.status is not _RUNNING:
+            return
+        began = stopwatch() if stopwatch else 0
+        record = task.scan(now_ns, skipped)
+        if skipped:
+            statistics.skip(skipped)
+        if stopwatch:
+            taken = stopwatch() - began
+            statistics.add(taken, self._late(began, now_ns))
+            if record is not None:
+                record.duration_ns = taken
+        else:
+            statistics.scans += 1
+        self._after(task, record)
+
+    def steps(self, now_ns: int, skipped: int) -> Steps:
+        """Return a scan in steps."""
+        self.statistics.skip(skipped)
+        self._began_ns = now_ns
+        self._late_ns = self._late(self._stopwatch(), now_ns) if self._stopwatch else 0
+        return self.task.scan_modeled(now_ns, skipped)
+
+    def done(self, record: ScanRecord | None) -> None:
+        """Tell of a scan whose last step was made; its time is the modeled one."""
+        taken = 0 if self._began_ns is None else self._scheduler.now_ns - self._began_ns
+        self._began_ns = None
+        self.statistics.add(taken, self._late_ns)
+        if record is not None:
+            record.duration_ns = min(taken, _LONGEST_NS)
+        self._after(self.task, record)
+
+    def fault(self, code: int) -> None:
+        """Fault the task for a scan that cannot be; one under way is given up."""
+        self._execution.drop(self)
+        self.task.heed_forces()
+        self._after(self.task, self.task.fault(code, self._scheduler.now_ns))
+
+    def _begin(self, now_ns: int, skipped: int) -> None:
+        """Let a scan be executed, unless the last one is still under way: that is an overlap (J2-3106-1 p. C-1)."""
+        if self.task.status is not _RUNNING:
+            return
+        if self._execution.busy(self):
+            self.fault(OVERLAP)
+        else:
+            self._execution.begin(self, now_ns, skipped)
+
+    def _late(self, began_ns: int, now_ns: int) -> int:
+        """Return how much later than its instant the host has begun a scan, by the clock that keeps pace."""
+        zero_ns = self._scheduler.zero_ns
+        return 0 if zero_ns is None else max(0, began_ns - zero_ns - now_ns)
+
+    def _resumed(self, progress: Progress) -> Steps:
+        self._began_ns = progress["began_ns"]
+        return self.task.resume_scan(progress)

@@ -1,0 +1,213 @@
+"""What makes a task scan: its Processor's clock, an event, a drive's 57C406, or the module it stands in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from automax_ros.core.ticks import UDC_TICK_NS
+from automax_ros.runtime.scan.events import Event, Events
+from automax_ros.runtime.tasks.cml_task import CmlTask
+from automax_ros.runtime.tasks.task import Task
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, PeriodicAction, ScheduledEvent, Scheduler
+
+Due = PeriodicAction
+"""Is called when a scan is due, with the instant in ns and the number of instants skipped just before it."""
+
+
+LATE_NS = UDC_TICK_NS
+"""Lateness from which on a host may have skipped what interrupts."""
+_LAST = EventKey(EventClass.OBSERVE, 0, "")
+
+
+class Trigger(Protocol):
+    """Tells when scans of one task are due, from ``arm`` to ``disarm``."""
+
+    def arm(self, first_ns: int, due: Due) -> None:
+        """Begin: no scan is due before ``first_ns``."""
+        ...
+
+    def disarm(self) -> None:
+        """End; a second time this does nothing."""
+        ...
+
+    @property
+    def next_ns(self) -> int | None:
+        """What ``arm`` must be given to go on as from now; None while it is not armed."""
+        ...
+
+
+MakeTrigger = Callable[[Task], Trigger]
+"""Makes the trigger of a task as it is installed."""
+
+
+class ClockTrigger:
+    """A scan is due each TICKS x tick rate."""
+
+    def __init__(self, task: Task, scheduler: Scheduler) -> None:
+        """Take the task; nothing is scheduled yet."""
+        self._scheduler = scheduler
+        self._period_ns = task.period_ns
+        self._key = EventKey(EventClass.SCAN, task.priority, task.name)
+        self._event: ScheduledEvent | None = None
+
+    def arm(self, first_ns: int, due: Due) -> None:
+        """Let a scan be due at ``first_ns`` and each period after it."""
+        self.disarm()
+        self._event = self._scheduler.every(self._period_ns, first_ns, self._key, due)
+
+    def disarm(self) -> None:
+        """Let no scan be due any more."""
+        if self._event is not None:
+            self._event.cancel()
+            self._event = None
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next scan is due."""
+        return self._scheduler.due_ns(self._event) if self._event is not None else None
+
+
+class Timeout:
+    """The time within which an event must be set again, once somebody waits for it.
+
+    A host that is late makes the interrupts of a module late too, so no time runs out before all that is due has been
+    carried out. Where it was late by ``LATE_NS`` or more the time begins again: scans of a UDC were skipped, and the
+    one whose end interrupts may still be under way in modeled execution (decision).
+    """
+
+    def __init__(self, timeout_ns: int, key: EventKey, scheduler: Scheduler, expired: Callable[[], None]) -> None:
+        """Take the time, and what is called when it is over; it does not run yet."""
+        self._timeout_ns, self._key, self._scheduler, self._expired = timeout_ns, key, scheduler, expired
+        self._end: ScheduledEvent | None = None
+
+    def begin(self, since_ns: int) -> None:
+        """Let the time run from an instant on, in place of any earlier one."""
+        self.end()
+        self._end = self._scheduler.at(since_ns + self._timeout_ns, self._key, self._over)
+
+    def end(self) -> None:
+        """Let it run no longer."""
+        if self._end is not None:
+            self._end.cancel()
+            self._end = None
+
+    def _over(self, now_ns: int) -> None:
+        wall_ns = self._scheduler.wall_ns
+        if wall_ns - now_ns >= LATE_NS:
+            self._end = self._scheduler.at(wall_ns + self._timeout_ns, self._key, self._over)
+        elif now_ns < wall_ns:
+            self._end = self._scheduler.at(wall_ns, _LAST, self._over)
+        else:
+            self._end = None
+            self._expired()
+
+
+class EventTrigger:
+    """A scan is due whenever an event is set (4.0, EVENT): at that instant, in the task's place among all scans.
+
+    A hardware event must be set within its TIMEOUT, in ticks of the Processor, from RUN and from each event on, or
+    ``expired`` is called (decision: no source gives the unit or the effect).
+    """
+
+    def __init__(self, event: Event, task: Task, scheduler: Scheduler, expired: Callable[[], None]) -> None:
+        """Take the event; nobody waits for it yet."""
+        self._event, self._scheduler = event, scheduler
+        self._key = EventKey(EventClass.SCAN, task.priority, task.name)
+        self._due: Due | None = None
+        self._set: ScheduledEvent | None = None
+        self._since_ns = 0
+        program = task.compiled.program
+        ticks = next((item.timeout for item in program.events if item.name == event.name), None)
+        self._timeout = Timeout(ticks * program.tick_ns, self._key, scheduler, expired) if ticks else None
+
+    def arm(self, first_ns: int, due: Due) -> None:
+        """Wait for the event from now on, and go on waiting while a scan that it started is under way."""
+        self.disarm()
+        self._due = due
+        self._event.pending = False
+        self._event.wait(self._wake)
+        self._wait_since(first_ns)
+
+    def disarm(self) -> None:
+        """Wait no longer."""
+        self._due = None
+        self._event.forget(self._wake)
+        if self._timeout is not None:
+            self._timeout.end()
+        if self._set is not None:
+            self._set.cancel()
+            self._set = None
+
+    @property
+    def next_ns(self) -> int | None:
+        """Since when it waits."""
+        return self._since_ns if self._due is not None else None
+
+    def _wait_since(self, now_ns: int) -> None:
+        self._since_ns = now_ns
+        if self._timeout is not None:
+            self._timeout.begin(now_ns)
+
+    def _wake(self, now_ns: int) -> None:
+        """Let the scan be due after whatever sets the event: a scan does not begin inside another."""
+        self._event.wait(self._wake)
+        if self._due is not None:
+            due, skipped = self._due, self._event.skipped
+            self._set = self._scheduler.at(now_ns, self._key, lambda now: due(now, skipped))
+            self._wait_since(now_ns)
+
+
+class DriveTrigger:
+    """A scan is due at each interrupt of the task's 57C406, six in a cycle of its line (52.0)."""
+
+    def __init__(self, task: CmlTask) -> None:
+        """Take the task; its 57C406 does not interrupt yet."""
+        self._task = task
+        self._key = EventKey(EventClass.SCAN, task.priority, task.name)
+
+    def arm(self, first_ns: int, due: Due) -> None:
+        """Let the 57C406 interrupt from ``first_ns`` on."""
+        self._task.port.arm(first_ns, self._key, due)
+
+    def disarm(self) -> None:
+        """Let it interrupt no more: the drive's gates and contactor are off at once."""
+        self._task.port.disarm()
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next interrupt comes."""
+        return self._task.port.next_ns
+
+
+class ModuleTrigger:
+    """The module itself says when a scan is due, as long as the trigger is ``armed``."""
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        """Begin unarmed."""
+        self._scheduler = scheduler
+        self.armed = False
+
+    def arm(self, first_ns: int, due: Due) -> None:  # noqa: ARG002
+        """Let the module begin."""
+        self.armed = True
+
+    def disarm(self) -> None:
+        """Let the module pass the task over."""
+        self.armed = False
+
+    @property
+    def next_ns(self) -> int | None:
+        """The present, while it is armed."""
+        return self._scheduler.now_ns if self.armed else None
+
+
+def usual_trigger(task: Task, events: Events, scheduler: Scheduler, expired: Callable[[Task], None]) -> Trigger:
+    """Return the trigger of a Processor's task: the event that its SCAN_LOOP names, else the clock (4.0).
+
+    ``expired`` is called with the task when a hardware event was not set within its TIMEOUT.
+    """
+    event = task.compiled.program.event
+    if event is None:
+        return ClockTrigger(task, scheduler)
+    return EventTrigger(events.event(event), task, scheduler, lambda: expired(task))

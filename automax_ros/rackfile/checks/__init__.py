@@ -1,0 +1,1 @@
+"""What must hold among tasks, modules and drives of a rack."""

@@ -1,0 +1,230 @@
+"""Looks at who writes and reads each common of a rack: two writers, none, nobody at all; a drive without its plant.
+
+All are warnings, and few of them false (decision). Writes before SCAN_LOOP, and those of a BASIC task that does its
+work once and ends, initialise: another task may write the common later. Elements of arrays count as separate unless
+both tasks name one by constants. Where each task writes nothing but constants to a BOOLEAN it is a handshake: one sets
+what the other resets. I/O points are wiring: who writes those that a task reads is not looked for.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from automax_ros.core.diagnostics import Diagnostic, Span
+from automax_ros.core.kinds import Direction
+from automax_ros.core.names import PREDEFINED
+from automax_ros.language.program import BoundCall, Program
+from automax_ros.language.tree.basic_tree import StartEvery
+from automax_ros.language.tree.tree import (
+    Assignment,
+    BooleanLiteral,
+    Call,
+    Element,
+    Expression,
+    IntegerLiteral,
+    Reference,
+    Scope,
+    Statement,
+)
+from automax_ros.language.tree.walk import expressions_of, jumps_of, statements_in_order, targets_of, variables_in
+from automax_ros.rackfile.model.config import CommonVariable, RackConfig
+from automax_ros.rackfile.modules.drive import DriveConfig
+
+_NAMED = 6
+"""Most commons that one warning names."""
+
+
+class _Write(NamedTuple):
+    """Where a scan writes a common, and whether what it writes is TRUE or FALSE as such."""
+
+    task: str
+    target: Reference | Element
+    line: int
+    is_constant: bool
+
+
+class _Read(NamedTuple):
+    """Where a task reads a common."""
+
+    task: str
+    line: int | None
+
+
+def writer_findings(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
+    """Return the places where a task writes a common that another task writes too (AMX6495), by task."""
+    files = {task.name: task.file.name for _, task in config.placed_tasks}
+    found: dict[str, list[Diagnostic]] = {}
+    written: dict[str, list[_Write]] = {}
+    for _, task in config.placed_tasks:
+        program = programs.get(task.name)
+        if program is None or program.target == "udc":  # Its dual port has rules of its own (udc_rules).
+            continue
+        own: dict[str, list[_Write]] = {}
+        for write in _writes(program):
+            own.setdefault(write.target.name, []).append(write)
+        for name, writes in own.items():
+            pair = _same(written.get(name, []), writes)
+            if pair is not None:
+                first, second = pair
+                message = (
+                    f"{name} is written here, and in line {first.line} of {files[first.task]} by task {first.task}"
+                )
+                hint = "whoever writes last wins: let one task write it, or give each a common of its own"
+                diagnostic = Diagnostic("AMX6495", message, second.target.span, second.line, hint)
+                found.setdefault(task.name, []).append(diagnostic)
+            written.setdefault(name, []).extend(writes)
+    return found
+
+
+def rack_warnings(config: RackConfig, programs: Mapping[str, Program]) -> list[Diagnostic]:
+    """Return what looks forgotten in a rack file; ``programs`` are those of all its tasks.
+
+    AMX6496 a common that tasks read and nobody writes, AMX6497 commons that nobody uses, AMX6498 the 57C406 of a
+    current minor loop without a plant.
+    """
+    return [*_unwritten(config, programs), *_unused(config, programs), *_without_plant(config, programs)]
+
+
+def _unwritten(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
+    files = {task.name: task.file.name for _, task in config.placed_tasks}
+    written = {name for program in programs.values() for name in _ever_written(program)} | _supplied(config)
+    reads: dict[str, _Read] = {}
+    for name, program in programs.items():
+        for common, line in _reads(program):
+            reads.setdefault(common, _Read(name, line))
+    for variable in config.declared:
+        read = reads.get(variable.name)
+        if read is not None and variable.name not in written and variable.point is None:
+            place = f"line {read.line} of {files[read.task]}"
+            message = f"{variable.name} is read in {place}, and nobody writes it: it stays {_zero(variable)}"
+            hint = "let a task write it; or write ros: in for what comes from outside, or a preset"
+            yield Diagnostic("AMX6496", message, _place(config, variable.line), hint=hint)
+
+
+def _unused(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
+    declared = {
+        symbol.name
+        for program in programs.values()
+        for symbol in program.symbols.values()
+        if symbol.scope is Scope.COMMON
+    }
+    declared |= _connected(config)
+    unused = [item for item in config.declared if item.name not in declared and item.point is None]
+    if unused and programs:
+        named = [f"{item.name} (line {item.line})" for item in unused[:_NAMED]]
+        more = f" and {len(unused) - _NAMED} more" if len(unused) > _NAMED else ""
+        what = f"common {named[0]} is" if len(unused) == 1 else f"commons {', '.join(named)}{more} are"
+        hint = "take out what is left over; or is a task missing?"
+        yield Diagnostic("AMX6497", f"the {what} used by no task", _place(config, unused[0].line), hint=hint)
+
+
+def _without_plant(config: RackConfig, programs: Mapping[str, Program]) -> Iterator[Diagnostic]:
+    drives = {module.slot: module for module in config.modules if isinstance(module, DriveConfig)}
+    for program in programs.values():
+        if program.cml is None:
+            continue
+        drive = drives.get(int(program.cml.facts["io_cntl_slot"]))
+        if drive is not None and drive.plant is None:
+            message = (
+                f"the {drive.model} in slot {drive.slot} has no plant: task {program.name} finds no line and no motor"
+            )
+            hint = f"write plant: NAME in slot {drive.slot}, and the plant under plants: (docs/plants.md)"
+            yield Diagnostic("AMX6498", message, _place(config, drive.line), hint=hint)
+
+
+def _supplied(config: RackConfig) -> set[str]:
+    """Return the commons that something other than a task gives a value."""
+    given = {item.name for item in config.declared if item.direction is Direction.IN or item.preset is not None}
+    return given | _connected(config)
+
+
+def _connected(config: RackConfig) -> set[str]:
+    """Return the commons that the rack itself writes, that plants feed, and that joints of robots command."""
+    return {*PREDEFINED, *(feed.common for feed in config.feeds), *(item.common for item in config.joint_commands)}
+
+
+def _place(config: RackConfig, line: int) -> Span:
+    """Return where the first word of a line of the rack file stands."""
+    text = config.text.split("\n")[line - 1]
+    start = len(text) - len(text.lstrip())
+    return Span(line, start + 1, start + 1 + len(re.split(r"[\s:]", text[start:])[0]))
+
+
+def _zero(variable: CommonVariable) -> str:
+    word = variable.type.word
+    return {"BOOLEAN": "FALSE", "STRING": "empty"}.get(word, "0")
+
+
+def _same(first: list[_Write], second: list[_Write]) -> tuple[_Write, _Write] | None:
+    """Return a write of each of two tasks to one variable or element; None where there is none, or a handshake."""
+    if all(item.is_constant for item in (*first, *second)):
+        return None
+    places = {element: write for write in reversed(first) if (element := _element(write)) is not None}
+    return next(((places[element], two) for two in second if (element := _element(two)) in places), None)
+
+
+def _element(write: _Write) -> tuple[int, ...] | None:
+    """Return the subscripts of what is written, () for a simple variable, None where they are not constants."""
+    if isinstance(write.target, Reference):
+        return ()  # A block's table is a whole array, and as such an input.
+    numbers = [item.value for item in write.target.subscripts if isinstance(item, IntegerLiteral)]
+    return tuple(numbers) if len(numbers) == len(write.target.subscripts) else None
+
+
+def _writes(program: Program) -> Iterator[_Write]:
+    """Yield where the scans of a task write commons, what initialises left out."""
+    if program.is_basic and not _repeats(program):
+        return
+    for target, line, value in _targets(program, program.scan):
+        symbol = program.symbols.get(target.name)
+        if (
+            symbol is not None
+            and symbol.scope is Scope.COMMON
+            and (isinstance(target, Element) or not symbol.dimensions)
+        ):
+            yield _Write(program.name, target, line or 0, isinstance(value, BooleanLiteral))
+
+
+def _ever_written(program: Program) -> set[str]:
+    return {target.name for target, _, _ in _targets(program, (*program.startup, *program.scan))}
+
+
+def _targets(
+    program: Program, statements: tuple[Statement, ...]
+) -> Iterator[tuple[Reference | Element, int | None, Expression | None]]:
+    """Yield what statements and the blocks among them write, with the line, and the value of an assignment."""
+    if program.cml is not None:
+        yield from ((target, program.cml.line, None) for target in _outputs(program.cml))
+    for statement, line in statements_in_order(statements):
+        value = statement.value if isinstance(statement, Assignment) else None
+        yield from ((target, line, value) for target in targets_of(statement))
+        if isinstance(statement, Call) and statement.span in program.calls:
+            yield from ((target, line, None) for target in _outputs(program.calls[statement.span]))
+
+
+def _outputs(bound: BoundCall) -> Iterator[Reference | Element]:
+    return (target for target in bound.targets if isinstance(target, (Reference, Element)))
+
+
+def _reads(program: Program) -> Iterator[tuple[str, int | None]]:
+    """Yield the commons that a task reads, with the line."""
+    for bound in program.calls.values():
+        outputs = {output.name for output in bound.block.outputs}
+        for keyword, value in bound.arguments.items():
+            if keyword not in outputs:
+                yield from ((variable.name, bound.line) for variable in variables_in(value))
+    for statement, line in statements_in_order((*program.startup, *program.scan)):
+        targets = targets_of(statement)
+        for expression in expressions_of(statement):
+            if expression not in targets:
+                yield from ((variable.name, line) for variable in variables_in(expression))
+
+
+def _repeats(program: Program) -> bool:
+    """Return whether a BASIC task goes on for ever: it jumps back, or begins again by the clock."""
+    for statement, line in statements_in_order(program.scan):
+        if isinstance(statement, StartEvery) or any(target <= (line or 0) for target in jumps_of(statement)):
+            return True
+    return False

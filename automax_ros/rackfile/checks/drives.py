@@ -1,0 +1,326 @@
+"""The drives of a rack: a plant that a module drives, or a task with a current minor loop, or both.
+
+The drives of a rack as ``drive/assess/assessment`` judges them: what the rack file and its tasks say, put together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from automax_ros.compile.base.cost import CostModel, Model
+from automax_ros.compile.base.functions import BUILTINS
+from automax_ros.compile.scan_times import command_ns
+from automax_ros.core.ticks import NS_PER_US
+from automax_ros.core.types import Value
+from automax_ros.core.values import source_text
+from automax_ros.drive.assess.drive_case import Computing, DriveCase, Given, Unjudged
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.plant.plant import PlantData
+from automax_ros.language.checks.rules.constant_values import constant_value
+from automax_ros.language.printer import print_expression
+from automax_ros.language.program import BoundCall, Program, places_that_write
+from automax_ros.language.tree.tree import Assignment, Expression, FunctionCall, Reference, Scope, Unary
+from automax_ros.language.tree.walk import statements_in_order
+from automax_ros.rackfile.checks.register_writes import numbered_writes
+from automax_ros.rackfile.model.config import Point, RackConfig, Timing
+from automax_ros.rackfile.model.driven import Driving
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.model.plant_data import plant_data
+from automax_ros.rackfile.model.plants import PlantConfig
+from automax_ros.rackfile.modules.drive import DEFAULTS, OPTIONS, PERIOD_STEP, PHASE_STEP, TACH_THRESHOLD
+from automax_ros.rackfile.modules.processor import PROCESSOR
+
+SLOT = "IO_CNTL_SLOT"
+"""The input of the loop that names its 57C406."""
+
+
+@dataclass(frozen=True)
+class RackDrive:
+    """One drive of a rack.
+
+    Attributes:
+        module: the module that drives it; None where the task names a slot without one.
+        slot: its slot.
+        letter: A or B where the module has two drives, otherwise "".
+        plant: its plant, None for a drive without one.
+        program: the task with its current minor loop, None where there is none.
+    """
+
+    module: ModuleConfig | None
+    slot: int
+    letter: str = ""
+    plant: PlantConfig | None = None
+    program: Program | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is called: its plant, or its loop's task."""
+        if self.plant is not None:
+            return self.plant.name
+        return self.program.name if self.program is not None else f"slot {self.slot}{self.letter}"
+
+    @property
+    def where(self) -> str:
+        """The module in words."""
+        if self.module is None:
+            return f"no module in slot {self.slot}"
+        return f"{self.module.model} in slot {self.slot}{f', drive {self.letter}' if self.letter else ''}"
+
+    @property
+    def call(self) -> BoundCall | None:
+        """The CALL of its current minor loop."""
+        return self.program.cml if self.program is not None else None
+
+    @property
+    def data(self) -> PlantData | None:
+        """What its plant is made of, None without a plant or a motor.
+
+        Raises:
+            ParameterError: it cannot be.
+        """
+        return plant_data(self.plant) if self.plant is not None else None
+
+
+def rack_drives(config: RackConfig, programs: Iterable[Program]) -> list[RackDrive]:
+    """Return the drives of a rack in the order of slots, those of one module in the order of its drives.
+
+    ``programs`` are its tasks as far as they have no errors.
+    """
+    loops = {slot: program for program in programs if (slot := _slot_of(program)) is not None}
+    found: list[RackDrive] = []
+    for module in config.modules:
+        loop = loops.pop(module.slot, None)
+        plants = module.plants if isinstance(module, Driving) else {}
+        found += [RackDrive(module, module.slot, item, plant, None if item else loop) for item, plant in plants.items()]
+        if loop is not None and "" not in plants:
+            found.append(RackDrive(module, module.slot, program=loop))
+    found += [RackDrive(None, slot, program=loop) for slot, loop in loops.items()]
+    return sorted(found, key=lambda drive: (drive.slot, drive.letter))
+
+
+def _slot_of(program: Program) -> int | None:
+    """Return the slot of the 57C406 that a task's loop commands, None for a task without a loop."""
+    slot = program.cml.facts.get(SLOT.lower()) if program.cml is not None else None
+    return slot if isinstance(slot, int) else None
+
+
+def given_inputs(
+    drive: RackDrive, config: RackConfig, programs: Iterable[Program], settings: Mapping[str, Value]
+) -> dict[str, Given]:
+    """Return what is programmed for the inputs of a drive's current minor loop, by keyword, defaults included.
+
+    Of a loop that is in no task only LIM_BAR is known, which is the drive's Motor Overload Ratio (36).
+
+    A variable counts as what ``--set`` gives it, as the one constant that tasks ever assign to it, as the present value
+    of a tunable, or as its preset, in this order; otherwise it is not known (decision).
+    """
+    call = drive.call
+    if call is None or drive.program is None:
+        ratio = drive.plant.motor_overload_ratio if drive.plant is not None else None
+        return {} if ratio is None else {"LIM_BAR": Given(ratio, f"{ratio} (motor_overload_ratio)")}
+    assigned = _assigned(drive.program, programs)
+    given = {name: _given(value, source_text(value), "default") for name, value in call.defaults.items()}
+    for item in call.block.inputs:
+        expression = call.arguments.get(item.name)
+        if expression is not None:
+            given[item.name] = _programmed(expression, drive.program, config, assigned, settings)
+    return given
+
+
+def _given(value: Value | None, text: str, source: str = "") -> Given:
+    number = float(value) if isinstance(value, (bool, int, float)) else None
+    return Given(number, f"{text} ({source})" if source else text)
+
+
+def _programmed(
+    expression: Expression,
+    program: Program,
+    config: RackConfig,
+    assigned: Mapping[str, Value | None],
+    settings: Mapping[str, Value],
+) -> Given:
+    value = constant_value(expression)
+    if value is not None:
+        return _given(value, source_text(value))
+    operand = expression.operand if isinstance(expression, Unary) else expression
+    name = print_expression(operand)
+    value, source = _present(name, program, config, assigned, settings)
+    if value is None:
+        return _given(None, name, "not known")
+    if isinstance(expression, Unary):
+        value = not value if isinstance(value, bool) else -value if isinstance(value, (int, float)) else value
+    return _given(value, f"{print_expression(expression)} = {source_text(value)}", source)
+
+
+def _present(
+    name: str,
+    program: Program,
+    config: RackConfig,
+    assigned: Mapping[str, Value | None],
+    settings: Mapping[str, Value],
+) -> tuple[Value | None, str]:
+    """Return the value of a variable, None where it is not known, and where it comes from."""
+    if name in settings:
+        return settings[name], "--set"
+    if name in assigned:
+        return assigned[name], "assigned"
+    symbol = program.symbols.get(name)
+    if symbol is not None and symbol.tuning is not None:
+        return symbol.tuning.current, "tunable"
+    variable = config.by_name.get(name)
+    if variable is not None and not variable.is_array and variable.presets:
+        return variable.presets[0], "preset"
+    return None, ""
+
+
+def _assigned(own: Program, programs: Iterable[Program]) -> dict[str, Value | None]:
+    """Return the constants that tasks assign to commons and one task to its locals; None for what else is written."""
+    found: dict[str, Value | None] = {}
+    for program in programs:
+        for name, value in written_constants(program, Scope.COMMON).items():
+            found[name] = None if name in found else value
+    return found | written_constants(own, Scope.LOCAL)
+
+
+def written_constants(program: Program, scope: Scope, start: int | None = None) -> dict[str, Value | None]:
+    """Return the variables that a task writes, with the value of those that get one constant in one place.
+
+    ``start`` is what a variable held before, for functions such as BIT_SET% of the variable itself; None: not known.
+    """
+    constants = _constants(program, start)
+    return {
+        name: constants[name][0] if len(places) == 1 and name in constants else None
+        for name, places in places_that_write(program, scope).items()
+    }
+
+
+def _constants(program: Program, start: int | None) -> dict[str, list[Value | None]]:
+    """Return what the assignments of a task give each simple variable, None for what is not a constant."""
+    found: dict[str, list[Value | None]] = {}
+    for statement, _ in statements_in_order((*program.startup, *program.scan)):
+        if isinstance(statement, Assignment):
+            name = print_expression(statement.target)
+            found.setdefault(name, []).append(_value(statement.value, name, start))
+    return found
+
+
+def _value(expression: Expression, name: str, start: int | None) -> Value | None:
+    """Return what an expression gives, None where that is not known; ``start`` is what the variable ``name`` held."""
+    if isinstance(expression, Reference) and expression.name == name:
+        return start
+    if not isinstance(expression, FunctionCall) or expression.name not in BUILTINS:
+        return constant_value(expression)
+    arguments = [_value(item, name, start) for item in expression.arguments]
+    if None in arguments:
+        return None
+    builtin = BUILTINS[expression.name]
+    result = builtin.carry_out(*arguments)
+    if builtin.fallible:
+        assert isinstance(result, tuple)
+        result = result[0]
+    return result if isinstance(result, (bool, int, float, str)) else None
+
+
+@runtime_checkable
+class _WiredToDrive(Protocol):
+    drive: int | None
+    """The slot of the 57C406 whose armature voltage it gets."""
+
+
+def drive_cases(
+    config: RackConfig, programs: Sequence[Program], settings: Mapping[str, Value]
+) -> list[DriveCase | Unjudged]:
+    """Return the drives of a rack, in the order of slots; ``settings`` are what ``--set`` gives commons."""
+    return [_case(drive, config, programs, settings) for drive in rack_drives(config, programs)]
+
+
+def _case(
+    drive: RackDrive, config: RackConfig, programs: Sequence[Program], settings: Mapping[str, Value]
+) -> DriveCase | Unjudged:
+    try:
+        data = drive.data
+    except ParameterError as error:
+        return Unjudged(drive.name, drive.where, str(error))
+    if data is None:
+        lacking = "a motor" if drive.plant is not None else "a plant"
+        return Unjudged(drive.name, drive.where, f"without {lacking} in the rack file there is nothing to compute from")
+    registers = _Registers(config, drive.slot, programs)
+    inputs = given_inputs(drive, config, programs, settings)
+    return DriveCase(
+        name=drive.name,
+        where=drive.where,
+        parameters=data.parameters,
+        inertia=data.inertia,
+        source_ohm=data.resistance_ohm,
+        task=drive.program.name if drive.program is not None else "",
+        inputs=inputs,
+        threshold=registers.given(TACH_THRESHOLD),
+        phase_step=registers.given(PHASE_STEP),
+        period_step=registers.given(PERIOD_STEP),
+        fast_change=registers.bit_0(OPTIONS),
+        voltage=any(_is_wired(module, drive.slot) for module in config.modules),
+        registers=not drive.letter,
+        computing=_computing(drive, config),
+    )
+
+
+def _computing(drive: RackDrive, config: RackConfig) -> Computing | None:
+    """Return how long the scans of a drive's task compute, on its Processor and on the slowest that may run it."""
+    program = drive.program
+    if program is None:
+        return None
+    model = next(module.model for module, task in config.placed_tasks if task.name == program.name)
+    times_us = {item: command_ns(program, CostModel(Model(item))) / NS_PER_US for item in PROCESSOR.models}
+    slowest = max(times_us, key=lambda item: times_us[item])
+    modeled, sixth_us = config.execution is Timing.MODELED, program.period_ns / NS_PER_US
+    return Computing(modeled, model, times_us[model], slowest, times_us[slowest], sixth_us)
+
+
+def _is_wired(module: object, slot: int) -> bool:
+    return isinstance(module, _WiredToDrive) and module.drive == slot
+
+
+@dataclass(frozen=True)
+class _Registers:
+    """What the registers of a 57C406 hold once the tasks have initialised them, as far as it can be known.
+
+    The loop's task gives them their defaults: presets and ``--set`` do not count, what tasks write later does (52.4.1).
+    """
+
+    config: RackConfig
+    slot: int
+    programs: Sequence[Program]
+
+    def given(self, register: int) -> Given:
+        """Return a register's value."""
+        return _of(self._words(register), DEFAULTS[register])
+
+    def bit_0(self, register: int) -> Given:
+        """Return whether bit 0 of a register is on."""
+        words = [None if word is None else word & 1 for word in self._words(register)]
+        return _of([*words, *self._points(register, 0)], DEFAULTS[register] & 1)
+
+    def _words(self, register: int) -> list[int | None]:
+        numbered = numbered_writes(self.programs).get((self.slot, register), [])
+        return [*self._points(register, None), *numbered]
+
+    def _points(self, register: int, bit: int | None) -> list[int | None]:
+        """Return what tasks write to the points of a register, or of one of its bits."""
+        place = Point(self.slot, register, bit)
+        names = {variable.name for variable in self.config.declared if variable.point == place}
+        written = (
+            item
+            for program in self.programs
+            for item in written_constants(program, Scope.COMMON, DEFAULTS[register]).items()
+        )
+        return [None if value is None else int(value) for name, value in written if name in names]
+
+
+def _of(written: Sequence[int | None], default: int) -> Given:
+    if not written:
+        return Given(default, f"{default} (default)")
+    if None in written or len(set(written)) > 1:
+        return Given(None, "written by tasks, value not known")
+    return Given(written[0], f"{written[0]} (written by a task)")

@@ -1,0 +1,120 @@
+"""What must hold among the tasks of a rack and its modules, beyond what each task's own check finds.
+
+Checks every task of a rack against the rack: its commons, and the tick of the Processor that runs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from automax_ros.blocks.catalogue import CATALOGUE
+from automax_ros.blocks.declare.declaration import Platform
+from automax_ros.compile.base.cost import PLATFORMS, Model
+from automax_ros.core.diagnostics import Diagnostic, SourceText, Span, has_errors, in_order
+from automax_ros.language.checks.checker import CheckResult, check
+from automax_ros.language.program import CommonSpec, Program
+from automax_ros.rackfile.checks.common_use import rack_warnings, writer_findings
+from automax_ros.rackfile.checks.drive_rules import drive_findings
+from automax_ros.rackfile.checks.interrupts import interrupt_findings
+from automax_ros.rackfile.checks.udc_rules import udc_findings
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.reading.files import FileFault, read_task_source
+from automax_ros.rackfile.sections.feeds import feed_findings
+
+
+class CheckedTask(NamedTuple):
+    """One task of a rack with what its check found; ``source`` is what the diagnostics refer to."""
+
+    task: TaskConfig
+    source: SourceText
+    result: CheckResult
+
+
+def commons_of(config: RackConfig) -> Mapping[str, CommonSpec]:
+    """Return the rack's common variables by full name, as the checker compares them with a task's COMMON."""
+    return {
+        variable.name: CommonSpec(
+            name=variable.name,
+            type=variable.type,
+            place=f"{config.path.name}:{variable.line}",
+            dimensions=variable.dimensions,
+            length=variable.length,
+            is_input=config.is_input(variable),
+        )
+        for variable in config.declared
+    }
+
+
+def check_tasks(config: RackConfig, sources: Mapping[str, SourceText] | None = None) -> list[CheckedTask]:
+    """Check all tasks of a rack, modules in the order of slots, tasks in the order of the file.
+
+    ``sources`` by the tasks' names stand for their files, which are not touched then. A source that could be read when
+    the rack file was loaded but cannot be any more is an error of its task (AMX6306).
+    """
+    commons = commons_of(config)
+    checked = [_checked(module, task, commons, config, sources) for module, task in config.placed_tasks]
+    programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
+    found = findings_by_task(config, programs)
+    return [item._replace(result=with_findings(item.result, found.get(item.task.name, ()))) for item in checked]
+
+
+def forgotten(config: RackConfig, checked: Sequence[CheckedTask]) -> list[Diagnostic]:
+    """Return what looks forgotten in the rack file, none as long as a task has errors and so may hide a use."""
+    programs = {item.task.name: item.result.program for item in checked if item.result.program is not None}
+    return rack_warnings(config, programs) if len(programs) == len(checked) else []
+
+
+def _checked(
+    module: ModuleConfig,
+    task: TaskConfig,
+    commons: Mapping[str, CommonSpec],
+    config: RackConfig,
+    sources: Mapping[str, SourceText] | None,
+) -> CheckedTask:
+    try:
+        source = read_task_source(task.file) if sources is None else sources[task.name]
+    except FileFault as fault:
+        place = SourceText(str(config.path), config.text)
+        gone = Diagnostic("AMX6306", f"the source {task.file.name} of task {task.name} {fault}", Span(task.line, 1, 2))
+        return CheckedTask(task, place, CheckResult(None, [gone]))
+    return CheckedTask(task, source, check_source(source, task.name, module.tick_ns, commons, module.times))
+
+
+def check_source(
+    source: SourceText,
+    name: str,
+    tick_ns: int,
+    commons: Mapping[str, CommonSpec],
+    model: Model = Model.NONE,
+) -> CheckResult:
+    """Check the text of one task against a rack's commons and the tick and model of the module that runs it."""
+    target = PLATFORMS.get(model, Platform.AUTOMAX)
+    return check(source, name=name, catalogue=CATALOGUE, target=target, tick_ns=tick_ns, commons=commons)
+
+
+def with_findings(result: CheckResult, findings: Sequence[Diagnostic]) -> CheckResult:
+    """Return a check's result with what the rack has against the task: no program where that is an error."""
+    if not findings:
+        return result
+    diagnostics = in_order([*result.diagnostics, *findings])
+    return replace(result, program=None if has_errors(findings) else result.program, diagnostics=diagnostics)
+
+
+Rule = Callable[[RackConfig, Mapping[str, Program]], Mapping[str, Sequence[Diagnostic]]]
+"""Returns what is wrong by the task in whose source it stands; it is given the programs without errors."""
+
+RULES: tuple[Rule, ...] = (interrupt_findings, udc_findings, drive_findings, feed_findings, writer_findings)
+"""All such rules."""
+
+
+def findings_by_task(config: RackConfig, programs: Mapping[str, Program]) -> dict[str, list[Diagnostic]]:
+    """Return what the rules find, by task."""
+    found: dict[str, list[Diagnostic]] = {}
+    for rule in RULES:
+        for name, diagnostics in rule(config, programs).items():
+            found.setdefault(name, []).extend(diagnostics)
+    return found

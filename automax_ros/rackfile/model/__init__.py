@@ -1,0 +1,1 @@
+"""What a rack file means, as frozen dataclasses."""

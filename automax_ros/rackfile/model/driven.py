@@ -1,0 +1,41 @@
+"""Which drive turns which plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.plants import PlantConfig
+
+
+@runtime_checkable
+class Driving(Protocol):
+    """A module with drives: ``plants`` are by drive, ``A`` and ``B`` of a UDC, "" where the module has only one."""
+
+    @property
+    def plants(self) -> Mapping[str, PlantConfig]: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class DrivenPlant:
+    """A plant that a drive turns: its name, the slot of the drive's module, and ``A`` or ``B`` of a UDC, else ""."""
+
+    config: PlantConfig
+    slot: int
+    drive: str = ""
+
+    @property
+    def name(self) -> str:
+        """The plant's name."""
+        return self.config.name
+
+
+def driven_plants(config: RackConfig) -> tuple[DrivenPlant, ...]:
+    """Return the simulated plants that drives turn, in the order of slots and drives."""
+    driving = (module for module in config.modules if isinstance(module, Driving))
+    found = (
+        DrivenPlant(plant, module.slot, drive) for module in driving for drive, plant in sorted(module.plants.items())
+    )
+    return tuple(item for item in found if item.config.motor is not None)

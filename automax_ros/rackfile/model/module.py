@@ -1,0 +1,133 @@
+"""A module as a rack file configures it: its registers, interrupts and tasks, whatever its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Protocol
+
+from automax_ros.compile.base.cost import CostModel, Model
+from automax_ros.rackfile.model.task import TaskConfig
+
+
+@dataclass(frozen=True)
+class Interrupt:
+    """An interrupt that a module raises while the rack has a common clock.
+
+    ``status`` is its interrupt status and control register (ISCR), which an EVENT names. ``period`` is the register
+    with the time between two, less one, in 0.5 ms; None where the module counts in a way of its own. ``inputs`` are
+    the registers that freeze at the interrupt. ``enable`` is a bit of ``status`` that must be set too, None where the
+    EVENT is enough.
+    """
+
+    status: int
+    period: int | None = None
+    inputs: range = range(0)
+    enable: int | None = None
+
+
+@dataclass(frozen=True)
+class Registers:
+    """The registers of a module: how many, and who writes them.
+
+    Tasks write ``outputs``. Of ``either`` a variable with ``ros: in`` is an input, any other what its task makes of it.
+    The rest are inputs, but for the ``reserved``: they are the module's own, and no point may stand there. ``reals``
+    are those on which REAL variables may stand. ``copies`` are pairs of a register and the input that shows the same;
+    ``clock_status`` pairs of an input and the bits that are set while there is a common
+    clock; ``counters`` are the first of two registers that count 24 bits. ``by_itself``: the module writes registers
+    without an interrupt too. ``shown`` are inputs that the module alone writes: neither ROS 2 nor a feed may.
+    ``commands`` are outputs that tasks alone write.
+    A module with drops has ``area`` registers for each, 0 being none, and points may stand on those of ``areas``.
+    """
+
+    count: int = 0
+    outputs: Collection[int] = range(0)
+    either: Collection[int] = range(0)
+    reserved: Collection[int] = range(0)
+    reals: Collection[int] = range(0)
+    interrupts: tuple[Interrupt, ...] = ()
+    copies: tuple[tuple[int, int], ...] = ()
+    clock_status: tuple[tuple[int, int], ...] = ()
+    counters: tuple[int, ...] = ()
+    by_itself: bool = False
+    shown: Collection[int] = range(0)
+    commands: Collection[int] = range(0)
+    area: int = 0
+    areas: Collection[int] = range(0)
+
+    @property
+    def writes(self) -> bool:
+        """Whether the module writes registers, and so is a writer of its own."""
+        return self.by_itself or bool(self.interrupts)
+
+    @property
+    def writable(self) -> Collection[int]:
+        """The registers that a task may write."""
+        if not self.either:
+            return self.outputs
+        return frozenset({*self.outputs, *self.either}) if self.outputs else self.either
+
+    def direction(self, register: int) -> str:
+        """Return in a word what a register is: ``input``, ``output`` or ``either``."""
+        if register in self.either:
+            return "either"
+        return "output" if register in self.outputs else "input"
+
+    def place(self, register: int) -> str:
+        """Return how messages name a register: by its number, or by its drop and its number there."""
+        if not self.area:
+            return f"register {register}"
+        return f"drop {register // self.area} register {register % self.area}"
+
+
+NO_REGISTERS = Registers()
+
+
+class ModuleConfig(Protocol):
+    """A module as a rack file configures it. Its kind (``rack/modules``) has the rest.
+
+    ``name`` is unique in the rack and that of its node; ``tick_ns`` is that of its tasks, 0 where it can have none;
+    ``common_registers`` is how many 16-bit registers of common variables it can hold, 0 for none.
+    """
+
+    @property
+    def slot(self) -> int: ...  # noqa: D102
+
+    @property
+    def model(self) -> str: ...  # noqa: D102
+
+    @property
+    def line(self) -> int: ...  # noqa: D102
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def tick_ns(self) -> int: ...  # noqa: D102
+
+    @property
+    def tasks(self) -> tuple[TaskConfig, ...]: ...  # noqa: D102
+
+    @property
+    def registers(self) -> Registers: ...  # noqa: D102
+
+    @property
+    def common_registers(self) -> int: ...  # noqa: D102
+
+    @property
+    def has_battery(self) -> bool: ...  # noqa: D102
+
+    @property
+    def keeps_locals(self) -> bool:
+        """Whether its tasks keep their locals at STOP ALL and without power (2.4.5)."""
+        ...
+
+    @property
+    def times(self) -> Model:
+        """Whose execution times its tasks have, Model.NONE for a module without tasks."""
+        ...
+
+
+def cost_model(module: ModuleConfig) -> CostModel:
+    """Return what times the tasks of a module have; a UDC with one task has others than one with two (table 5)."""
+    return CostModel(module.times, alone=len(module.tasks) == 1)

@@ -1,0 +1,174 @@
+"""What the ``plants`` section of a rack file means; engineering units as in the file.
+
+``line`` is the line of the file where a plant is defined, ``supply`` its AC line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from automax_ros.core.json_schema import Schema, named
+from automax_ros.drive.base.nameplate import EXAMPLES, NamePlate
+from automax_ros.drive.plant.coupling import CouplingData
+from automax_ros.drive.plant.overspeed import FULL
+from automax_ros.rackfile.reading.scale import Scale
+
+PLANT_NAME = r"[A-Z][A-Z0-9_]{0,15}"
+"""A plant's name, as a pattern."""
+MOTORS = {"dc_10hp_240v": "10hp", "dc_150hp_500v": "150hp", "dc_800hp_700v": "800hp"}
+"""Motors that a plant may have by name, each with its name in ``drive/base/nameplate``."""
+
+
+def plant_name(text: str) -> Schema:
+    """Return the schema of a value that names a plant; ``text`` says for what."""
+    return named(text, f"^{PLANT_NAME.replace('A-Z', 'A-Za-z')}$")
+
+
+@dataclass(frozen=True)
+class SupplyConfig:
+    """The AC line of a plant; None is the usual value for its motor.
+
+    Attributes:
+        v_ll: line-to-line voltage, V rms.
+        hz: frequency, Hz.
+        ls_mh: source inductance of a phase, mH.
+        rs_mohm: source resistance of a phase, milliohm.
+        standard: whether the phases pass in the standard order C, B, A (52.1.5).
+    """
+
+    v_ll: float | None = None
+    hz: float | None = None
+    ls_mh: float | None = None
+    rs_mohm: float | None = None
+    standard: bool = True
+
+
+@dataclass(frozen=True)
+class LoadConfig:
+    """What a plant's motor turns.
+
+    Attributes:
+        torque_nm: a torque that keeps its direction at any speed, N m; positive brakes positive speed.
+        torque_per_rpm: pairs of rpm and N m, rpm ascending; () for none.
+        friction_nm: Coulomb friction, N m.
+        speed_rpm: the speed at which the shaft is held, 0 for a locked rotor; None for a shaft that turns.
+        from_ros: whether ROS 2 may set ``torque_nm``.
+    """
+
+    torque_nm: float = 0.0
+    torque_per_rpm: tuple[tuple[float, float], ...] = ()
+    friction_nm: float = 0.0
+    speed_rpm: float | None = None
+    from_ros: bool = False
+
+
+@dataclass(frozen=True)
+class CoupleConfig:
+    """What a plant's shaft is coupled to: the plant of a name, and how; ``line`` is the line of the file."""
+
+    to: str
+    data: CouplingData
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class PlantConfig:
+    """A plant.
+
+    Attributes:
+        name: its name.
+        motor: a name of ``MOTORS`` or a plate; None for a plant of which only the drive's parameters are known, which
+            is not simulated.
+        motor_overload_ratio: that of its drive, %.
+        line: the line of the file.
+        supply: the AC line.
+        load: what the motor turns.
+        inertia: inertia of motor and load over the motor's own.
+        couple: what its shaft is coupled to, None for nothing, or where the other plant says so.
+        joint: what ROS calls its shaft; "" where that is the plant's name.
+    """
+
+    name: str
+    motor: str | NamePlate | None = None
+    motor_overload_ratio: int | None = None
+    line: int = 0
+    supply: SupplyConfig = field(default_factory=SupplyConfig)
+    load: LoadConfig = field(default_factory=LoadConfig)
+    inertia: float = 1.0
+    couple: CoupleConfig | None = None
+    joint: str = ""
+
+    @property
+    def joint_name(self) -> str:
+        """What ROS calls its shaft."""
+        return self.joint or self.name
+
+    @property
+    def line_hz(self) -> float | None:
+        """Frequency of its AC line, Hz; None without a motor."""
+        plate = self.plate
+        return self.supply.hz if self.supply.hz is not None or plate is None else plate.line_hz
+
+    @property
+    def plate(self) -> NamePlate | None:
+        """The motor's plate, None without a motor."""
+        if self.motor is None:
+            return None
+        return self.motor if isinstance(self.motor, NamePlate) else EXAMPLES[MOTORS[self.motor]]
+
+
+@dataclass(frozen=True)
+class JointCommand:
+    """A common that commands of ros2_control write.
+
+    Attributes:
+        plant: the plant's name.
+        joint: the name of its joint.
+        interface: ``velocity`` or ``effort``.
+        common: the variable's full name.
+        scale: what counts of an INTEGER mean, in rpm or N m; None for a REAL, which has these itself.
+        line: the line of the file.
+    """
+
+    plant: str
+    joint: str
+    interface: str
+    common: str
+    scale: Scale | None = None
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class FeedConfig:
+    """A signal of a plant that an instrument brings into a common.
+
+    Attributes:
+        plant: the plant's name.
+        common: the variable's full name.
+        element: which element of it.
+        signal: a name of ``drive/plant/signals.SIGNALS``.
+        every_ns: how often, ns.
+        scale: what counts of an INTEGER mean, None for a REAL, which has the signal itself.
+        line: the line of the file.
+    """
+
+    plant: str
+    common: str
+    element: int
+    signal: str
+    every_ns: int
+    scale: Scale | None = None
+    line: int = 0
+
+
+def full_speeds(feeds: Iterable[FeedConfig]) -> dict[str, float]:
+    """Return by plant the speed (rpm) that its tachometer shows as 4095, of those whose feed brings it in counts.
+
+    A plant with several such feeds has that of the first (decision).
+    """
+    found: dict[str, float] = {}
+    for feed in feeds:
+        if feed.signal == "tach_rpm" and feed.scale is not None:
+            found.setdefault(feed.plant, abs(feed.scale.value_of(FULL)))
+    return found

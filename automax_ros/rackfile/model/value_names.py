@@ -1,0 +1,97 @@
+"""Texts ``TASK.NAME=VALUE`` against the tunables of a rack's tasks.
+
+Values and names that a person gives on a command line, against a rack's common variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from automax_ros.core.kinds import Direction
+from automax_ros.core.names import PREDEFINED, Element, NameFault, element
+from automax_ros.core.names import setting as core_setting
+from automax_ros.core.names import setting as named_setting
+from automax_ros.core.types import DataType, Value, bare_name
+from automax_ros.language.program import Program, Symbol, lines_that_write
+from automax_ros.rackfile.model.config import CommonElement, RackConfig
+
+DEFAULT_WATCHED = 5
+"""How many variables a status line shows when nobody chose any."""
+_ABSENT = "the rack has no common variable"
+
+
+def setting(config: RackConfig, text: str) -> tuple[str, Value]:
+    """Return the name and value of ``NAME=VALUE``; the name may be that of an array's element.
+
+    Raises:
+        Fault: not of that form, no such common, the value does not fit, or the rack itself writes that common (2.4.6).
+    """
+    meant, value = core_setting(text, config.by_name, _ABSENT)
+    if meant.name in PREDEFINED:
+        raise NameFault(f"{meant.name} cannot be set: the rack itself writes it", "leave it out")
+    return meant.label, value
+
+
+def watched(
+    config: RackConfig, names: Sequence[str] | None, programs: Iterable[Program] = ()
+) -> Sequence[CommonElement]:
+    """Return what the given names mean, such as ``REF%`` and ``TABLE%(3)``; without names what the rack file watches.
+
+    Where it says nothing either, these are the first published commons that control-block tasks among ``programs``
+    write, and after them the first others: a panel's push-buttons stand first in many files, and say least.
+
+    Raises:
+        NameFault: there is no such simple common or element.
+    """
+    if names is not None:
+        return [common_named(config, name) for name in names]
+    if config.watch is not None:
+        return config.watch
+    written = {name for program in programs if not program.is_basic for name in lines_that_write(program)}
+    published = [
+        variable
+        for variable in config.variables
+        if variable.direction is not Direction.CLOSED and not variable.is_array and variable.type is not DataType.STRING
+    ]
+    published.sort(key=lambda variable: variable.name not in written)
+    return [Element(variable) for variable in published[:DEFAULT_WATCHED]]
+
+
+def common_named(config: RackConfig, name: str) -> CommonElement:
+    """Return the simple common or the element of an array that a name means.
+
+    Raises:
+        NameFault: there is none.
+    """
+    return element(name, config.by_name, _ABSENT)
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """A value for a tunable of a task, named with its type character."""
+
+    task: str
+    name: str
+    value: Value
+
+
+def tunables_of(program: Program) -> dict[str, Symbol]:
+    """Return the tunables of a task by their full names."""
+    return {full: symbol for full, symbol in program.symbols.items() if symbol.tuning is not None}
+
+
+def tuning(programs: Mapping[str, Program], text: str) -> Tuning:
+    """Return what a text gives a tunable of one of the tasks, whose type character may be left out.
+
+    Raises:
+        Fault: the task has none of that name, or the value is not of its type.
+        KeyError: there is no such task.
+    """
+    owner, _, value = text.partition("=")
+    task, _, name = owner.strip().upper().partition(".")
+    tunables = tunables_of(programs[task])
+    bare = {bare_name(full): full for full in tunables}
+    full = name if name in tunables else bare.get(name, name)
+    meant, found = named_setting(f"{full}={value}", tunables, f"task {task} has no tunable")
+    return Tuning(task, meant.label, found)

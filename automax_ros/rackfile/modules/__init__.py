@@ -1,0 +1,1 @@
+"""The kinds of module that a rack file may name, and their configurations."""

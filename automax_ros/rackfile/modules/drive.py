@@ -1,0 +1,149 @@
+"""The drive analog I/O module 57C405: the armature voltage that fast bridge change needs (52.6.1).
+
+``drive`` is the slot of the 57C406 whose armature voltage a transformer of 52.6.1 brings to connector P4. Its nominal
+voltage is the one nearest to that of the plant's line (decision). Register 0 shows the signal, 4095 counts at 10 V,
+clamped there: at each interrupt of the 57C406, every 5.5 ms while there is none. The other registers are inputs from
+outside. No source gives these registers (decision). Without ``drive`` there is no signal: register 0 is an input like
+the others.
+
+The 57C406 as a rack file configures it: its slot, and the plant that it drives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import Keys, whole
+from automax_ros.rackfile.model.config import MAX_SLOT
+from automax_ros.rackfile.model.module import Registers
+from automax_ros.rackfile.model.plants import plant_name
+from automax_ros.rackfile.modules.io import IoModel, WithoutTasks
+from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.reading.values import integer_value
+
+if TYPE_CHECKING:
+    from automax_ros.rackfile.model.plants import PlantConfig
+
+
+TACH_THRESHOLD, PHASE_STEP, PERIOD_STEP, OPTIONS = 4136, 4137, 4138, 4146
+"""The registers that an application may write (52.7)."""
+DEFAULTS = {TACH_THRESHOLD: 109, PHASE_STEP: 4, PERIOD_STEP: 2, OPTIONS: 0}
+"""What initialisation of the CML task writes to them (52.4.1, 52.5.1, 52.6.2, 52.7)."""
+ACCESS_NS = 5_000
+"""By how much an access of the application delays the microprocessor, ns (52.7, decision: no manual says how much)."""
+_COUNT = max(DEFAULTS) + 1
+_REGISTERS = Registers(
+    _COUNT,
+    outputs=frozenset(DEFAULTS),
+    reserved=frozenset(range(_COUNT)) - frozenset(DEFAULTS),
+    by_itself=True,
+)
+
+
+@dataclass(frozen=True)
+class DriveConfig(WithoutTasks):
+    """A 57C406; without a ``plant`` it has registers and switches only, and its loop sees no line."""
+
+    slot: int
+    model: str
+    plant: PlantConfig | None = None
+    line: int = 0
+
+    registers: Registers = _REGISTERS
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"drive_{self.slot}"
+
+    @property
+    def plants(self) -> Mapping[str, PlantConfig]:
+        """The plant of its one drive."""
+        return {} if self.plant is None else {"": self.plant}
+
+
+class DriveControllerKind:
+    """What a rack file may say of a 57C406."""
+
+    word = "drive I/O controller"
+    table: Mapping[str, IoModel] = MappingProxyType({"57C406": IoModel("drive I/O controller module", _REGISTERS)})
+    models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
+    options: Keys = MappingProxyType({"plant": plant_name("The plant that the module drives.")})
+
+    def read(self, found: FoundModule) -> DriveConfig:
+        """Read the plant."""
+        node = found.section.get("plant")
+        what = f"plant of {found.where}"
+        plant = None if node is None else found.plants.claim(node, what)
+        if node is not None and plant is not None and plant.motor is None and not found.findings.errors:
+            found.findings.add("AMX6522", f"{what}: the plant {plant.name} has no motor", node.span)
+        return DriveConfig(found.slot, found.model, plant, found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Find nothing wrong: no source tells of a slot where a 57C406 may not stand."""
+
+
+DRIVE_CONTROLLER = DriveControllerKind()
+
+
+_ANALOG_REGISTERS = Registers(4, by_itself=True)
+
+
+@dataclass(frozen=True)
+class DriveAnalogConfig(WithoutTasks):
+    """A 57C405; ``drive`` is the slot of the 57C406 to whose armature it is wired."""
+
+    slot: int
+    model: str
+    drive: int | None = None
+    line: int = 0
+    drive_span: Span | None = field(default=None, compare=False)
+
+    registers: Registers = _ANALOG_REGISTERS
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"drive_analog_{self.slot}"
+
+
+class DriveAnalogKind:
+    """What a rack file may say of a 57C405."""
+
+    word = "drive analog I/O"
+    table: Mapping[str, IoModel] = MappingProxyType({"57C405": IoModel("drive analog I/O module", _ANALOG_REGISTERS)})
+    models: Mapping[str, str] = MappingProxyType({number: model.title for number, model in table.items()})
+    options: Keys = MappingProxyType(
+        {"drive": whole("Slot of the 57C406 whose armature voltage is wired to it.", 0, MAX_SLOT)}
+    )
+
+    def read(self, found: FoundModule) -> DriveAnalogConfig:
+        """Read which drive it is wired to."""
+        node = found.section.get("drive")
+        what = f"drive of {found.where}"
+        drive = None if node is None else integer_value(node, what, found.findings, low=0, high=15, code="AMX6520")
+        return DriveAnalogConfig(found.slot, found.model, drive, found.span.line, node.span if node else None)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report a drive that is not there, and one that has two of these modules."""
+        controllers = {item.slot for item in rack.of(DRIVE_CONTROLLER)}
+        wired: dict[int, Span] = {}
+        for module in rack.modules:
+            if not isinstance(module, DriveAnalogConfig) or module.drive is None or module.drive_span is None:
+                continue
+            drive, span = module.drive, module.drive_span
+            if drive in wired:
+                message = f"the armature voltage of the drive in slot {drive} goes to another 57C405 already"
+                rack.findings.add("AMX6521", message, span, notes=(Note("that one is wired here", wired[drive]),))
+            elif drive in controllers or not rack.complete:
+                wired[drive] = span
+            else:
+                hint = "name the slot of the 57C406 whose armature is wired to connector P4"
+                rack.findings.add("AMX6520", f"slot {drive} holds no 57C406", span, hint)
+
+
+DRIVE_ANALOG = DriveAnalogKind()

@@ -1,0 +1,180 @@
+"""The pulsetach input module 57C421: a 24-bit counter, a comparator, a timer interrupt (57C421B manual p. 4-4, 4-5).
+
+The counter is in the registers 0 and 1, high word first with its sign extended, to be read as a DOUBLE INTEGER; the
+update period in 2, (value + 1) x 0.5 ms; the comparator in 3 and 4, like the counter; the interrupt status and control
+register is 5, with the timer interrupt enable in bit 5, 6 defines the mode, 7 is the module's status. No source says
+what 6 and 7 hold, nor what the comparator does when it is reached: 6 can be written and does nothing, 7 stays 0, and
+the comparator is a place for a number (decision). The counter comes from outside and keeps its low 24 bits, as a
+counter that runs over does (decision).
+
+What all I/O modules have in common: registers that stand in a table, no keys of their own, no tasks, any slot.
+
+Digital input and output modules: registers of 16 points.
+
+No source at hand gives their register maps; these are ours (decision): a 57C402 or 57C403 has 16 outputs in register 0,
+a 57C408 16 inputs in register 0 and 16 outputs in register 1. Of a drive's 57C408 bit 0 of the inputs is the run
+permissive and bit 1 the external instantaneous electronic trip (IET, TRUE trips); bits 0, 1 and 2 of the outputs are
+FMCR, RMCR and drive OK, which its 57C406 sets at each CML scan (decision). A 57C419 has 32 inputs in the registers 0
+and 1, which freeze at its interrupt (4.0), its interrupt status and control register in 2 and its update period in 3.
+
+Analog modules: two inputs (57C409) or four outputs (57C410), 4095 counts at full scale (57C409 manual p. 3-3).
+
+A 57C409 has its two inputs in the registers 0 and 1, their status in 4 and a control register for each in 5 and 6; that
+2 and 3 are their update periods is ours (decision). Each channel has an interrupt, at which its input freezes. The
+module drives the common clock while bit 6 is set in one of the control registers, of which the manual sets both
+(decision). The registers of a 57C410 are ours too (decision): four outputs in 0 to 3.
+
+The resolver input module 57C411: position, position at the external strobe, interrupt (57C411 manual p. 4-1).
+
+Register 0 is the position, 1 that at the last edge of EXTERNAL STROBE, 2 a copy of the interrupt status and control
+register 3, 4 the update period. The unit of the period is ours, after the 57C421: 0.5 ms, less one (decision). What
+stands in the registers 0 and 1 comes from outside, as the converter would give it: bits 2 to 13 within a turn, 14 and
+15 turns. No source says of bit 12 of register 3: it can be set and does nothing (decision).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Protocol, runtime_checkable
+
+from automax_ros.compile.base.cost import Model
+from automax_ros.core.json_schema import Keys
+from automax_ros.rackfile.model.module import Interrupt, Registers
+from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+
+
+class WithoutTasks:
+    """What the configuration of a module says that runs no tasks and holds no common variables of its own."""
+
+    tick_ns = 0
+    times = Model.NONE
+    has_battery = False
+    keeps_locals = True
+    common_registers = 0
+
+    @property
+    def tasks(self) -> tuple[TaskConfig, ...]:
+        """No tasks."""
+        return ()
+
+
+@dataclass(frozen=True)
+class IoConfig(WithoutTasks):
+    """An I/O module in any slot; ``node`` begins its name."""
+
+    slot: int
+    model: str
+    node: str
+    registers: Registers
+    line: int = 0
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"{self.node}_{self.slot}"
+
+
+@dataclass(frozen=True)
+class IoModel:
+    """One catalogue number: what the module is, and its registers."""
+
+    title: str
+    registers: Registers
+
+
+@runtime_checkable
+class HasTable(Protocol):
+    """A kind of module whose catalogue numbers each have registers of their own."""
+
+    @property
+    def table(self) -> Mapping[str, IoModel]: ...  # noqa: D102
+
+
+@dataclass(frozen=True, eq=False)
+class IoKind:
+    """A kind of module of which a rack file says nothing but its number and its slot."""
+
+    word: str
+    node: str
+    table: Mapping[str, IoModel]
+    models: Mapping[str, str] = field(init=False)
+    options: Keys = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Derive what the other kinds say for themselves."""
+        titles = {number: model.title for number, model in self.table.items()}
+        object.__setattr__(self, "models", MappingProxyType(titles))
+
+    def read(self, found: FoundModule) -> IoConfig:
+        """Read the section, which has no keys of its own."""
+        return IoConfig(found.slot, found.model, self.node, self.table[found.model].registers, found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Find nothing wrong: no source tells of a slot where these modules may not stand."""
+
+
+DRIVE_MODEL = "57C408"
+"""The drive digital I/O module."""
+DRIVE_INPUTS, DRIVE_OUTPUTS = 0, 1
+"""The registers of a drive's 57C408."""
+PERMISSIVE_BIT, EXTERNAL_TRIP_BIT = 0, 1
+FMCR_BIT, RMCR_BIT, DRIVE_OK_BIT = 0, 1, 2
+_OUTPUTS = Registers(1, outputs=range(1))
+_DRIVE = Registers(2, outputs=range(1, 2))
+_INPUTS = Registers(4, outputs=range(2, 4), interrupts=(Interrupt(status=2, period=3, inputs=range(2)),))
+
+DIGITAL_IO = IoKind(
+    "digital I/O",
+    "digital_io",
+    {
+        "57C402": IoModel("digital output module", _OUTPUTS),
+        "57C403": IoModel("digital output module", _OUTPUTS),
+        DRIVE_MODEL: IoModel("drive digital I/O module", _DRIVE),
+        "57C419": IoModel("32-channel digital input module", _INPUTS),
+    },
+)
+
+
+_ANALOG_INPUTS = Registers(
+    7,
+    outputs=frozenset({2, 3, 5, 6}),
+    interrupts=(
+        Interrupt(status=5, period=2, inputs=range(1)),
+        Interrupt(status=6, period=3, inputs=range(1, 2)),
+    ),
+    clock_status=((4, 0x0500),),
+)
+
+ANALOG_IO = IoKind(
+    "analog I/O",
+    "analog_io",
+    {
+        "57C409": IoModel("2-channel analog input module", _ANALOG_INPUTS),
+        "57C410": IoModel("analog output module", Registers(4, outputs=range(4))),
+    },
+)
+
+
+_RESOLVER_REGISTERS = Registers(
+    5,
+    outputs=range(3, 5),
+    interrupts=(Interrupt(status=3, period=4, inputs=range(2)),),
+    copies=((3, 2),),
+)
+
+RESOLVER = IoKind("resolver input", "resolver", {"57C411": IoModel("resolver input module", _RESOLVER_REGISTERS)})
+
+
+TIMER_ENABLE = 5
+"""The bit of register 5 without which there is no timer interrupt."""
+_COUNTER_REGISTERS = Registers(
+    8,
+    outputs=range(2, 7),
+    interrupts=(Interrupt(status=5, period=2, inputs=range(2), enable=TIMER_ENABLE),),
+    counters=(0,),
+)
+
+PULSETACH = IoKind("pulsetach input", "pulsetach", {"57C421": IoModel("pulsetach input module", _COUNTER_REGISTERS)})

@@ -1,0 +1,197 @@
+"""Network modules as a rack file configures them: 57C404, with the network's name, its drop and how many it represents.
+
+```yaml
+12: {module: 57C404, network: PAPER, drop: 3, depth: 2}
+```
+
+Drop 0 is the network's one master, 1 to 55 are slaves. ``depth`` says on which drops variables of a slave may stand;
+the depth with which the module communicates is that of its register 20, which a task writes (57C570 manual p. 18-7).
+Racks that name the same network in one ROS 2 domain, below the same namespace, are on one cable (decision).
+
+The registers of a network module 57C404: 56 drop areas of 64 registers (57C570 manual p. 18-4 to 18-7).
+
+Register 64 x drop + n of the module is register n of the drop's area, for IOREAD% and IOWRITE too (decision). Of the
+area of a drop, 0 to 31 go from its slave to the master and 32 to 63 from the master to its slave. The area of drop 0
+is the module's status; 32 to 39 of it are broadcast, written in the master and read in every slave. That the 57C404
+has the map that is printed for the network part of a 57C570 is ours (decision); the manual of the 57C445 says the same
+of its drops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import Keys, named, whole
+from automax_ros.core.text import quoted
+from automax_ros.core.yaml_text import Node
+from automax_ros.rackfile.model.module import Registers
+from automax_ros.rackfile.modules.io import WithoutTasks
+from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.reading.names import RACK_NAME, is_rack_name
+from automax_ros.rackfile.reading.values import Findings, integer_value, text_value
+
+AREA = 64
+"""Registers of the area of one drop."""
+HALF = 32
+"""Registers that go one way; those from the master come second."""
+MASTER = 0
+"""The drop of the master."""
+LAST_DROP = 55
+COUNT = AREA * (LAST_DROP + 1)
+
+STATUS = range(4, 8)
+"""Which drops communicate: drops 0 to 15 in the bits of the first, and so on."""
+OWN_DROP, RECEIVED, TIMEOUTS, CRC_ERRORS, OVERRUNS, TRANSMITTED, DEPTH = 12, 14, 15, 16, 17, 19, 20
+"""Further registers of the area of drop 0; 18, abort errors, stays 0: nothing in DDS is like it (decision)."""
+ABORTS = 18
+VALID = 0x8000
+"""The bit of ``OWN_DROP`` of a module whose drop number is valid."""
+DONE, INVALID = 0x8000, 0x4000
+"""Bits of ``DEPTH``: it was processed; it was wrong, and the last good one is used."""
+BROADCAST = range(32, 40)
+_SHOWN = (*STATUS, OWN_DROP, RECEIVED, TIMEOUTS, CRC_ERRORS, OVERRUNS, ABORTS, TRANSMITTED)
+
+
+def greatest_depth(drop: int) -> int:
+    """Return the most drops that the slave at a drop can represent (p. 18-7)."""
+    return LAST_DROP + 1 - drop
+
+
+def from_slave(drop: int) -> range:
+    """Return the registers of a drop that its slave writes."""
+    return range(AREA * drop, AREA * drop + HALF)
+
+
+def from_master(drop: int) -> range:
+    """Return the registers of a drop that the master writes, those of drop 0 being ``BROADCAST`` and reserved ones."""
+    return range(AREA * drop + HALF, AREA * (drop + 1))
+
+
+def registers_of(drop: int, depth: int) -> Registers:
+    """Return the registers as the module of a drop has them, of a slave with ``depth`` drops.
+
+    No point can stand on a register that the manual calls reserved, nor in a slave on drops that are not its own
+    (decision: only the master has the areas of all drops).
+    """
+    own = range(drop, drop + depth)
+    if drop == MASTER:
+        areas = range(1, LAST_DROP + 1)
+        outputs = {number for area in areas for number in from_master(area)} | set(BROADCAST)
+        shown = frozenset(_SHOWN)
+    else:
+        areas = own
+        outputs = {number for area in areas for number in from_slave(area)} | {DEPTH}
+        shown = frozenset({*_SHOWN, *BROADCAST})
+    data = {number for area in areas for number in range(AREA * area, AREA * (area + 1))}
+    used = data | outputs | shown
+    return Registers(
+        COUNT,
+        outputs=frozenset(outputs),
+        reserved=frozenset(range(COUNT)) - used,
+        by_itself=True,
+        shown=shown,
+        area=AREA,
+        areas=frozenset({0, *areas}),
+    )
+
+
+@dataclass(frozen=True)
+class NetworkConfig(WithoutTasks):
+    """A 57C404: the ``network`` whose cable it is on, its ``drop``, and on how many drops variables may stand."""
+
+    slot: int
+    model: str
+    network: str
+    drop: int
+    depth: int = 1
+    line: int = 0
+    span: Span | None = field(default=None, compare=False)
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"network_{self.slot}"
+
+    @cached_property
+    def registers(self) -> Registers:
+        """Its registers, as its drop has them."""
+        return registers_of(self.drop, self.depth)
+
+    @property
+    def drops(self) -> range:
+        """The drops that it may represent."""
+        return range(self.drop, self.drop + self.depth)
+
+
+class NetworkKind:
+    """What a rack file may say of a 57C404."""
+
+    word = "network module"
+    models: Mapping[str, str] = MappingProxyType({"57C404": "DCS-NET network communications module"})
+    options: Keys = MappingProxyType(
+        {
+            "network": named("Name of the network that its cable is part of.", RACK_NAME),
+            "drop": whole("Its place on the network; 0 is the master.", MASTER, LAST_DROP),
+            "depth": whole("On how many drops, from its own on, its variables may stand.", 1, LAST_DROP, 1),
+        }
+    )
+
+    def read(self, found: FoundModule) -> NetworkConfig | None:
+        """Read network, drop and depth."""
+        section, findings = found.section, found.findings
+        if not section.require(("network", "drop"), found.where, found.span, findings):
+            return None
+        network, drop = section.get("network"), section.get("drop")
+        assert network is not None
+        assert drop is not None
+        name = _network_name(network, f"network of {found.where}", findings)
+        number = integer_value(drop, f"drop of {found.where}", findings, low=MASTER, high=LAST_DROP, code="AMX6561")
+        if name is None or number is None:
+            return None
+        depth = _depth(section.get("depth"), number, found)
+        return (
+            None
+            if depth is None
+            else NetworkConfig(found.slot, found.model, name, number, depth, found.span.line, drop.span)
+        )
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report two modules of the rack that represent one drop of a network (57C570 manual p. 18-7)."""
+        own = [module for module in rack.modules if isinstance(module, NetworkConfig)]
+        for index, module in enumerate(own):
+            for other in own[:index]:
+                both = sorted({*module.drops} & {*other.drops})
+                if both and other.network == module.network and module.span is not None and other.span is not None:
+                    message = f"drop {both[0]} of network {module.network} is that of the 57C404 in slot {other.slot}"
+                    notes = (Note("that one is here", other.span),)
+                    rack.findings.add("AMX6563", message, module.span, "give each module drops of its own", notes)
+
+
+NETWORK = NetworkKind()
+
+
+def _network_name(node: Node, what: str, findings: Findings) -> str | None:
+    text = text_value(node, what, findings, limit=100)
+    if text is None:
+        return None
+    name = findings.upper_case(text, node.span)
+    if not is_rack_name(name):
+        message = f"{what} is {quoted(text)}; a network's name has 1 to 8 letters and digits"
+        findings.add("AMX6560", message, node.span, "for example PAPER, or the letter that the plant's drawings have")
+        return None
+    return name
+
+
+def _depth(node: Node | None, drop: int, found: FoundModule) -> int | None:
+    if node is None:
+        return 1
+    if drop == MASTER:
+        message = f"{found.where} is the master, drop 0: it has no depth"
+        found.findings.add("AMX6561", message, node.span, "depth is how many drops a slave represents: leave it out")
+        return None
+    high = greatest_depth(drop)
+    return integer_value(node, f"depth of {found.where}", found.findings, low=1, high=high, code="AMX6561")

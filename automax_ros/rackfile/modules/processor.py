@@ -1,0 +1,182 @@
+"""AutoMax Processors: each runs up to 32 tasks on a tick of its own (J2-3106-1 p. 2-5, 10-1).
+
+The AutoMax PC3000: a Processor on a card of its own in a personal computer, a rack without a backplane.
+
+The card is the Processor/Scanner module 57C560; a 57C570 is an enclosure with one in it. The Serial module 57C565 is no
+Processor (1.3). It is written as the only module of a rack, in slot 0, though the hardware has none (decision). It
+holds its common variables itself; no I/O module can stand next to it, so there are neither points nor interrupts,
+hardware events and current minor loops (J-3675 p. 6-17). Its times are those of table 6.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from automax_ros.compile.base.cost import Model
+from automax_ros.core.json_schema import Keys, steps
+from automax_ros.core.ticks import DEFAULT_TICK_NS, MAX_TICK_NS, MIN_TICK_NS, NS_PER_MS, TICK_STEP_NS, tick_ns
+from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.rackfile.model.module import NO_REGISTERS, Registers
+from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.modules.common_memory import COMMON_MEMORY
+from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.reading.executive import OLDEST, tick_fault, version_text
+from automax_ros.rackfile.reading.values import wrong_kind
+from automax_ros.rackfile.sections.tasks import PRIORITIES, tasks_schema
+
+MAX_PROCESSORS = 4
+"""Processors of one rack (J2-3106-1 p. 2-5)."""
+_COMMON_REGISTERS = 65536
+"""Registers for commons where a Processor works alone (decision: as many as the 57C413 has)."""
+_TICKS_MS = tuple(time / NS_PER_MS for time in (MIN_TICK_NS, MAX_TICK_NS, TICK_STEP_NS, DEFAULT_TICK_NS))
+_TICK = re.compile(r"[0-9]{1,6}(\.[0-9]{1,9})?\Z")
+_SINCE = {"57C435": 30}
+"""The first version of the Executive with a module, in tenths, where that is not the oldest (1.1)."""
+_SLOTS = range(1, 5)
+"""Where Processors stand next to a common memory module (J2-3106-1 p. 10-2)."""
+
+
+@dataclass(frozen=True)
+class ProcessorConfig:
+    """A Processor module; ``model`` is its number as the manuals write it (``57C430A``), tasks in the file's order."""
+
+    slot: int
+    model: str
+    tick_ns: int
+    tasks: tuple[TaskConfig, ...] = ()
+    line: int = 0
+
+    has_battery = True
+    keeps_locals = True
+    registers: Registers = NO_REGISTERS
+    common_registers = _COMMON_REGISTERS
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"processor_{self.slot}"
+
+    @property
+    def times(self) -> Model:
+        """Whose execution times its tasks have."""
+        return Model(self.model)
+
+
+class ProcessorKind:
+    """What a rack file may say of a Processor."""
+
+    word = "processor"
+    models = {"57C430A": "6010", "57C431": "6011", "57C435": "7010"}  # noqa: RUF012
+    options: Keys = MappingProxyType(
+        {
+            "tick_ms": steps("Tick rate in ms; the scan time of a task is its TICKS times this.", *_TICKS_MS),
+            "tasks": tasks_schema(PRIORITIES),
+        }
+    )
+
+    def read(self, found: FoundModule) -> ProcessorConfig:
+        """Read tick and tasks."""
+        _check_model(found)
+        tick = _tick(found.section.get("tick_ms"), found)
+        tasks = found.section.get("tasks")
+        read = found.tasks.read(tasks, found.where) if tasks else ()
+        return ProcessorConfig(found.slot, found.model, tick, read, found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report too few or too many Processors, and those in other slots than 1 to 4, or 0 for a Processor alone."""
+        own = rack.of(self)
+        if not rack.complete:
+            return
+        has_memory = any(item.slot == 0 for item in rack.of(COMMON_MEMORY))
+        if not any(isinstance(item.kind, ProcessorKind) for item in rack.standing):
+            hint = f"Processors are {', '.join(self.models)}"
+            rack.findings.add("AMX6209", "the rack has no Processor", rack.span, hint)
+        elif len(own) > MAX_PROCESSORS:
+            message = f"the rack has {len(own)} Processors; it may have at most {MAX_PROCESSORS}"
+            rack.findings.add("AMX6207", message, own[MAX_PROCESSORS].span)
+        elif len(own) > 1 and not has_memory:
+            message = "more than one Processor needs a common memory module in slot 0"
+            hint = f"put {' or '.join(COMMON_MEMORY.models)} into slot 0 and the Processors into slots 1 to 4"
+            rack.findings.add("AMX6205", message, own[1].span, hint)
+        else:
+            allowed = _SLOTS if has_memory else range(1)
+            where = "slots 1 to 4 next to common memory" if has_memory else "slot 0 of a rack without common memory"
+            for item in own:
+                if item.slot not in allowed:
+                    message = f"a Processor stands in {where}, not in slot {item.slot}"
+                    rack.findings.add("AMX6206", message, item.span)
+
+
+PROCESSOR = ProcessorKind()
+
+
+def _tick(node: Node | None, found: FoundModule) -> int:
+    if node is None:
+        return DEFAULT_TICK_NS
+    if not isinstance(node, Scalar) or not node.plain or not _TICK.match(node.text):
+        wrong_kind(node, f"tick_ms of {found.where}", "a number of milliseconds such as 5.5", found.findings)
+        return DEFAULT_TICK_NS
+    try:
+        tick = tick_ns(node.text)
+    except ValueError as error:
+        found.findings.add("AMX6210", f"{found.where}: {error}", node.span)
+        return DEFAULT_TICK_NS
+    fault = tick_fault(found.executive, tick)
+    if fault is not None:
+        found.findings.add("AMX6702", f"{found.where}: {fault}", node.span)
+    return tick
+
+
+def _check_model(found: FoundModule) -> None:
+    since = _SINCE.get(found.model, OLDEST)
+    if found.executive < since:
+        message = f"{found.where} needs executive {version_text(since)} or later, not {version_text(found.executive)}"
+        found.findings.add("AMX6703", message, found.span)
+
+
+NODE = "pc3000"
+
+
+@dataclass(frozen=True)
+class Pc3000Config(ProcessorConfig):
+    """A PC3000 with its tasks."""
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node: there is one."""
+        return NODE
+
+    @property
+    def times(self) -> Model:
+        """Whose execution times its tasks have."""
+        return Model.PC3000
+
+
+class Pc3000Kind(ProcessorKind):
+    """What a rack file may say of a PC3000: what it may say of a Processor."""
+
+    word = "PC3000"
+    models = dict.fromkeys(("57C560", "57C570"), "PC3000")
+
+    def read(self, found: FoundModule) -> Pc3000Config:
+        """Read tick and tasks."""
+        plain = super().read(found)
+        return Pc3000Config(plain.slot, plain.model, plain.tick_ns, plain.tasks, plain.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report a PC3000 in another slot than 0, and whatever stands next to one."""
+        own = rack.of(self)
+        for item in own[:1]:
+            if item.slot != 0:
+                message = f"the PC3000 {item.model} stands in slot 0 of a rack of its own, not in slot {item.slot}"
+                rack.findings.add("AMX6773", message, item.span)
+        for item in rack.standing if own else ():
+            if item is not own[0]:
+                message = f"the {item.model} in slot {item.slot} cannot stand next to a PC3000, which has no slots"
+                hint = "write a rack of its own for each of them"
+                rack.findings.add("AMX6773", message, item.span, hint)
+
+
+PC3000 = Pc3000Kind()

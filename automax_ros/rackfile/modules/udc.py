@@ -1,0 +1,220 @@
+"""UDC modules as a rack file configures them: 57552, with a task for drive A, one for drive B, or one alone (2.3).
+
+The dual-port registers of a UDC module (S-3056 p. 3-50, SB3000 p. 3-8): which they are and who writes them.
+
+Of what no source gives (decision): 2002 counts the scans since the last interrupt, bit 6 of 2000 drives the common
+clock and its other bits mean nothing, the test I/O of the module (1000 to 1017) may be inputs or outputs. Registers
+that are not listed belong to the module's operating system (S-3006 p. 4-2).
+
+An estimate of what a task takes on a UDC: no source tells the size of compiled statements (decision).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+
+from automax_ros.compile.base.cost import Model
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import Keys, may_be_empty, section, words
+from automax_ros.core.text import quoted
+from automax_ros.core.ticks import UDC_TICK_NS
+from automax_ros.core.types import DataType
+from automax_ros.core.yaml_text import Node
+from automax_ros.drive.pmi.registers import DRIVE_B, WRITTEN
+from automax_ros.language.program import Program, Symbol
+from automax_ros.language.tree.tree import Scope
+from automax_ros.language.tree.walk import arguments_of, expressions_of, parts, statements_in_order
+from automax_ros.rackfile.model.module import Interrupt, Registers
+from automax_ros.rackfile.model.plants import PlantConfig, plant_name
+from automax_ros.rackfile.model.task import TaskConfig
+from automax_ros.rackfile.modules.kind import Arrangement, FoundModule
+from automax_ros.rackfile.reading.values import Findings, Section, entries_of, text_value
+from automax_ros.rackfile.sections.tasks import TaskPlace, tasks_schema
+
+COUNT = 2048
+RAIL = range(24)
+"""Rail and Flex I/O ports of the PMI: 0 to 11 of drive A, 12 to 23 of drive B."""
+RAIL_COUNTERS = {"A": (5, 11), "B": (17, 23)}
+"""The check-bit fault counters of each drive's rail ports (SB3000 p. 3-8)."""
+STATUS = (*range(80, 90), *range(1080, 1090))
+"""UDC-PMI communication status of the drives A and B."""
+COMMAND = (*range(100, 200), *range(1100, 1200))
+"""Commands to the PMI: outputs."""
+FEEDBACK = (*range(200, 300), *range(1200, 1300))
+"""What the PMI sends back: inputs."""
+TEST = range(1000, 1018)
+"""Test switches and meter ports of the module."""
+EVERY_SCAN = range(300, 600)
+"""Application registers that the UDC copies every scan."""
+NTH_SCAN = range(1300, 1600)
+"""Application registers that the UDC copies every Nth scan."""
+APPLICATION = frozenset((*EVERY_SCAN, *NTH_SCAN))
+ISCR = 2000
+SCANS_PER_INTERRUPT = 2001
+SCAN_COUNTER = 2002
+
+_INPUTS = (*RAIL, *STATUS, *FEEDBACK, SCAN_COUNTER)
+_OUTPUTS = (*COMMAND, ISCR, SCANS_PER_INTERRUPT)
+_USED = frozenset((*_INPUTS, *_OUTPUTS, *TEST, *APPLICATION))
+RETAINED = frozenset((*RAIL, *STATUS, *FEEDBACK, *TEST))
+"""What STOP ALL and a power cycle leave: inputs, feedback, communication status, test switches, D/A set-up (2.4.5)."""
+
+UDC_REGISTERS = Registers(
+    COUNT,
+    outputs=frozenset(_OUTPUTS),
+    either=frozenset((*TEST, *APPLICATION)),
+    reserved=frozenset(range(COUNT)) - _USED,
+    reals=APPLICATION,
+    interrupts=(Interrupt(ISCR),),
+    commands=frozenset(COMMAND),
+)
+
+
+MAX_BYTES = 20 * 1024
+"""Largest UDC task (2.3)."""
+STATEMENT_BYTES = 8
+"""Estimate for a statement, a CALL included, without what stands in it (decision)."""
+TERM_BYTES = 6
+"""Estimate for each variable, constant, operator, function and parameter: a call and an address (decision)."""
+_VALUE_BYTES = {DataType.BOOLEAN: 1, DataType.INTEGER: 2, DataType.DOUBLE: 4, DataType.REAL: 4}
+_STATE_BYTES = 4
+
+
+def estimated_bytes(program: Program) -> int:
+    """Return about how large a task is, in bytes: its code, its locals, and what its blocks keep."""
+    statements = list(statements_in_order((*program.startup, *program.scan)))
+    terms = 0
+    for statement, _ in statements:
+        given = (*expressions_of(statement), *(argument.value for argument in arguments_of(statement)))
+        terms += sum(1 for expression in given for _ in parts(expression))
+    code = STATEMENT_BYTES * len(statements) + TERM_BYTES * terms
+    variables = sum(_variable_bytes(symbol) for symbol in program.symbols.values() if symbol.scope is Scope.LOCAL)
+    return code + variables + _STATE_BYTES * _states(program)
+
+
+def _variable_bytes(symbol: Symbol) -> int:
+    size = symbol.length + 1 if symbol.type is DataType.STRING else _VALUE_BYTES[symbol.type]
+    return size * symbol.elements
+
+
+def _states(program: Program) -> int:
+    """Return how many values the blocks keep."""
+    return sum(
+        1 if state.size is None else state.size(bound.facts)
+        for bound in program.calls.values()
+        for state in bound.block.states
+    )
+
+
+MAX_UDCS = 10
+"""UDC modules of one rack (J2-3106-1 p. 2-5)."""
+DRIVES = ("A", "B")
+"""The drives of a UDC, in the order in which their tasks run."""
+
+
+@dataclass(frozen=True)
+class UdcConfig:
+    """A UDC module. ``tasks`` stand in the order of their drives; ``plants`` are by drive."""
+
+    slot: int
+    model: str
+    tasks: tuple[TaskConfig, ...] = ()
+    plants: Mapping[str, PlantConfig] = field(default_factory=dict)
+    line: int = 0
+
+    tick_ns = UDC_TICK_NS
+    times = Model.UDC
+    has_battery = False
+    keeps_locals = False
+    common_registers = 0
+
+    @property
+    def name(self) -> str:
+        """The module's name in the rack, as that of its node."""
+        return f"udc_{self.slot}"
+
+    @cached_property
+    def registers(self) -> Registers:
+        """Its registers: of a drive with a PMI the module writes feedback and communication status itself."""
+        bases = [DRIVE_B if drive == "B" else 0 for drive, plant in self.plants.items() if plant.motor is not None]
+        shown = frozenset(base + number for base in bases for number in WRITTEN)
+        return replace(UDC_REGISTERS, shown=shown) if shown else UDC_REGISTERS
+
+
+class _Drives:
+    """The tasks of one UDC: each drive has at most one."""
+
+    key, sample, most = "drive", "A", len(DRIVES)
+    schema = words("The drive that the task is for; A runs before B.", DRIVES)
+
+    def __init__(self) -> None:
+        self._taken: dict[str, Span] = {}
+
+    def read(self, node: Node, what: str, findings: Findings) -> TaskPlace | None:
+        """Return a drive."""
+        text = text_value(node, f"drive of {what}", findings, limit=100)
+        if text is None:
+            return None
+        if text not in DRIVES:
+            findings.add("AMX6470", f"drive of {what} is {quoted(text)}; it must be A or B", node.span)
+        elif text in self._taken:
+            note = Note("that task is here", self._taken[text])
+            findings.add("AMX6470", f"drive {text} has a task already", node.span, notes=(note,))
+        else:
+            self._taken[text] = node.span
+            return TaskPlace(DRIVES.index(text), text)
+        return None
+
+
+_PLANTS = may_be_empty(
+    section("The plants that its drives turn.", {drive: plant_name(f"The plant of drive {drive}.") for drive in DRIVES})
+)
+
+
+class UdcKind:
+    """What a rack file may say of a UDC."""
+
+    word = "UDC"
+    models = {"57552": "UDC module"}  # noqa: RUF012
+    options: Keys = MappingProxyType({"tasks": tasks_schema(_Drives()), "plants": _PLANTS})
+
+    def read(self, found: FoundModule) -> UdcConfig:
+        """Read tasks and plants."""
+        node = found.section.get("tasks")
+        tasks = found.tasks.read(node, found.where, _Drives()) if node else ()
+        for task in tasks:
+            _check_source_kind(task, found)
+        in_order = tuple(sorted(tasks, key=lambda task: task.priority))
+        return UdcConfig(found.slot, found.model, in_order, _plants(found), found.span.line)
+
+    def check_places(self, rack: Arrangement) -> None:
+        """Report too many UDCs; no source tells of a slot where one may not stand."""
+        own = rack.of(self)
+        if len(own) > MAX_UDCS:
+            message = f"the rack has {len(own)} UDC modules; it may have at most {MAX_UDCS}"
+            rack.findings.add("AMX6471", message, own[MAX_UDCS].span)
+
+
+UDC = UdcKind()
+
+
+def _check_source_kind(task: TaskConfig, found: FoundModule) -> None:
+    """Report a task in a language that a UDC does not have (J2-3106-1 p. 2-5)."""
+    suffix = task.file.suffix.upper()
+    if suffix != ".BLK":
+        message = f"task {task.name} of {found.where} is a {suffix} file; a UDC runs control-block tasks (.BLK) only"
+        found.findings.add("AMX6304", message, Span(task.line, 1, 2))
+
+
+def _plants(found: FoundModule) -> Mapping[str, PlantConfig]:
+    node = found.section.get("plants")
+    if node is None:
+        return {}
+    what = f"plants of {found.where}"
+    section = Section(entries_of(node, what, found.findings) or (), what, DRIVES, found.findings)
+    named = ((drive, section.get(drive)) for drive in DRIVES)
+    claimed = ((drive, found.plants.claim(node, f"drive {drive} of {found.where}")) for drive, node in named if node)
+    return {drive: plant for drive, plant in claimed if plant is not None}

@@ -1,0 +1,1 @@
+"""Rack files made from what an old plant left: configuration tasks, folders of sources."""

@@ -1,0 +1,231 @@
+"""Task sources of an old plant made acceptable: what DOS editors and older Executives left, changed in place.
+
+Line numbers stay, and so does the number of lines. What is not understood is not touched.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from automax_ros.core.diagnostics import Diagnostic, SourceText
+from automax_ros.core.text import count_of
+from automax_ros.core.types import MAX_STRING_LENGTH
+from automax_ros.language.text.constants import STRING_LIMIT
+from automax_ros.language.text.lines import END_OF_FILE, LineReader
+from automax_ros.language.text.reporter import Reporter, TooManyProblemsError
+from automax_ros.language.text.tokens import Kind, Token
+
+Check = Callable[[str], Iterable[Diagnostic]]
+"""What is wrong with a task's text."""
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f]")
+_WHOLE_NUMBER = re.compile(r"([-+ \t]*[0-9]+)([Ee][-+]?[0-9]+)?")
+_PRINT = re.compile(r"[ ]*[0-9]+[ ]+PRINT(?![A-Z0-9_%!@$])")
+_LENGTH = re.compile(r"(\$)[ \t]*:[ \t]*([0-9]+)")
+_TAB = 8
+"""Columns from one tab stop to the next, as DOS has them."""
+_MOST_ROUNDS = 50
+"""How often a text is gone through until nothing changes any more (decision: a bound on untrusted texts)."""
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A source as it was and as it is acceptable: texts, and ``data``, the bytes to store; ``notes`` say what changed.
+
+    Lines of ``before`` end like those of ``after``, so that the two can be compared line by line.
+    """
+
+    before: str
+    after: str
+    data: bytes
+    notes: tuple[str, ...]
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything changed, ends of lines included."""
+        return bool(self.notes)
+
+
+@dataclass
+class _Counts:
+    """How often each kind of change was made, in the words for it."""
+
+    numbers: dict[str, int] = field(default_factory=dict)
+
+    def add(self, thing: str) -> None:
+        self.numbers[thing] = self.numbers.get(thing, 0) + 1
+
+
+def convert(data: bytes, check: Check) -> Converted:
+    """Return a source made acceptable; ``check`` finds what is left to change.
+
+    UTF-16 becomes UTF-8; a byte order mark, and Ctrl-Z with all that follows, where DOS stops reading, are left out;
+    CR LF and CR become LF. Control characters become blanks. Outside of texts between quotes tabs become blanks up to
+    the next multiple of 8 columns, and, remarks left out, lower case becomes upper case. REAL constants of blocks get
+    their decimal point, lengths of strings above 255 become 255 and a length of 0, which stood for the default, goes;
+    a text of PRINT with more than 132 characters is printed in parts
+    (decision: what an old Executive took, and the file of a DOS editor).
+    """
+    text, encoding, notes = _decoded(data)
+    text, _, rest = text.partition(END_OF_FILE)
+    if rest or END_OF_FILE in data.decode("latin-1"):
+        notes.append(f"Ctrl-Z and the {count_of(len(rest), 'character')} after it left out")
+    ends = text.count("\r\n") + text.replace("\r\n", "").count("\r")
+    before = text.replace("\r\n", "\n").replace("\r", "\n")
+    if ends:
+        notes.append(f"{count_of(ends, 'line end')} written as LF")
+    counts = _Counts()
+    after = _stable(before, check, counts)
+    notes += [count_of(number, thing) for thing, number in counts.numbers.items()]
+    return Converted(before, after, after.encode(encoding), tuple(notes))
+
+
+def _decoded(data: bytes) -> tuple[str, str, list[str]]:
+    """Return the text, the encoding to write it in, and notes; what is not UTF-8 keeps one character per byte."""
+    if data.startswith(_UTF_16):
+        try:
+            return data.decode("utf-16"), "utf-8", ["UTF-16 written as UTF-8"]
+        except UnicodeDecodeError:
+            return data.decode("latin-1"), "latin-1", []
+    notes = ["byte order mark left out"] if data.startswith(codecs.BOM_UTF8) else []
+    plain = data.removeprefix(codecs.BOM_UTF8)
+    try:
+        return plain.decode(), "utf-8", notes
+    except UnicodeDecodeError:
+        return plain.decode("latin-1"), "latin-1", notes
+
+
+def _stable(text: str, check: Check, counts: _Counts) -> str:
+    """Return a text through which one more round would change nothing."""
+    for _ in range(_MOST_ROUNDS):
+        changed = _with_constants(_in_upper_case(_without_control(text, counts), counts), check, counts)
+        if changed == text:
+            break
+        text = changed
+    return text
+
+
+def _without_control(text: str, counts: _Counts) -> str:
+    """Return the text with control characters and tabs outside of quotes as blanks."""
+    lines = text.split("\n")
+    quoted, _ = _ranges(text)
+    for row, line in enumerate(lines):
+        if _CONTROL.search(line) or "\t" in line:
+            lines[row] = _plain(line, quoted.get(row, []), counts)
+    return "\n".join(lines)
+
+
+def _plain(line: str, quoted: list[range], counts: _Counts) -> str:
+    result: list[str] = []
+    width = 0
+    for column, char in enumerate(line):
+        text = char
+        if _CONTROL.match(char):
+            text = " "
+            counts.add("control character")
+        elif char == "\t" and not any(column in part for part in quoted):
+            text = " " * (_TAB - width % _TAB)
+            counts.add("tab")
+        result.append(text)
+        width += len(text)
+    return "".join(result)
+
+
+def _in_upper_case(text: str, counts: _Counts) -> str:
+    """Return the text in upper case, texts between quotes and remarks left out."""
+    lines = text.split("\n")
+    quoted, remarks = _ranges(text)
+    for row, line in enumerate(lines):
+        if line == line.upper():
+            continue
+        kept = quoted.get(row, []) + remarks.get(row, [])
+        upper = "".join(
+            char.upper() if char.isascii() and not any(column in part for part in kept) else char
+            for column, char in enumerate(line)
+        )
+        if upper != line:
+            counts.add("lower-case line")
+            lines[row] = upper
+    return "\n".join(lines)
+
+
+def _ranges(text: str) -> tuple[dict[int, list[range]], dict[int, list[range]]]:
+    """Return, by row from 0, the columns of texts between quotes, and those of remarks without their first word."""
+    quoted: dict[int, list[range]] = {}
+    remarks: dict[int, list[range]] = {}
+    rows = text.split("\n")
+    for tokens, last_row in _logical_lines(text):
+        for token in tokens:
+            row = token.line - 1
+            if token.kind is Kind.STRING or (token.fault is not None and token.fault.code == "AMX0020"):
+                quoted.setdefault(row, []).append(range(token.column - 1, token.end_column - 1))
+            elif token.kind is Kind.REMARK:
+                first = token.column - 1 + len(token.text)
+                remarks.setdefault(row, []).append(range(first, len(rows[row])))
+                for after in range(row + 1, last_row + 1):
+                    remarks.setdefault(after, []).append(range(len(rows[after])))
+    return quoted, remarks
+
+
+def _logical_lines(text: str) -> Iterable[tuple[list[Token], int]]:
+    """Return the tokens of each numbered line, and the row from 0 on which it ends, as far as they can be read."""
+    try:
+        for line in LineReader(SourceText("", text), _Silent()):
+            yield line.tokens, line.tokens[-1].line - 1
+    except TooManyProblemsError:  # pragma: no cover - a silent reporter has no limit
+        return
+
+
+class _Silent(Reporter):
+    """Takes what is wrong with a text without keeping it."""
+
+    def report(self, *_: object) -> None:
+        """Keep nothing."""
+
+
+def _with_constants(text: str, check: Check, counts: _Counts) -> str:
+    """Return the text with decimal points and string lengths where the check misses them."""
+    lines = text.split("\n")
+    found = [item for item in check(text) if item.code in _CURES]
+    for item in sorted(found, key=lambda item: item.span, reverse=True):
+        row, start, end = item.span.line - 1, item.span.column - 1, item.span.end_column - 1
+        thing, cure = _CURES[item.code]
+        cured = cure(lines[row][start:end], lines[row][:start])
+        if cured is not None:
+            lines[row] = lines[row][:start] + cured + lines[row][end:]
+            counts.add(thing)
+    return "\n".join(lines)
+
+
+def _with_point(constant: str, _: str) -> str | None:
+    match = _WHOLE_NUMBER.fullmatch(constant)
+    return None if match is None else f"{match[1]}.0{match[2] or ''}"
+
+
+def _with_length(declared: str, _: str) -> str | None:
+    match = _LENGTH.search(declared)
+    if match is None:
+        return None
+    length = "" if not int(match[2][:9]) else f":{MAX_STRING_LENGTH}"
+    return declared[: match.start()] + match[1] + length + declared[match.end() :]
+
+
+def _in_parts(constant: str, before: str) -> str | None:
+    """Return a long text of PRINT as several, one printed directly after the other; others cannot be divided."""
+    if not _PRINT.match(before):
+        return None
+    quote, text = constant[0], constant[1:-1]
+    parts = (text[place : place + STRING_LIMIT] for place in range(0, len(text), STRING_LIMIT))
+    return "; ".join(f"{quote}{part}{quote}" for part in parts)
+
+
+_Cure = Callable[[str, str], str | None]
+_CURES: dict[str, tuple[str, _Cure]] = {
+    "AMX0021": ("text in parts", _in_parts),
+    "AMX2016": ("decimal point", _with_point),
+    "AMX4008": ("string length", _with_length),
+}
+"""What is changed where the check finds a problem, by its code: from the stretch at fault and what precedes it."""

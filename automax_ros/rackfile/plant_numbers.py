@@ -1,0 +1,103 @@
+"""The numbers of a plant by dotted path, as their keys stand in the rack file: ``UNWIND.load.torque_nm``.
+
+A rack with other numbers is the rack of another text, so that every rule of the file applies to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.faults import Fault
+from automax_ros.core.json_schema import Schema
+from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.yaml_text import Flaw, Node, Scalar, YamlFault, read_yaml, yaml_of
+from automax_ros.core.yaml_text import Mapping as Keys
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.sections.plants import KEYS
+
+_NOWHERE = Span(1, 1, 2)
+
+
+@dataclass(frozen=True)
+class PlantNumber:
+    """A number of a plant: ``keys`` lead to it, ``low`` and ``high`` are its limits."""
+
+    plant: str
+    keys: tuple[str, ...]
+    low: float
+    high: float
+    is_whole: bool = False
+
+    @property
+    def label(self) -> str:
+        """Its full name."""
+        return ".".join((self.plant, *self.keys))
+
+
+def plant_number(config: RackConfig, text: str) -> PlantNumber:
+    """Return the number that ``PLANT.key.key`` means; the plant's name may be in lower case.
+
+    Raises:
+        Fault: there is no such plant, or its section has no such number.
+    """
+    owner, _, path = "".join(text.split()).partition(".")
+    plants = {plant.name: plant for plant in config.plants}
+    name = owner.upper()
+    if name not in plants:
+        raise Fault(f"the rack has no plant {quoted(owner)}", near_or_listed(name, plants))
+    known = {".".join(keys): (keys, schema) for keys, schema in _numbers({"properties": KEYS}, ())}
+    if path not in known:
+        raise Fault(f"plant {name} has no number {quoted(path)}", near_or_listed(path, known, f"{name}."))
+    keys, schema = known[path]
+    return PlantNumber(name, keys, schema["minimum"], schema["maximum"], schema["type"] == "integer")
+
+
+def with_numbers(text: str, values: Mapping[PlantNumber, str]) -> str:
+    """Return a rack file's text with other numbers of plants, the text itself without any.
+
+    Keys that lead to them are made where the file lacks them; a motor that is a name is none that has numbers.
+
+    Raises:
+        Fault: something other than keys stands where keys lead through.
+    """
+    if not values:
+        return text
+    root = read_yaml(text, _raise)
+    assert isinstance(root, Keys)
+    for number, value in values.items():
+        root = _with(root, ("plants", number.plant, *number.keys), value, number.label)
+    return yaml_of(root)
+
+
+def _numbers(schema: Schema, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema]]:
+    """Yield the numbers that keys of fixed names lead to."""
+    if "minimum" in schema:
+        yield path, schema
+    for choice in schema.get("anyOf", ()):
+        yield from _numbers(choice, path)
+    for key, value in schema.get("properties", {}).items():
+        yield from _numbers(value, (*path, key))
+
+
+def _with(node: Node | None, keys: tuple[str, ...], value: str, label: str) -> Keys | Scalar:
+    if not keys:
+        return Scalar(value, True, _NOWHERE)
+    entries = node.entries if isinstance(node, Keys) else ()
+    if node is not None and not isinstance(node, Keys) and not (isinstance(node, Scalar) and node.is_null):
+        raise Fault(f"{label} cannot vary: the rack file has no key {quoted(keys[0])} there", "write the keys out")
+    key, *rest = keys
+    changed = [(name, _with(item, tuple(rest), value, label) if _means(name, keys) else item) for name, item in entries]
+    if not any(_means(name, keys) for name, _ in entries):
+        changed.append((Scalar(key, True, _NOWHERE), _with(None, tuple(rest), value, label)))
+    return Keys(tuple(changed), node.span if node is not None else _NOWHERE)
+
+
+def _means(name: Scalar, keys: tuple[str, ...]) -> bool:
+    """Whether a key of the file is the first of ``keys``; names of plants are in upper case once they are read."""
+    return name.text == keys[0] or name.text.upper() == keys[0]
+
+
+def _raise(flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
+    raise YamlFault(flaw, f"line {span.line}: {message}", hint)

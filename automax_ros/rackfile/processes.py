@@ -1,0 +1,188 @@
+"""How a process of a distributed rack is called: as its first module.
+
+Which modules of a rack need a process of their own, and which must share one, when a rack runs distributed.
+
+What modules exchange through registers and common variables crosses from process to process. What does not may not be
+cut: modules share a process where one acts on another at an instant of rack time, and only there (decision). So these
+share one:
+
+- a Processor, the 57C406 whose gates one of its tasks fires, and the drive digital I/O module of that drive (52.1.1);
+- a 57C405 and the 57C406 whose armature voltage is wired to it (52.6.1);
+- modules whose plants are coupled: two shafts are one mechanical system;
+- a module that interrupts and the Processors with an EVENT for that interrupt (J-3675 p. 6-17);
+- the modules of tasks that declare one software event, or that open one channel (J-3675 p. 6-17, 6-20).
+
+The common clock joins none of them (decision): which module drives it is a bit of a register, and each process follows
+that bit on its own image. Neither do plants that feed commons, nor forces, STOP ALL or power: they cross as
+writes and orders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, runtime_checkable
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.language.program import Program
+from automax_ros.rackfile.checks.tasks import check_tasks
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.rackfile.model.module import ModuleConfig
+
+HOME = "common_memory"
+"""The name of the seat of common memory, as that of its node, also where a lone Processor holds the commons."""
+_LOOP_SLOTS = {"io_cntl_slot": "fires the gates of", "dig_io_slot": "reads the permissive of"}
+"""The inputs of a current minor loop that name modules, with what its task does there."""
+
+
+class NoSuchSeat(Fault):
+    """A text names no module of the rack."""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A process of a distributed rack.
+
+    Attributes:
+        name: that of its first module, ``common_memory`` for the home.
+        slots: of its modules, in order.
+        is_home: whether it holds common memory: it alone publishes the rack's topics and takes what operators want.
+        modules: the names of its modules, in the order of slots.
+        reasons: why its modules share a process, a sentence each; () for a module alone.
+    """
+
+    name: str
+    slots: tuple[int, ...]
+    is_home: bool
+    modules: tuple[str, ...]
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The process and what is in it, for messages."""
+        return self.name if self.modules == (self.name,) else f"{self.name} ({' '.join(self.modules)})"
+
+
+def seats_of(config: RackConfig, programs: Iterable[Program] | None = None) -> tuple[Seat, ...]:
+    """Return the processes of a distributed rack: the home first, the others in the order of their first slots.
+
+    ``programs`` are its tasks without errors; they are checked here where they are not given. A task with errors
+    joins no modules: a rack with one does not start anyway.
+    """
+    if programs is None:
+        programs = [item.result.program for item in check_tasks(config) if item.result.program is not None]
+    bonds = list(_bonds(config, list(programs)))
+    groups = _groups([module.slot for module in config.modules], [bond.slots for bond in bonds])
+    seats = (_seat(config, slots, bonds) for slots in groups)
+    return tuple(sorted(seats, key=lambda seat: (not seat.is_home, seat.slots)))
+
+
+def seat_named(seats: Sequence[Seat], text: str) -> Seat:
+    """Return the seat of a module, which is named by its slot or by its name, such as ``3`` or ``processor_3``.
+
+    Raises:
+        NoSuchSeat: the rack has no such module.
+    """
+    wanted = text.strip().lower()
+    for seat in seats:
+        if wanted in (seat.name, *seat.modules, *map(str, seat.slots)):
+            return seat
+    known = [name for seat in seats for name in seat.modules]
+    raise NoSuchSeat(f"the rack has no module {quoted(text)}", near_or_listed(wanted, known))
+
+
+class _Bond(NamedTuple):
+    """Modules that may not be cut from each other."""
+
+    slots: tuple[int, ...]
+    reason: str
+
+
+def _bonds(config: RackConfig, programs: Sequence[Program]) -> Iterator[_Bond]:
+    names = {module.slot: module.name for module in config.modules}
+    homes = {task.name: module.slot for module, task in config.placed_tasks}
+    for program in programs:
+        yield from _loop_bonds(program, homes[program.name], names)
+        yield from _interrupt_bonds(program, homes[program.name], names, config)
+    yield from _wire_bonds(config.modules, names)
+    yield from _plant_bonds(config)
+    yield from _meeting_bonds(programs, homes)
+
+
+def _loop_bonds(program: Program, slot: int, names: dict[int, str]) -> Iterator[_Bond]:
+    """Yield the modules that the current minor loop of a task commands at each interrupt."""
+    facts = program.cml.facts if program.cml is not None else {}
+    for key, does in _LOOP_SLOTS.items():
+        other = facts.get(key)
+        if isinstance(other, int) and other in names:
+            yield _Bond((slot, other), f"task {program.name} {does} {names[other]}")
+
+
+def _interrupt_bonds(program: Program, slot: int, names: dict[int, str], config: RackConfig) -> Iterator[_Bond]:
+    """Yield the modules whose interrupts set events of a task."""
+    for event in program.events:
+        variable = config.by_name.get(event.interrupt_status.name) if event.interrupt_status is not None else None
+        if variable is not None and variable.point is not None:
+            other = variable.point.slot
+            yield _Bond((slot, other), f"task {program.name} waits for the interrupt {event.name} of {names[other]}")
+
+
+@runtime_checkable
+class _Wired(Protocol):
+    """A module to which a signal of the drive in another slot is wired."""
+
+    @property
+    def drive(self) -> int | None: ...
+
+
+def _wire_bonds(modules: Iterable[ModuleConfig], names: dict[int, str]) -> Iterator[_Bond]:
+    for module in modules:
+        if isinstance(module, _Wired) and module.drive in names:
+            yield _Bond((module.slot, module.drive), f"{module.name} has the armature voltage of {names[module.drive]}")
+
+
+def _plant_bonds(config: RackConfig) -> Iterator[_Bond]:
+    turned = {driven.name: driven for driven in driven_plants(config)}
+    for driven in turned.values():
+        couple = driven.config.couple
+        other = turned.get(couple.to) if couple is not None else None
+        if other is not None:
+            yield _Bond((driven.slot, other.slot), f"the shafts of {driven.name} and {other.name} are coupled")
+
+
+def _meeting_bonds(programs: Sequence[Program], homes: dict[str, int]) -> Iterator[_Bond]:
+    """Yield the modules whose tasks meet at an event or a channel."""
+    met: dict[str, list[Program]] = {}
+    for program in programs:
+        events = [f"the event {event.name}" for event in program.events]
+        channels = [f"channel {file.number}" for file in program.files if file.direction is not None]
+        for what in dict.fromkeys((*events, *channels)):
+            met.setdefault(what, []).append(program)
+    for what, group in met.items():
+        slots = tuple(sorted({homes[program.name] for program in group}))
+        if len(slots) > 1:
+            yield _Bond(slots, f"tasks {' and '.join(program.name for program in group)} share {what}")
+
+
+def _groups(slots: Sequence[int], bonds: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Return the slots in the least groups that no bond leads out of."""
+    group = {slot: {slot} for slot in slots}
+    for bond in bonds:
+        joined = set().union(*(group[slot] for slot in bond))
+        group.update(dict.fromkeys(joined, joined))
+    return list(dict.fromkeys(tuple(sorted(group[slot])) for slot in slots))
+
+
+def _seat(config: RackConfig, slots: tuple[int, ...], bonds: Iterable[_Bond]) -> Seat:
+    modules = tuple(module.name for module in config.modules if module.slot in slots)
+    is_home = config.home_slot in slots
+    reasons = tuple(bond.reason for bond in bonds if bond.slots[0] in slots and len(set(bond.slots)) > 1)
+    return Seat(HOME if is_home else modules[0], slots, is_home, modules, reasons)
+
+
+def part_name(config: RackConfig, slots: Collection[int]) -> str:
+    """Return the name of the process that has the modules of some slots; ``slot N`` where the rack has none there."""
+    first = min(slots, default=config.home_slot)
+    return next((module.name for module in config.modules if module.slot == first), f"slot {first}")

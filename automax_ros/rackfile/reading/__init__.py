@@ -1,0 +1,1 @@
+"""Values, names, scales and files as a rack file writes them."""

@@ -1,0 +1,240 @@
+"""Mappings of a rack file: known keys, each once, and none missing.
+
+Collects what is wrong with a rack file.
+
+Single values of a rack file: text, numbers, TRUE and FALSE, each checked where it stands.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable
+from collections.abc import Mapping as AbstractMapping
+from typing import TypeGuard, TypeVar
+
+from automax_ros.core.diagnostics import Diagnostic, Note, Span, in_order
+from automax_ros.core.problems import PROBLEMS, Severity
+from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.types import DataType
+from automax_ros.core.values import is_number, number, value_of, whole_number
+from automax_ros.core.yaml_text import Flaw, Mapping, Node, Scalar, Sequence
+
+MAX_FINDINGS = 200
+"""Most errors, and most warnings, that one file reports (decision: nobody reads more; hostile files have millions)."""
+_YAML_CODES = {Flaw.SYNTAX: "AMX6003", Flaw.EXTRA: "AMX6004", Flaw.SIZE: "AMX6005"}
+
+
+class Findings:
+    """The diagnostics of one file so far."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._items: dict[Severity, list[Diagnostic]] = {Severity.ERROR: [], Severity.WARNING: []}
+        self._refused: set[Span] = set()
+        self._lower_case = False
+
+    def add(self, code: str, message: str, span: Span, hint: str | None = None, notes: tuple[Note, ...] = ()) -> None:
+        """Report a problem, unless the YAML at this very place was already refused as such."""
+        if span in self._refused:
+            return
+        items = self._items[PROBLEMS[code].severity]
+        if len(items) < MAX_FINDINGS:
+            items.append(Diagnostic(code, message, span, hint=hint, notes=notes))
+
+    def refuse(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
+        """Report that the text at a place cannot be taken for what it is; later problems of that place are not new."""
+        self.add(code, message, span, hint)
+        self._refused.add(span)
+
+    def yaml_flaw(self, flaw: Flaw, message: str, span: Span, hint: str | None) -> None:
+        """Report what ``read_yaml`` finds: AMX6003 syntax, AMX6004 parts of YAML that are not read, AMX6005 size."""
+        report = self.refuse if flaw is Flaw.EXTRA else self.add
+        report(_YAML_CODES[flaw], message, span, hint)
+
+    def upper_case(self, text: str, span: Span) -> str:
+        """Return a name of the rack in upper case; the first that was not gets a warning (semantics, BASIC)."""
+        upper = text.upper() if text.isascii() else text
+        if upper != text and not self._lower_case:
+            self._lower_case = True
+            message = f"name {quoted(text)} is read as {quoted(upper)}, and so are all others in this file"
+            self.add("AMX6411", message, span, "the rack's names are in upper case")
+        return upper
+
+    @property
+    def errors(self) -> int:
+        """Number of errors so far, at most MAX_FINDINGS."""
+        return len(self._items[Severity.ERROR])
+
+    def in_order(self) -> list[Diagnostic]:
+        """Return the diagnostics sorted by place."""
+        return in_order(self._items[Severity.ERROR] + self._items[Severity.WARNING])
+
+
+_OCTAL = re.compile(r"[-+]?0+[0-9]")
+"""Leading zeros make another number in YAML."""
+_T = TypeVar("_T", int, float)
+
+
+def kind_of(node: Node) -> str:
+    """Return in words what a node is, for messages that wanted something else."""
+    if isinstance(node, Mapping):
+        return "keys and values"
+    if isinstance(node, Sequence):
+        return "a list"
+    if node.is_null:
+        return "nothing"
+    return quoted(node.text) if node.plain else f"the text {quoted(node.text)}"
+
+
+def wrong_kind(node: Node, what: str, wanted: str, findings: Findings, hint: str | None = None) -> None:
+    """Report that ``what`` is not of the kind it must be."""
+    findings.add("AMX6008", f"{what} must be {wanted}, not {kind_of(node)}", node.span, hint)
+
+
+def text_value(node: Node, what: str, findings: Findings, *, limit: int) -> str | None:
+    """Return a text of one line with at most ``limit`` characters; quotes are optional."""
+    if not isinstance(node, Scalar) or node.is_null:
+        wrong_kind(node, what, "text", findings)
+        return None
+    if not is_clean(node.text):
+        findings.add("AMX6010", f"{what} has characters that cannot be printed, or more than one line", node.span)
+        return None
+    if len(node.text) > limit:
+        message = f"{what} has {len(node.text)} characters; it may have at most {limit}"
+        findings.add("AMX6010", message, node.span)
+        return None
+    return node.text
+
+
+def is_clean(text: str) -> bool:
+    """Whether a text has only printable characters and tabs: nothing that ends a line or breaks an encoding."""
+    return all(char.isprintable() or char == "\t" for char in text)
+
+
+def boolean_value(node: Node, what: str, findings: Findings) -> bool | None:
+    """Return true or false."""
+    value = value_of(node.text, DataType.BOOLEAN) if is_plain_word(node) else None
+    if not isinstance(value, bool):
+        wrong_kind(node, what, "true or false", findings)
+        return None
+    return value
+
+
+def integer_value(node: Node, what: str, findings: Findings, *, low: int, high: int, code: str) -> int | None:
+    """Return a whole number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
+    return _number(node, what, "a whole number", whole_number, findings, (low, high, code))
+
+
+def number_value(node: Node, what: str, findings: Findings, *, low: float, high: float, code: str) -> float | None:
+    """Return a number from ``low`` to ``high``; ``code`` is the problem where it is not in this range."""
+    return _number(node, what, "a number", number, findings, (low, high, code))
+
+
+def is_plain_word(node: Node) -> TypeGuard[Scalar]:
+    """Whether a node is a single value without quotes, and without the leading zeros that YAML reads as octal."""
+    return isinstance(node, Scalar) and node.plain and not _OCTAL.match(node.text)
+
+
+def _number(
+    node: Node,
+    what: str,
+    word: str,
+    read: Callable[[str], _T],
+    findings: Findings,
+    limits: tuple[float, float, str],
+) -> _T | None:
+    low, high, code = limits
+    try:
+        if not is_plain_word(node):
+            raise ValueError
+        value = read(node.text)
+    except ValueError:
+        wrong_kind(node, what, word, findings, number_hint(node))
+        return None
+    if not low <= value <= high:
+        message = f"{what} is {quoted(node.text, marks='')}; it must be {low:g} to {high:g}"
+        findings.add(code, message, node.span)
+        return None
+    return value
+
+
+def number_hint(node: Node) -> str | None:
+    """Return what to do about a value that looks like a number but is not read as one."""
+    if not isinstance(node, Scalar) or len(node.text) > 60:
+        return None
+    if not node.plain and is_number(node.text):
+        return f"write {node.text} without quotes"
+    digits = node.text.lstrip("+-")
+    if node.plain and digits.startswith("0") and digits.isdecimal() and digits.strip("0"):
+        return f"write {digits.lstrip('0')} without leading zeros"
+    return None
+
+
+Entry = tuple[Scalar, Node]
+
+
+def entries_of(node: Node, what: str, findings: Findings) -> tuple[Entry, ...] | None:
+    """Return keys and values, () for a key without a value; None (reported) where something else stands."""
+    if isinstance(node, Mapping):
+        return node.entries
+    if isinstance(node, Scalar) and node.is_null:
+        return ()
+    wrong_kind(node, what, "keys and values", findings)
+    return None
+
+
+class Section:
+    """A mapping whose keys have fixed names.
+
+    Reports AMX6006 a key twice and AMX6007 a key that is not known.
+    """
+
+    def __init__(
+        self,
+        entries: Iterable[Entry],
+        what: str,
+        known: Collection[str],
+        findings: Findings,
+        hints: AbstractMapping[str, str] | None = None,
+    ) -> None:
+        """Sort the entries; ``what`` names the section in messages, ``known`` are its keys.
+
+        ``hints`` say of keys that people look for what does their work.
+        """
+        self._values: dict[str, Entry] = {}
+        for key, value in entries:
+            if key.text not in known:
+                hint = (hints or {}).get(key.text) or did_you_mean(key.text, known)
+                hint = hint or f"{what} has the keys {', '.join(known)}"
+                findings.add("AMX6007", f"{what} has no key {quoted(key.text)}", key.span, hint)
+            elif key.text in self._values:
+                report_twice(key, f"key {quoted(key.text)} of {what}", self._values[key.text][0].span, findings)
+            else:
+                self._values[key.text] = (key, value)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values
+
+    def get(self, key: str) -> Node | None:
+        """Return the value of a key, None where the file does not have it."""
+        entry = self._values.get(key)
+        return entry[1] if entry else None
+
+    def key_span(self, key: str) -> Span:
+        """Return the place of a key that the section has."""
+        return self._values[key][0].span
+
+    def require(self, keys: Iterable[str], what: str, span: Span, findings: Findings) -> bool:
+        """Report AMX6009 if keys are missing; return whether all are there."""
+        missing = [key for key in keys if key not in self._values]
+        if missing:
+            word = "key" if len(missing) == 1 else "keys"
+            names = ", ".join(quoted(key) for key in missing)
+            findings.add("AMX6009", f"{what} lacks the {word} {names}", span)
+        return not missing
+
+
+def report_twice(key: Scalar, what: str, first: Span, findings: Findings, code: str = "AMX6006") -> None:
+    """Report that something is defined a second time."""
+    notes = (Note("first defined here", first),)
+    findings.add(code, f"{what} is already defined in line {first.line}", key.span, notes=notes)

@@ -1,0 +1,1 @@
+"""The sections of a rack file: tasks, common variables, points, plants."""

@@ -1,0 +1,279 @@
+"""The ``common`` section: the rack's common variables and their options.
+
+Values that common variables have when the rack starts, each in the variable's own type.
+
+The hardware has no presets; in the emulator one is a write by the rack at time 0 (semantics, Scan, memory, tasks).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from automax_ros.core.diagnostics import Note, Span
+from automax_ros.core.json_schema import (
+    Keys,
+    Schema,
+    either,
+    entries,
+    flag,
+    line,
+    listed,
+    may_be_empty,
+    number,
+    scalar,
+    section,
+    words,
+)
+from automax_ros.core.kinds import Direction
+from automax_ros.core.names import PREDEFINED
+from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.types import DataType, Value, bare_name
+from automax_ros.core.values import value_of, wanted
+from automax_ros.core.yaml_text import Node, Scalar, Sequence
+from automax_ros.rackfile.model.config import DEFAULT_OUT_LIMIT, CommonVariable
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.reading.names import COMMON_NAME, DeclarationFault, VariableName, is_reserved, variable_name
+from automax_ros.rackfile.reading.scale import SCHEMA as SCALE
+from automax_ros.rackfile.reading.scale import Scale, scale_of
+from automax_ros.rackfile.reading.values import (
+    Findings,
+    Section,
+    boolean_value,
+    entries_of,
+    is_plain_word,
+    kind_of,
+    number_hint,
+    number_value,
+    report_twice,
+    text_value,
+    wrong_kind,
+)
+from automax_ros.rackfile.sections.points import KEYS, PointReader
+
+_CODE = "AMX6406"
+
+
+def preset_value(
+    node: Node, variable: VariableName, elements: int, findings: Findings
+) -> Value | tuple[Value, ...] | None:
+    """Return the preset of a variable with ``elements`` values; None where there was something to report."""
+    what = f"preset of {variable.name}"
+    if not isinstance(node, Sequence):
+        return _one(node, variable, what, findings)
+    if not variable.dimensions:
+        findings.add(_CODE, f"{what} is a list, but the variable is not an array", node.span)
+        return None
+    if len(node.items) != elements:
+        message = f"{what} has {len(node.items)} values; the array has {elements} elements"
+        findings.add(_CODE, message, node.span, "subscripts count from 0: an array (10) has 11 elements")
+        return None
+    values = [_one(item, variable, what, findings) for item in node.items]
+    return tuple(value for value in values if value is not None) if None not in values else None
+
+
+def _one(node: Node, variable: VariableName, what: str, findings: Findings) -> Value | None:
+    kind = variable.type
+    if kind is DataType.STRING:
+        return _text(node, variable.length, what, findings)
+    value = value_of(node.text, kind) if is_plain_word(node) else None
+    if value is None:
+        findings.add(_CODE, f"{what} must be {wanted(kind)}, not {kind_of(node)}", node.span, number_hint(node))
+    return value
+
+
+def _text(node: Node, length: int, what: str, findings: Findings) -> str | None:
+    text = text_value(node, what, findings, limit=1000)
+    if text is not None and len(text) > length:
+        findings.add(_CODE, f"{what} has {len(text)} characters; the string holds {length}", node.span)
+        return None
+    return text
+
+
+UNIT_LIMIT = 16
+DESCRIPTION_LIMIT = 200
+"""Longest `unit` and longest `description`, in characters (decision)."""
+MIN_RATE_HZ, MAX_RATE_HZ = 0.01, 2000.0
+"""Range of `rate_limit_hz` (decision: 2000 Hz is one message per tick of 0.5 ms)."""
+
+_DIRECTIONS = {"closed": Direction.CLOSED, "out": Direction.OUT, "in": Direction.IN}
+OPTIONS: Keys = {
+    "ros": words("`out`: a topic with the value; `in`: that, and one that writes it; `closed`: neither.", _DIRECTIONS),
+    "rate_limit_hz": number("Most messages per second on the topic.", MIN_RATE_HZ, MAX_RATE_HZ),
+    "preset": either(
+        "Written when the rack starts; for an array also a list, the last subscript running fastest.",
+        scalar("The value, for an array that of each element."),
+        listed("A value for each element.", scalar("The value of an element.")),
+    ),
+    "non_volatile": flag("Whether the value survives STOP ALL, a power cycle and a restart.", False),
+    "unit": line("The engineer's unit.", UNIT_LIMIT),
+    "scale": SCALE,
+    "description": line("A line about the variable.", DESCRIPTION_LIMIT),
+    **KEYS,
+}
+"""What may be said of a common variable."""
+SCHEMA: Schema = may_be_empty(
+    entries(
+        "The rack's common variables: name, type character, length of a string, largest subscripts.",
+        COMMON_NAME,
+        may_be_empty(section("A common variable.", OPTIONS)),
+    )
+)
+_PREDEFINED_BARE = {bare_name(name): name for name in PREDEFINED}
+
+
+class CommonReader:
+    """Reads the ``common`` section."""
+
+    def __init__(
+        self, modules: Iterable[ModuleConfig], findings: Findings, unread: frozenset[int] = frozenset()
+    ) -> None:
+        """Begin with no variables; I/O points stand on ``modules``, or in slots whose module could not be read."""
+        self._points = PointReader(modules, findings, unread)
+        self._findings = findings
+        self._names: dict[str, Span] = {}
+        self._bare: dict[str, tuple[str, Span]] = {}
+        self._simple = 0
+        self._left_closed: list[CommonVariable] = []
+        self._left_span = Span(1, 1, 2)
+
+    def read(self, node: Node) -> tuple[CommonVariable, ...]:
+        """Return the variables that are right, in the order of the file."""
+        entries = entries_of(node, "common", self._findings) or ()
+        variables = [self._variable(key, value) for key, value in entries]
+        self._report_left_closed()
+        return tuple(item for item in variables if item is not None)
+
+    def _variable(self, key: Scalar, node: Node) -> CommonVariable | None:
+        declared = self._name(key)
+        options = entries_of(node, f"options of {quoted(key.text)}", self._findings)
+        if declared is None or options is None:
+            return None
+        section = Section(options, f"common variable {declared.name}", OPTIONS, self._findings)
+        self._check_predefined(key, declared, section)
+        variable = CommonVariable(declared.name, declared.type, declared.dimensions, declared.length)
+        preset = section.get("preset")
+        direction = self._direction(section, variable, key)
+        point = self._points.read(section, declared, key.span)
+        if direction is Direction.IN and point is not None:
+            self._points.check_input(point, declared, section.key_span("ros"))
+        return CommonVariable(
+            name=declared.name,
+            type=declared.type,
+            dimensions=declared.dimensions,
+            length=declared.length,
+            non_volatile=self._flag(section, "non_volatile", declared.name),
+            preset=preset_value(preset, declared, variable.elements, self._findings) if preset else None,
+            direction=direction,
+            rate_limit_hz=self._rate(section, declared.name, direction),
+            unit=self._text(section, "unit", declared.name, UNIT_LIMIT),
+            description=self._text(section, "description", declared.name, DESCRIPTION_LIMIT),
+            line=key.span.line,
+            point=point,
+            scale=self._scale(section, declared, direction),
+        )
+
+    def _name(self, key: Scalar) -> VariableName | None:
+        try:
+            declared = variable_name(self._findings.upper_case(key.text, key.span))
+        except DeclarationFault as fault:
+            self._findings.add(fault.code, f"{quoted(key.text)}: {fault.message}", key.span, fault.hint)
+            return None
+        bare = bare_name(declared.name)
+        if is_reserved(declared.name):
+            message = f"{declared.name} is a word of the language and cannot name a variable"
+            self._findings.add("AMX6401", message, key.span)
+        if declared.name in self._names:
+            report_twice(key, f"variable {declared.name}", self._names[declared.name], self._findings, "AMX6402")
+            return None
+        if bare in self._bare:
+            other, place = self._bare[bare]
+            message = f"{declared.name} and {other} are two variables: they differ only in type"
+            notes = (Note(f"{other} is defined here", place),)
+            self._findings.add("AMX6403", message, key.span, "give one of them another name", notes)
+        self._names[declared.name] = key.span
+        self._bare.setdefault(bare, (declared.name, key.span))
+        return declared
+
+    def _check_predefined(self, key: Scalar, declared: VariableName, section: Section) -> None:
+        """The rack writes these (2.4.6); a preset or a writer on ROS would contradict it (decision)."""
+        name = _PREDEFINED_BARE.get(bare_name(declared.name))
+        if name is None:
+            return
+        if declared.name != name or declared.dimensions:
+            message = f"{declared.name} must be the simple BOOLEAN {name}: the name is pre-defined"
+            self._findings.add("AMX6410", message, key.span)
+        for option in ("preset", "non_volatile", *KEYS):
+            if option in section:
+                message = f"{name} has no {option}: the rack itself writes it"
+                self._findings.add("AMX6410", message, section.key_span(option))
+        ros = section.get("ros")
+        if isinstance(ros, Scalar) and ros.text == "in":
+            self._findings.add("AMX6410", f"{name} cannot be written: the rack itself writes it", ros.span)
+
+    def _direction(self, section: Section, variable: CommonVariable, key: Scalar) -> Direction:
+        if not variable.is_array:
+            self._simple += 1
+        node = section.get("ros")
+        if node is None:
+            return self._default_direction(variable, key)
+        if not isinstance(node, Scalar) or node.is_null:
+            wrong_kind(node, f"ros of {variable.name}", "out, in or closed", self._findings)
+            return Direction.CLOSED
+        direction = _DIRECTIONS.get(node.text)
+        if direction is None:
+            message = f"ros of {variable.name} is {quoted(node.text)}; it must be out, in or closed"
+            self._findings.add("AMX6407", message, node.span, did_you_mean(node.text, _DIRECTIONS))
+            return Direction.CLOSED
+        if direction is not Direction.CLOSED and variable.is_array and variable.type is DataType.STRING:
+            message = f"{variable.name} cannot be published: ROS 2 has no standard message for an array of strings"
+            self._findings.add("AMX6413", message, node.span, "write ros: closed")
+        return direction
+
+    def _default_direction(self, variable: CommonVariable, key: Scalar) -> Direction:
+        if variable.is_array:
+            return Direction.CLOSED
+        if self._simple <= DEFAULT_OUT_LIMIT:
+            return Direction.OUT
+        if not self._left_closed:
+            self._left_span = key.span
+        self._left_closed.append(variable)
+        return Direction.CLOSED
+
+    def _report_left_closed(self) -> None:
+        if self._left_closed:
+            message = (
+                f"{len(self._left_closed)} simple commons from {self._left_closed[0].name} on have no topic: "
+                f"without the key ros only the first {DEFAULT_OUT_LIMIT} of a rack are published"
+            )
+            self._findings.add("AMX6412", message, self._left_span, "write ros: out or ros: closed for each of them")
+
+    def _rate(self, section: Section, name: str, direction: Direction) -> float | None:
+        node = section.get("rate_limit_hz")
+        if node is None:
+            return None
+        rate = number_value(
+            node, f"rate_limit_hz of {name}", self._findings, low=MIN_RATE_HZ, high=MAX_RATE_HZ, code="AMX6408"
+        )
+        if direction is Direction.CLOSED:
+            message = f"rate_limit_hz of {name} has no effect: the variable has no topic"
+            self._findings.add("AMX6414", message, section.key_span("rate_limit_hz"), "write ros: out as well")
+        return rate
+
+    def _scale(self, section: Section, declared: VariableName, direction: Direction) -> Scale | None:
+        node = section.get("scale")
+        if node is None:
+            return None
+        if direction is Direction.CLOSED:
+            message = f"scale of {declared.name} has no effect: the variable has no topic"
+            self._findings.add("AMX6451", message, section.key_span("scale"), "write ros: out or ros: in too")
+        return scale_of(node, declared, section.key_span("scale"), self._findings)
+
+    def _flag(self, section: Section, key: str, name: str) -> bool:
+        node = section.get(key)
+        return bool(node is not None and boolean_value(node, f"{key} of {name}", self._findings))
+
+    def _text(self, section: Section, key: str, name: str, limit: int) -> str:
+        node = section.get(key)
+        if node is None:
+            return ""
+        return text_value(node, f"{key} of {name}", self._findings, limit=limit) or ""

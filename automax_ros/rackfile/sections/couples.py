@@ -1,0 +1,98 @@
+"""The key ``couple`` of a plant: another plant's shaft, and what is between the two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.json_schema import Keys, Schema, number, section
+from automax_ros.core.text import near_or_listed, quoted
+from automax_ros.core.yaml_text import Node
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.plant.coupling import LEAST_RATIO, MOST_RATIO, CouplingData
+from automax_ros.rackfile.model.plant_data import build_plants, couple_plants
+from automax_ros.rackfile.model.plants import CoupleConfig, PlantConfig, plant_name
+from automax_ros.rackfile.reading.values import Findings, Section, entries_of, number_value, text_value
+
+CODE = "AMX6478"
+RANGES = {
+    "ratio": (LEAST_RATIO, MOST_RATIO),
+    "stiffness_nm_per_rad": (1.0, 1e7),
+    "damping_nms_per_rad": (0.0, 1e6),
+}
+"""Ranges of a coupling's numbers (decision)."""
+KEYS: Keys = {
+    "to": plant_name("The other plant."),
+    "ratio": number("Speed of this plant's motor over that of the other.", *RANGES["ratio"], 1),
+    "stiffness_nm_per_rad": number("Stiffness at this shaft; without it stiff.", *RANGES["stiffness_nm_per_rad"]),
+    "damping_nms_per_rad": number("Damping of the spring.", *RANGES["damping_nms_per_rad"]),
+}
+SCHEMA: Schema = section("What couples the shaft to that of another plant.", KEYS, ("to",))
+
+
+def read_couple(node: Node, what: str, findings: Findings) -> CoupleConfig | None:
+    """Return what a plant is coupled to, None where there was something to report."""
+    where = f"couple of {what}"
+    entries = entries_of(node, where, findings)
+    if entries is None:
+        return None
+    section = Section(entries, where, KEYS, findings)
+    if not section.require(("to",), where, node.span, findings):
+        return None
+    named = section.get("to")
+    text = text_value(named, f"to of {where}", findings, limit=100) if named is not None else None
+    numbers: dict[str, float] = {}
+    for key, (low, high) in RANGES.items():
+        value = section.get(key)
+        found = number_value(value, f"{key} of {where}", findings, low=low, high=high, code=CODE) if value else None
+        if found is not None:
+            numbers[key] = found
+    if text is None or named is None:
+        return None
+    if "damping_nms_per_rad" in numbers and "stiffness_nm_per_rad" not in section:
+        message = f"{where} has a damping and no stiffness: a stiff shaft does not swing"
+        findings.add(CODE, message, section.key_span("damping_nms_per_rad"))
+    return CoupleConfig(findings.upper_case(text, named.span), CouplingData(**numbers), named.span.line)
+
+
+def check_couples(plants: Mapping[str, PlantConfig], findings: Findings) -> None:
+    """Report couplings to nothing, or of a plant that is coupled already; then those that cannot be simulated."""
+    taken: dict[str, int] = {}
+    before = findings.errors
+    for name, config in plants.items():
+        if config.couple is not None:
+            _check(name, config.couple, plants, taken, findings)
+    if findings.errors == before == 0:
+        _try(plants, findings)
+
+
+def _check(
+    name: str, couple: CoupleConfig, plants: Mapping[str, PlantConfig], taken: dict[str, int], findings: Findings
+) -> None:
+    span = Span(couple.line, 1, 2)
+    other = plants.get(couple.to)
+    if couple.to == name:
+        findings.add(CODE, f"plant {name} is coupled to itself", span, "name another plant")
+        return
+    if other is None:
+        hint = near_or_listed(couple.to, [key for key in plants if key != name])
+        findings.add(CODE, f"plant {name} is coupled to {quoted(couple.to)}, which the rack does not have", span, hint)
+        return
+    if other.motor is None:
+        findings.add(CODE, f"plant {name} is coupled to {couple.to}, which has no motor: it is not simulated", span)
+    for item in (name, couple.to):
+        if item in taken:
+            message = f"plant {item} is coupled already (line {taken[item]})"
+            findings.add(CODE, message, span, "a plant is coupled to one other, and one of the two says so")
+    taken.update(dict.fromkeys((name, couple.to), couple.line))
+
+
+def _try(plants: Mapping[str, PlantConfig], findings: Findings) -> None:
+    """Report what only shows when the plants are made."""
+    made = build_plants(plants.values())
+    for config in plants.values():
+        try:
+            couple_plants(made, (config,))
+        except ParameterError as error:
+            assert config.couple is not None
+            findings.add(CODE, f"plant {config.name}: {error}", Span(config.couple.line, 1, 2))

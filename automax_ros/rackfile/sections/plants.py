@@ -1,0 +1,225 @@
+"""Reads the ``plants`` section: the motors and loads that drives turn. A plant belongs to one drive of one module.
+
+A plant without ``motor`` is not simulated: its drive's parameters are all there is (decision).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.json_schema import Keys, Schema, either, entries, may_be_empty, number, section, whole, words
+from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.core.yaml_text import Mapping, Node, Scalar
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.nameplate import NamePlate
+from automax_ros.rackfile.model.plant_data import plant_data
+from automax_ros.rackfile.model.plants import MOTORS, PLANT_NAME, LoadConfig, PlantConfig, SupplyConfig, plant_name
+from automax_ros.rackfile.reading.values import (
+    Findings,
+    Section,
+    entries_of,
+    integer_value,
+    number_value,
+    report_twice,
+    text_value,
+)
+from automax_ros.rackfile.sections.couples import SCHEMA as COUPLE_SCHEMA
+from automax_ros.rackfile.sections.couples import check_couples, read_couple
+from automax_ros.rackfile.sections.joint_keys import SCHEMA as JOINT_SCHEMA
+from automax_ros.rackfile.sections.joint_keys import GivenJoint, check_joint_names, read_joint
+from automax_ros.rackfile.sections.plant_keys import (
+    FEED_SCHEMA,
+    INERTIA_SCHEMA,
+    LOAD_HINTS,
+    LOAD_SCHEMA,
+    SUPPLY_SCHEMA,
+    read_inertia,
+    read_load,
+    read_supply,
+)
+
+MOST_PLANTS = 32
+"""Most plants of a rack (decision: two for each of 16 slots)."""
+MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO = 115, 400
+"""Range of the Motor Overload Ratio in %: that of LIM_BAR, which must be the same (36)."""
+_LEAST, _MOST = 1e-9, 1e9
+_PLATE: Keys = {
+    "hp": number("Rated power, hp.", _LEAST, _MOST),
+    "volts": number("Rated armature voltage, V.", _LEAST, _MOST),
+    "rpm": number("Rated speed.", _LEAST, _MOST),
+    "amps": number("Rated armature current, A.", _LEAST, _MOST),
+    "resistance_ohm": number("Resistance of the armature.", _LEAST, _MOST),
+    "inductance_h": number("Inductance of the armature.", _LEAST, _MOST),
+    "inertia_kg_m2": number("Inertia of the motor.", _LEAST, _MOST),
+}
+_PLATE_REQUIRED = ("hp", "volts", "rpm")
+_SIMULATED: Keys = {
+    "line": SUPPLY_SCHEMA,
+    "load": LOAD_SCHEMA,
+    "inertia": INERTIA_SCHEMA,
+    "couple": COUPLE_SCHEMA,
+    "feeds": FEED_SCHEMA,
+    "joint": JOINT_SCHEMA,
+}
+KEYS: Keys = {
+    "motor": either(
+        "The motor; a plant without one is not simulated.",
+        words("A motor that the emulator has.", MOTORS),
+        section("The motor's name plate.", _PLATE, _PLATE_REQUIRED),
+    ),
+    "motor_overload_ratio": whole("Motor Overload Ratio of the drive, %.", MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO),
+    **_SIMULATED,
+}
+"""What may be said of a plant."""
+SCHEMA: Schema = may_be_empty(
+    entries(
+        "The lines, motors and loads of drives, by their names.",
+        plant_name("")["pattern"],
+        may_be_empty(section("A plant.", KEYS)),
+        MOST_PLANTS,
+    )
+)
+_NAME = re.compile(PLANT_NAME + r"\Z")
+_LIMIT = 100
+
+
+@dataclass
+class Plants:
+    """The plants of one rack file, and who has claimed them; ``feeds`` and ``joints`` are read on with the commons."""
+
+    findings: Findings
+    known: dict[str, PlantConfig] = field(default_factory=dict)
+    complete: bool = True
+    feeds: list[tuple[str, Node]] = field(default_factory=list)
+    joints: list[GivenJoint] = field(default_factory=list)
+    _claimed: dict[str, tuple[str, Span]] = field(default_factory=dict)
+
+    def claim(self, node: Node, what: str) -> PlantConfig | None:
+        """Return the plant that a module names for ``what``, None (reported) where there is none to have."""
+        text = text_value(node, what, self.findings, limit=_LIMIT)
+        if text is None:
+            return None
+        name = self.findings.upper_case(text, node.span)
+        plant = self.known.get(name)
+        if plant is None:
+            if self.complete:
+                hint = did_you_mean(name, self.known) or "define it in the section `plants:` of the rack file"
+                self.findings.add("AMX6474", f"{what}: the rack has no plant {quoted(text)}", node.span, hint)
+            return None
+        if name in self._claimed:
+            user, place = self._claimed[name]
+            message = f"{what}: the plant {name} is that of {user} (line {place.line}) already"
+            self.findings.add("AMX6474", message, node.span, "a plant belongs to one drive")
+            return None
+        self._claimed[name] = (what, node.span)
+        return plant
+
+
+def read_plants(node: Node | None, findings: Findings) -> Plants:
+    """Return the plants of the section; what is wrong goes to the findings."""
+    plants = Plants(findings)
+    if node is None:
+        return plants
+    places: dict[str, Span] = {}
+    entries = entries_of(node, "plants", findings) or ()
+    if len(entries) > MOST_PLANTS:
+        message = f"the rack file has {len(entries)} plants; at most {MOST_PLANTS} are simulated"
+        findings.add("AMX6501", message, entries[MOST_PLANTS][0].span)
+        plants.complete = False
+    for key, value in entries[:MOST_PLANTS]:
+        name = findings.upper_case(key.text, key.span)
+        if not _NAME.match(name):
+            message = f"{quoted(key.text)}: a plant's name has 1 to 16 letters, digits and underscores, a letter first"
+            findings.add("AMX6476", message, key.span)
+            plants.complete = False
+        elif name in places:
+            report_twice(key, f"plant {name}", places[name], findings)
+        else:
+            places[name] = key.span
+            plants.known[name] = _plant(name, key, value, plants)
+    if plants.complete:
+        check_couples(plants.known, findings)
+        check_joint_names({name: (plant.joint_name, places[name]) for name, plant in plants.known.items()}, findings)
+    return plants
+
+
+def _plant(name: str, key: Scalar, node: Node, plants: Plants) -> PlantConfig:
+    findings = plants.findings
+    what = f"plant {name}"
+    section = Section(entries_of(node, what, findings) or (), what, KEYS, findings, LOAD_HINTS)
+    ratio, motor = section.get("motor_overload_ratio"), section.get("motor")
+    line, load, inertia, couple, feeds, joint = (section.get(option) for option in _SIMULATED)
+    needless = next((option for option in _SIMULATED if option in section), "")
+    if motor is None and needless:
+        findings.add("AMX6009", f"{what} has {needless} and no motor: it is not simulated", section.key_span(needless))
+    if feeds is not None:
+        plants.feeds.append((name, feeds))
+    if joint is not None:
+        plants.joints.append(read_joint(joint, name, findings))
+    config = PlantConfig(
+        name,
+        _motor(motor, f"motor of {what}", findings) if motor else None,
+        None if ratio is None else _ratio(ratio, what, findings),
+        key.span.line,
+        read_supply(line, what, findings) if line else SupplyConfig(),
+        read_load(load, what, findings) if load else LoadConfig(),
+        read_inertia(inertia, what, findings) if inertia else 1.0,
+        read_couple(couple, what, findings) if couple else None,
+        plants.joints[-1].name if joint else "",
+    )
+    if not findings.errors:
+        _check_data(config, key.span, findings)
+    return config
+
+
+def _check_data(config: PlantConfig, span: Span, findings: Findings) -> None:
+    """Report a motor that contradicts itself or cannot be simulated."""
+    try:
+        plant_data(config)
+    except ParameterError as error:
+        findings.add("AMX6473", f"plant {config.name}: {error}", span)
+
+
+def _ratio(node: Node, what: str, findings: Findings) -> int | None:
+    low, high = MIN_OVERLOAD_RATIO, MAX_OVERLOAD_RATIO
+    return integer_value(node, f"motor_overload_ratio of {what}", findings, low=low, high=high, code="AMX6475")
+
+
+def _motor(node: Node, what: str, findings: Findings) -> str | NamePlate | None:
+    if isinstance(node, Mapping):
+        return _plate(node, what, findings)
+    name = text_value(node, what, findings, limit=_LIMIT)
+    if name is not None and name not in MOTORS:
+        hint = (
+            did_you_mean(name, MOTORS)
+            or f"motors are {', '.join(MOTORS)}, or a name plate: {{hp: 10, volts: 240, ...}}"
+        )
+        findings.add("AMX6473", f"{what} is {quoted(name)}, which the emulator does not have", node.span, hint)
+        return None
+    return name
+
+
+def _plate(node: Mapping, what: str, findings: Findings) -> NamePlate | None:
+    section = Section(node.entries, what, _PLATE, findings)
+    if not section.require(_PLATE_REQUIRED, what, node.span, findings):
+        return None
+    numbers: dict[str, float] = {}
+    for key in _PLATE:
+        value = section.get(key)
+        if value is None:
+            continue
+        found = number_value(value, f"{key} of {what}", findings, low=_LEAST, high=_MOST, code="AMX6473")
+        if found is None:
+            return None
+        numbers[key] = found
+    return NamePlate(
+        hp=numbers["hp"],
+        volts=numbers["volts"],
+        rpm=numbers["rpm"],
+        amps=numbers.get("amps"),
+        resistance_ohm=numbers.get("resistance_ohm"),
+        inductance_h=numbers.get("inductance_h"),
+        inertia_kg_m2=numbers.get("inertia_kg_m2"),
+    )

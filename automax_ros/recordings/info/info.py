@@ -1,0 +1,367 @@
+"""What a recording holds, counted from its messages: rack, tasks and scans, topics, files, and whether it is sound.
+
+How the tasks of a recording run, from the rack file and the sources that are stored inside.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap.records import Attachment
+
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.text import count_of
+from automax_ros.messages.cdr.cdr import CdrError, decoder
+from automax_ros.messages.cdr.message_headers import scan_head
+from automax_ros.messages.types.messages import Operation, Scan, ScanError, String, VariableTable
+from automax_ros.messages.types.rack_files import RackFilesError, files_from_text, source_name
+from automax_ros.rackfile.checks.tasks import check_source, commons_of
+from automax_ros.rackfile.loader import load_stored
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.mcap_file import TRUNCATED_HINT, McapFile, RawMessage
+from automax_ros.recordings.mcap.opening import NO_BAG_HINT, size_of
+from automax_ros.recordings.mcap.unpacking import DAMAGED_HINT
+from automax_ros.recordings.read.common_log import variables_of
+from automax_ros.recordings.read.reader import BagReader
+from automax_ros.recordings.read.soundness import verdict_of
+from automax_ros.recordings.tables.series import Progress
+
+MOST_KEPT = 1000
+"""Most attachments, operations, tasks and kinds of errors that `bag info` lists (decision): a recording may
+lie about them."""
+_TABLE = "automax_msgs/msg/VariableTable"
+_SCAN = "automax_msgs/msg/Scan"
+_OPERATION = "automax_msgs/msg/Operation"
+_STRING = "std_msgs/msg/String"
+_FILES_TOPIC = "/config"
+_NO_ERRORS = bytes(4)
+"""How a Scan ends that has no errors: with the length of an empty list."""
+_PROGRESS_MASK = 0x3FF
+_NUMBER = re.compile(r"(\d{1,9})(?=\.mcap$)")
+REPAIR_HINT = "`automax bag repair` makes a whole recording of what is readable"
+
+
+@dataclass
+class TopicInfo:
+    """A topic: how many messages of which type."""
+
+    type_name: str
+    messages: int = 0
+
+
+@dataclass
+class TaskInfo:
+    """The scans of a task: how many, the lowest and highest number, numbers left out, restarts, errors logged.
+
+    ``errors`` counts them by BASIC line and number of the problem.
+    """
+
+    slot: int = 0
+    scans: int = 0
+    first: int = 0
+    last: int = 0
+    missing: int = 0
+    restarts: int = 0
+    errors: Counter[ScanError] = field(default_factory=Counter)
+    _before: int | None = None
+
+    def count(self, number: int) -> None:
+        """Take a scan's number into account."""
+        self.scans += 1
+        if self._before is None:
+            self.first = self.last = number
+        elif number > self._before:
+            self.missing += number - self._before - 1
+        else:
+            self.restarts += 1
+        self.first, self.last = min(self.first, number), max(self.last, number)
+        self._before = number
+
+
+@dataclass
+class FileInfo:
+    """A data file: its size, its chunks, the bytes in them as stored and unpacked."""
+
+    name: str
+    size: int
+    chunks: int = 0
+    stored_bytes: int = 0
+    unpacked_bytes: int = 0
+
+
+@dataclass(frozen=True)
+class AttachmentInfo:
+    """A file stored inside."""
+
+    name: str
+    media_type: str
+    size: int
+    sha256: str
+
+
+@dataclass
+class BagInfo:
+    """What a recording holds. Stamps are nanoseconds; ``problems`` is empty where it is sound.
+
+    ``texts`` are the rack's file and the sources of its tasks as they are stored inside. ``gaps`` says which writes are
+    missing, where that was checked.
+    """
+
+    path: Path
+    custom_data: dict[str, str] = field(default_factory=dict)
+    table: VariableTable | None = None
+    first_stamp: int | None = None
+    last_stamp: int | None = None
+    messages: int = 0
+    topics: dict[str, TopicInfo] = field(default_factory=dict)
+    tasks: dict[str, TaskInfo] = field(default_factory=dict)
+    files: list[FileInfo] = field(default_factory=list)
+    operations: list[Operation] = field(default_factory=list)
+    attachments: list[AttachmentInfo] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
+    problems: list[BagError] = field(default_factory=list)
+    gaps: list[str] = field(default_factory=list)
+
+    @property
+    def gap_texts(self) -> list[str]:
+        """What is missing in it though it is sound: by its recorder's own word, its write log and its scans."""
+        told = self.custom_data.get("gaps", "")
+        found = [f"the recorder says: {told}"] if told else []
+        scans = [f"{count_of(task.missing, 'scan')} of {name}" for name, task in self.tasks.items() if task.missing]
+        return [*found, *self.gaps, *(f"{text} not there" for text in scans)]
+
+    @property
+    def duration_ns(self) -> int:
+        """Time from the first stamp to the last."""
+        return (self.last_stamp or 0) - (self.first_stamp or 0)
+
+    @property
+    def size(self) -> int:
+        """Bytes of all data files."""
+        return sum(file.size for file in self.files)
+
+    @property
+    def scans(self) -> int:
+        """Scans of all tasks."""
+        return sum(task.scans for task in self.tasks.values())
+
+    @property
+    def compression(self) -> float | None:
+        """How many times more bytes the chunks hold than they take."""
+        stored = sum(file.stored_bytes for file in self.files)
+        return sum(file.unpacked_bytes for file in self.files) / stored if stored else None
+
+
+def bag_info(bag: Path, *, check: bool = False, progress: Progress | None = None) -> BagInfo:
+    """Read a recording from its beginning to its end and count what it holds; checksums are verified on the way.
+
+    ``check`` decodes every message of a type that we know too, and looks whether the write log has gaps or goes back.
+    What is wrong with the recording is told in ``problems``; what can be read before that place is counted. Memory does
+    not grow with the recording.
+
+    Raises:
+        BagError: there is no recording of ROS 2 in mcap files at the path.
+    """
+    info = BagInfo(bag)
+    files = _data_files(info)
+    total = sum(size_of(file) for file in files)
+    parts = 2 if check else 1
+    before = 0
+    for file in files:
+        data = McapFile(file)
+        entry = FileInfo(file.name, size_of(file))
+        info.files.append(entry)
+        try:
+            for number, record in enumerate(data.records()):
+                _count(info, record)
+                if progress is not None and not number & _PROGRESS_MASK:
+                    progress(min(1.0, (before + data.position) / total) / parts)
+        except BagError as error:
+            if not info.messages and error.code in {"AMX6810", "AMX6811"}:
+                raise
+            info.problems.append(_with_repair(error))
+        entry.chunks, entry.stored_bytes, entry.unpacked_bytes = (
+            data.chunks_read,
+            data.stored_bytes,
+            data.unpacked_bytes,
+        )
+        before += entry.size
+    if info.table is not None and info.first_stamp is not None and info.last_stamp is not None:
+        # A rack sends its files before its run begins; the recording of a run does not begin earlier.
+        info.first_stamp = min(max(info.first_stamp, info.table.stamp), info.last_stamp)
+    if check and not info.problems:
+        _check(info, progress)
+    return info
+
+
+def _data_files(info: BagInfo) -> list[Path]:
+    """The data files, even where metadata.yaml is missing or wrong."""
+    try:
+        reader = BagReader(info.path)
+    except BagError as error:
+        found = info.path.glob("*.mcap") if info.path.is_dir() else ()
+        files = sorted(filter(Path.is_file, found), key=_in_order)
+        if not files or error.code == "AMX6811":
+            raise
+        info.problems.append(_with_repair(error))
+        return files
+    info.custom_data = reader.custom_data
+    return reader.files
+
+
+def _in_order(path: Path) -> tuple[int, str]:
+    match = _NUMBER.search(path.name)
+    return int(match[1]) if match else 0, path.name
+
+
+def _with_repair(error: BagError) -> BagError:
+    """Point to the repair what it mends: not what is beyond the limits, nor what has a hint of its own."""
+    if error.code == "AMX6814" or error.hint not in ("", TRUNCATED_HINT, DAMAGED_HINT, NO_BAG_HINT):
+        return error
+    return BagError(error.code, error.place, error.message, REPAIR_HINT)
+
+
+def _count(info: BagInfo, record: object) -> None:
+    if isinstance(record, RawMessage):
+        info.messages += 1
+        stamp = record.publish_time
+        if info.first_stamp is None or stamp < info.first_stamp:
+            info.first_stamp = stamp
+        if info.last_stamp is None or stamp > info.last_stamp:
+            info.last_stamp = stamp
+        name = record.schema.name if record.schema else ""
+        topic = info.topics.get(record.channel.topic)
+        if topic is None:
+            topic = info.topics[record.channel.topic] = TopicInfo(name)
+        topic.messages += 1
+        if name == _SCAN:
+            _count_scan(info, record)
+        elif name == _OPERATION and len(info.operations) < MOST_KEPT:
+            operation = _decoded(info, _OPERATION, record)
+            assert isinstance(operation, Operation)
+            info.operations.append(operation)
+        elif name == _TABLE and info.table is None:
+            _keep_table(info, record)
+        elif name == _STRING and record.channel.topic.endswith(_FILES_TOPIC) and not info.texts:
+            _keep_sent_files(info, record)
+    elif isinstance(record, Attachment):
+        _count_attachment(info, record)
+
+
+def _count_scan(info: BagInfo, record: RawMessage) -> None:
+    try:
+        head = scan_head(record.data)
+    except CdrError as error:
+        raise BagError("AMX6816", info.path, f"the scan at {record.log_time} ns is malformed: {error}") from error
+    task = info.tasks.get(head.task)
+    if task is None:
+        if len(info.tasks) >= MOST_KEPT:
+            raise BagError("AMX6814", info.path, f"scans of more than {MOST_KEPT} tasks")
+        task = info.tasks[head.task] = TaskInfo()
+    task.count(head.scan)
+    if record.data[-len(_NO_ERRORS) :] != _NO_ERRORS:
+        scan = _decoded(info, _SCAN, record)
+        assert isinstance(scan, Scan)
+        for logged in scan.errors:
+            if logged in task.errors or len(task.errors) < MOST_KEPT:
+                task.errors[logged] += 1
+
+
+def _keep_table(info: BagInfo, record: RawMessage) -> None:
+    table = _decoded(info, _TABLE, record)
+    assert isinstance(table, VariableTable)
+    variables_of(info.path, table)
+    info.table = table
+
+
+def _keep_sent_files(info: BagInfo, record: RawMessage) -> None:
+    """Keep the files that a rack has sent, for a recording that has none stored inside."""
+    with contextlib.suppress(CdrError, RackFilesError):  # another program's topic of that name
+        message = decoder(_STRING)(record.data)
+        assert isinstance(message, String)
+        info.texts.update((file.name, file.text) for file in files_from_text(message.data))
+
+
+def _decoded(info: BagInfo, type_name: str, record: RawMessage) -> object:
+    try:
+        return decoder(type_name)(record.data)
+    except CdrError as error:
+        text = f"the message on {record.channel.topic[:247]} at {record.log_time} ns is malformed: {error}"
+        raise BagError("AMX6816", info.path, text) from error
+
+
+def _count_attachment(info: BagInfo, record: Attachment) -> None:
+    digest = hashlib.sha256(record.data).hexdigest()
+    entry = AttachmentInfo(record.name, record.media_type, len(record.data), digest)
+    if entry in info.attachments or len(info.attachments) >= MOST_KEPT:
+        return  # a split file repeats them
+    info.attachments.append(entry)
+    if record.name.endswith((".yaml", ".BLK", ".BAS")) and len(record.data) <= _MOST_TEXT:
+        info.texts.setdefault(record.name, record.data.decode("utf-8", "replace"))
+
+
+_MOST_TEXT = 1 << 18
+"""Longest rack file or source that is looked into, in bytes."""
+
+
+def _check(info: BagInfo, progress: Progress | None) -> None:
+    """Decode every message of a type that we know, and look whether all of it is sound."""
+    reader = BagReader(info.path)
+    if progress is not None:
+        reader.on_progress = lambda share: progress((1 + share) / 2)
+    verdict = verdict_of(reader)
+    info.gaps = list(verdict.gaps)
+    if verdict.fault is not None:
+        info.problems.append(verdict.fault)
+
+
+RACK_FILE = "rack.yaml"
+
+
+@dataclass(frozen=True)
+class TaskFacts:
+    """A task as the rack file and its source have it; None where the source is missing or has errors.
+
+    ``ticks`` is None too for a task without TICKS, ``period_ns`` for one without a scan period.
+    """
+
+    slot: int
+    processor: str
+    tick_ns: int
+    priority: int
+    target: str | None = None
+    ticks: int | None = None
+    period_ns: int | None = None
+
+
+def task_facts(info: BagInfo) -> dict[str, TaskFacts]:
+    """Return the tasks of the rack by name; none where the recording stores no rack file without errors."""
+    text = info.texts.get(RACK_FILE)
+    config = load_stored(SourceText(RACK_FILE, text), Path(RACK_FILE)).config if text is not None else None
+    if config is None:
+        return {}
+    commons = commons_of(config)
+    facts = {}
+    for processor in config.task_modules:
+        for task in processor.tasks:
+            name = source_name(task.name, task.file.name)
+            source = info.texts.get(name)
+            program = None
+            if source:
+                text_of = SourceText(name, source)
+                program = check_source(text_of, task.name, processor.tick_ns, commons, processor.times).program
+            facts[task.name] = TaskFacts(
+                processor.slot,
+                processor.model,
+                processor.tick_ns,
+                task.priority,
+                program.target if program else None,
+                (program.ticks or None) if program else None,
+                (program.period_ns or None) if program else None,
+            )
+    return facts

@@ -1,0 +1,1 @@
+"""Recordings of a rack that runs elsewhere, made from its messages."""

@@ -1,0 +1,170 @@
+"""The topics of a running rack, as its VariableTable names them.
+
+What a recording made from outside says of itself, apart from its messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import automax_ros
+from automax_ros.core.kinds import Direction
+from automax_ros.core.types import DataType
+from automax_ros.messages.stream.rack_messages import SCALED_TYPE, topic_type_name, value_type_name
+from automax_ros.messages.types.messages import NAMES, JointState, PlantState, Variable, VariableTable
+from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, fingerprint
+from automax_ros.messages.types.topics import LATCHED, OPERATION, PLANT, SCAN, VALUE, QosProfile
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.rackfile.model.ros_names import JOINTS, plant_topic, topic_names
+
+MAX_VALUE_TOPICS = 2000
+"""Most topics of common variables that a recorder listens to (decision: ROS serves no more at the pace of scans)."""
+
+MAX_PLANT_TOPICS = 100
+"""Most topics of plants that a recorder listens to (decision: a rack has far fewer drives)."""
+
+
+@dataclass(frozen=True)
+class TopicKind:
+    """Type and quality of service of a topic."""
+
+    type_name: str
+    qos: QosProfile
+
+
+class LiveTopics:
+    """Topics by name, of the rack whose namespace is ``space`` (with its slash, such as ``/pm1``)."""
+
+    def __init__(
+        self, space: str, table: VariableTable | None = None, offered: Mapping[str, Collection[str]] | None = None
+    ) -> None:
+        """Name the topics; without a table those of common variables are not known.
+
+        ``offered`` are the types of topics that the ROS graph has: the table does not say which variables have a scale,
+        and nothing of plants.
+        ``left_out`` is how many topics of common variables lie beyond the limit.
+        """
+        self.variables = f"{space}/variables"
+        self.snapshot = f"{space}/backplane/snapshot"
+        self.backplane = f"{space}/backplane"
+        self.scans = f"{space}/scans"
+        self.states = f"{space}/states"
+        self.operations = f"{space}/operations"
+        self.config = f"{space}/config"
+        found = _values(space, table, offered or {}) if table else {}
+        self.values = dict(list(found.items())[:MAX_VALUE_TOPICS])
+        self.left_out = len(found) - len(self.values)
+        self.plants = _plants(space, offered or {})
+
+    @classmethod
+    def expected(cls, space: str, config: RackConfig) -> LiveTopics:
+        """Name the topics of a rack that need not be there yet, from its file."""
+        topics = cls(space)
+        names = topic_names(variable.name for variable in config.variables)
+        for variable in config.variables:
+            type_name = topic_type_name(variable)
+            if variable.direction is not Direction.CLOSED and type_name and len(topics.values) < MAX_VALUE_TOPICS:
+                topics.values[f"{space}/{names[variable.name]}"] = TopicKind(type_name, VALUE)
+        state = NAMES[PlantState]
+        plants = {f"{space}/{plant_topic(item.name)}": [state] for item in driven_plants(config)}
+        topics.plants = _plants(space, {**plants, f"{space}/{JOINTS}": [NAMES[JointState]]})
+        return topics
+
+    @property
+    def in_order(self) -> list[str]:
+        """Every topic, in the order of subscriptions.
+
+        The rack answers each new reader of the last three: an image first, then states and full scans that follow it.
+        """
+        first = [self.variables, self.backplane, *self.values, *self.plants, self.operations]
+        return [*first, self.snapshot, self.scans, self.states]
+
+    @property
+    def all(self) -> dict[str, TopicKind]:
+        """Every topic that is recorded."""
+        return {
+            self.variables: TopicKind("automax_msgs/msg/VariableTable", LATCHED),
+            self.snapshot: TopicKind("automax_msgs/msg/CommonImage", LATCHED),
+            self.backplane: TopicKind("automax_msgs/msg/CommonWrite", SCAN),
+            self.scans: TopicKind("automax_msgs/msg/Scan", SCAN),
+            self.states: TopicKind("automax_msgs/msg/TaskState", SCAN),
+            self.operations: TopicKind("automax_msgs/msg/Operation", OPERATION),
+            **self.values,
+            **self.plants,
+        }
+
+
+def _values(space: str, table: VariableTable, offered: Mapping[str, Collection[str]]) -> dict[str, TopicKind]:
+    """The topics of common variables; a topic outside of the rack's ``common`` is none of a rack."""
+    found = {}
+    for variable in table.variables:
+        type_name = _value_type_name(variable)
+        if type_name and not variable.dimensions and SCALED_TYPE in offered.get(variable.topic, ()):
+            type_name = SCALED_TYPE
+        if variable.direction != Direction.CLOSED and type_name and variable.topic.startswith(f"{space}/common/"):
+            found[variable.topic] = TopicKind(type_name, VALUE)
+    return found
+
+
+def _plants(space: str, offered: Mapping[str, Collection[str]]) -> dict[str, TopicKind]:
+    """The topics of plants: their states, and the shafts of all."""
+    state, joint = NAMES[PlantState], NAMES[JointState]
+    begin = f"{space}/{plant_topic('')}"
+    names = sorted(name for name, types in offered.items() if name.startswith(begin) and state in types)
+    found = {name: TopicKind(state, PLANT) for name in names[:MAX_PLANT_TOPICS]}
+    if found and joint in offered.get(f"{space}/{JOINTS}", ()):
+        found[f"{space}/{JOINTS}"] = TopicKind(joint, PLANT)
+    return found
+
+
+def _value_type_name(variable: Variable) -> str | None:
+    try:
+        return value_type_name(DataType.numbered(variable.type), is_array=bool(variable.dimensions))
+    except ValueError:  # a table that was not written by a rack
+        return None
+
+
+GAPS_NAMED = 20
+"""Gaps that the bag tells one by one; it tells the number of all."""
+
+
+def provenance(
+    rack: str,
+    files: Sequence[RackFile],
+    lacks: Sequence[str],
+    replayable_s: float | None,
+    gaps: Sequence[str],
+    ended: str | None,
+) -> dict[str, str]:
+    """Return the custom data of the bag; times in s since the start of the run, None where there is nothing to say."""
+    data = {"rack": rack, "version": automax_ros.__version__, "recorder": "automax record"}
+    if not any("file" in item or "source" in item for item in lacks):
+        data["fingerprint"] = f"{fingerprint(files):016x}"
+    if lacks:
+        data["lacks"] = "; ".join(lacks)
+    if replayable_s is not None:
+        data["replayable_from_s"] = f"{replayable_s:.6f}"
+    if gaps:
+        data["gaps"] = f"{len(gaps)}: " + "; ".join(gaps[:GAPS_NAMED])
+    if ended is not None:
+        data["ended"] = ended
+    return data
+
+
+def lacking(
+    files: Sequence[RackFile], tasks: Iterable[str], wrong: Iterable[str], left_out: int, waiting: Iterable[str]
+) -> list[str]:
+    """Return what a bag lacks for a replay without the repository.
+
+    ``wrong`` are tasks that run another source than the stored one, ``left_out`` counts topics of commons, ``waiting``
+    are tasks that cannot be executed again yet.
+    """
+    owners = {file.owner for file in files}
+    wanted = {RACK_FILE: RACK_FILE, **{task: f"{task}.BLK" for task in tasks}}
+    found = [f"the file {name}" for owner, name in wanted.items() if owner not in owners]
+    found += [f"the source that task {task} runs (another one is stored)" for task in wrong]
+    if left_out:
+        found.append(f"the topics of {left_out} common variables beyond the first {MAX_VALUE_TOPICS}")
+    return found + [f"a full scan and a state of task {task} to begin with" for task in waiting]

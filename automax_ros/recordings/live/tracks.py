@@ -1,0 +1,122 @@
+"""How far the recording of a running rack has come with each task, and what did not come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from automax_ros.messages.cdr.cdr import CdrError, decode
+from automax_ros.messages.cdr.message_headers import ScanHead, StateHead, scan_head, state_head
+from automax_ros.recordings.live.topics import LiveTopics
+from automax_ros.recordings.write.writer import MAX_STAMP
+
+
+class Stamped(Protocol):
+    """A message, or its head, with the time at which it is true (ns)."""
+
+    @property
+    def stamp(self) -> int:
+        """The time."""
+        ...
+
+
+_Stamped = TypeVar("_Stamped", bound=Stamped)
+
+
+def possible(stamp: int) -> int:
+    """Return a stamp.
+
+    Raises:
+        CdrError: no recording has a place for it: what has it is left out, and ends nothing.
+    """
+    if not 0 <= stamp <= MAX_STAMP:
+        raise CdrError(f"{stamp} ns is not the time of a message")
+    return stamp
+
+
+def timely(message: _Stamped) -> _Stamped:
+    """Return a message, or its head, whose stamp is ``possible``."""
+    possible(message.stamp)
+    return message
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Messages that did not come: what they were, how many (0: nobody knows), and the stamp where that was seen."""
+
+    stamp: int
+    what: str
+    missing: int
+
+    def __str__(self) -> str:
+        return f"{self.missing or 'some'} {self.what}"
+
+
+@dataclass
+class TaskTrack:
+    """What is recorded of one task: number and stamp of its last scan, the last scan that a state contains.
+
+    ``follows``: each scan since a full one is there. ``ready``: a state joins them, so they can be executed again.
+    ``alone``: that holds for the present file of a split recording too.
+    """
+
+    last: int = -1
+    stamp: int = -1
+    state: int = -1
+    follows: bool = False
+    ready: bool = False
+    alone: bool = False
+
+    def begin_file(self) -> None:
+        """Wait for a state in a further file; scans go on."""
+        self.state, self.alone = -1, False
+
+    def rest(self) -> None:
+        """Wait for a full scan and a state."""
+        self.state, self.follows, self.ready, self.alone = -1, False, False, False
+
+    def began_anew(self, scan: int, stamp: int, *, proven: bool = False) -> bool:
+        """Whether a scan or state of this number and time belongs to a later run of the rack.
+
+        Where it is ``proven`` to be of this run, the task alone was put into RUN again, and counts from 0.
+        """
+        again = scan < self.last and stamp > self.stamp
+        if again and proven:
+            self.last = -1
+        return again and not proven
+
+    def take_scan(self, scan: int, stamp: int) -> None:
+        """Note a scan that is full or follows the last one."""
+        self.follows = True
+        self._join(self.state == scan - 1)
+        self.last, self.stamp = scan, stamp
+
+    def take_state(self, scan: int) -> None:
+        """Note a state after a scan."""
+        self.state = scan
+        self._join(self.follows and scan == self.last)
+
+    def _join(self, joined: bool) -> None:
+        self.ready, self.alone = self.ready or joined, self.alone or joined
+
+
+def task_head(topics: LiveTopics, topic: str, payload: bytes) -> ScanHead | StateHead | None:
+    """Return the head of a scan or of a task's state; None for what is neither, or malformed."""
+    try:
+        if topic == topics.scans:
+            return timely(scan_head(payload))
+        return timely(state_head(payload)) if topic == topics.states else None
+    except CdrError:
+        return None
+
+
+def has_written(payload: bytes, last_write: int) -> bool:
+    """Whether a scan wrote common memory and the write must follow: one that was pre-empted may have before.
+
+    ``last_write`` is the stamp of the last write that came.
+    """
+    try:
+        scan: Any = decode("automax_msgs/msg/Scan", payload)
+    except CdrError:
+        return False
+    return bool(scan.committed.variable or (scan.written.variable and last_write <= scan.stamp))

@@ -1,0 +1,1 @@
+"""The mcap file format and what a recording says of itself."""

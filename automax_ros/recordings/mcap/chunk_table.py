@@ -1,0 +1,165 @@
+"""An unpacked chunk whose messages are found without reading them one by one: by the index that stands after it.
+
+The index is not trusted: it counts only where its messages and the chunk's own definitions fill the chunk without gaps.
+
+Where the chunks of a block are unpacked to: one after the other in a few megabytes.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from automax_ros.recordings.mcap.chunk_builder import MESSAGE_FIELDS, RECORD_HEAD
+from automax_ros.recordings.mcap.unpacking import Buffer
+
+BLOCK_BYTES = 16 << 20
+"""Bytes unpacked that a block has at most; a larger chunk is a block of its own (decision: a bound on memory)."""
+
+
+class BlockBuffer:
+    """Gives room to chunks. A buffer that is full stays as it is, and another one is begun."""
+
+    def __init__(self) -> None:
+        self._filling = np.empty(0, np.uint8)
+        self._used = 0
+        self._given: deque[tuple[NDArray[np.uint8], int]] = deque()
+
+    def room(self, size: int) -> memoryview:
+        """Return the room of the next chunk."""
+        if self._used + size > len(self._filling):
+            self._filling, self._used = np.empty(max(BLOCK_BYTES, size), np.uint8), 0
+        begin = self._used
+        self._used += size
+        self._given.append((self._filling, begin))
+        return self._filling.data[begin : self._used]
+
+    def taken(self) -> tuple[NDArray[np.uint8], int]:
+        """Return the buffer of the chunk that was read next, and where it begins there."""
+        return self._given.popleft()
+
+
+_INDEX_HEAD = struct.Struct("<HI")
+"""Channel and bytes of the entries: what the content of a message index begins with."""
+_ENTRY = np.dtype([("log_time", "<u8"), ("place", "<u8")])
+_HEAD = np.dtype(
+    [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time", "<u8"),
+        ("publish_time", "<u8"),
+    ]
+)
+"""What a message's record begins with."""
+MESSAGE_HEAD = RECORD_HEAD.size + MESSAGE_FIELDS.size
+"""Bytes of its record that stand before a message itself."""
+Definition = tuple[int, int, bytes]
+"""A schema or channel: the place of its record, its opcode and its content."""
+_DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
+_MOST_DEFINITIONS = 10_000
+MOST_MESSAGES = 400_000
+"""A chunk with more messages than this is read one by one (decision: a bound on memory for untrusted recordings)."""
+
+
+@dataclass(frozen=True)
+class ChunkTable:
+    """Where the messages of a chunk stand, in the order of the file: ``numbers`` of their channels, lengths and times.
+
+    ``places`` are where their records begin. ``definitions`` are the schemas and channels: place, opcode, content.
+    """
+
+    numbers: NDArray[np.int64]
+    places: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    log_times: NDArray[np.uint64]
+    stamps: NDArray[np.uint64]
+    definitions: tuple[Definition, ...]
+
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """Where the messages themselves begin."""
+        return self.places + MESSAGE_HEAD
+
+
+class WholeChunk:
+    """The unpacked bytes of a chunk, which ends at a ``place`` of the file, and the indexes that follow it there."""
+
+    def __init__(self, data: Buffer, place: int = 0) -> None:
+        self.data, self.place = data, place
+        self._indexes: list[bytes] | None = []
+        self._left = len(data) // MESSAGE_HEAD * _ENTRY.itemsize
+        """How many bytes entries can have at most."""
+
+    def add_index(self, content: bytes) -> None:
+        """Take the content of a message index; one that cannot be that of the chunk makes all of them count nothing."""
+        if self._indexes is None or len(content) < _INDEX_HEAD.size:
+            self._indexes = None
+            return
+        _, size = _INDEX_HEAD.unpack_from(content)
+        self._left -= size
+        if size != len(content) - _INDEX_HEAD.size or size % _ENTRY.itemsize or self._left < 0:
+            self._indexes = None
+        elif size:
+            self._indexes.append(content)
+
+    def table(self) -> ChunkTable | None:
+        """Return where the messages stand; None where the indexes do not tell it for every byte of the chunk."""
+        if not self._indexes or sum(map(len, self._indexes)) > MOST_MESSAGES * _ENTRY.itemsize:
+            return None
+        parts = [np.frombuffer(content, _ENTRY, offset=_INDEX_HEAD.size)["place"] for content in self._indexes]
+        told = np.sort(np.concatenate(parts))
+        if told[-1] > len(self.data) - MESSAGE_HEAD:
+            return None
+        places = told.astype(np.int64)
+        found = np.ndarray((len(self.data) - MESSAGE_HEAD + 1,), f"V{MESSAGE_HEAD}", self.data, strides=(1,))
+        heads = found[places].view(_HEAD)
+        lengths = heads["length"]
+        if (heads["opcode"] != int(Opcode.MESSAGE)).any() or (lengths < MESSAGE_FIELDS.size).any():
+            return None
+        if (lengths > len(self.data)).any():
+            return None
+        ends = places + RECORD_HEAD.size + lengths.astype(np.int64)
+        begins = np.append(places, len(self.data))
+        known = np.concatenate(([0], ends))
+        if (known > begins).any():
+            return None
+        gaps = np.flatnonzero(known < begins)
+        definitions = list(self._definitions(zip(known[gaps].tolist(), begins[gaps].tolist(), strict=True)))
+        if None in definitions or len(definitions) > _MOST_DEFINITIONS:
+            return None
+        return ChunkTable(
+            heads["channel"].astype(np.int64),
+            places,
+            lengths.astype(np.int64) - MESSAGE_FIELDS.size,
+            heads["log_time"].copy(),
+            heads["publish_time"].copy(),
+            tuple(item for item in definitions if item is not None),
+        )
+
+    def _definitions(self, gaps: Iterator[tuple[int, int]]) -> Iterator[Definition | None]:
+        """Return the records between messages; None for one that is neither schema nor channel."""
+        for begin, end in gaps:
+            position = begin
+            while position < end:
+                start = position + RECORD_HEAD.size
+                opcode, length = RECORD_HEAD.unpack_from(self.data, position) if start <= end else (0, 0)
+                if opcode not in _DEFINITIONS or start + length > end:
+                    yield None
+                    return
+                yield definition_at(self.data, position)
+                position = start + length
+
+
+def definition_at(data: Buffer, place: int) -> Definition:
+    """Return the schema or channel whose record begins at a place of a chunk."""
+    opcode, length = RECORD_HEAD.unpack_from(data, place)
+    start = place + RECORD_HEAD.size
+    return place, opcode, bytes(data[start : start + length])

@@ -1,0 +1,1 @@
+"""Recordings read: messages, blocks of messages, the write log, whether they are sound."""

@@ -1,0 +1,425 @@
+"""Reads recordings: rosbag2 folders with mcap files, and single .mcap files, those of other programs too.
+
+Puts the messages of other recorders into the order in which they were sent.
+
+`ros2 bag record` stores messages topic by topic as it gets round to them, latched ones in the order of discovery. What
+a rack sends comes from one thread, so the times of sending are its order; in our own recordings that is the file's.
+"""
+
+from __future__ import annotations
+
+import copy
+import heapq
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path, PurePath
+from typing import Any, NamedTuple, TypeVar
+
+from mcap.records import Attachment, Channel, Metadata, Schema
+
+from automax_ros.core.text import printable
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.yaml_text import Flaw, YamlFault, read_data
+from automax_ros.messages.cdr.cdr import CdrError, Message, decoder
+from automax_ros.recordings.mcap.channels import require_known
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.mcap_file import McapFile, RawMessage
+from automax_ros.recordings.mcap.metadata import METADATA_FILE
+from automax_ros.recordings.mcap.opening import no_recording, opened, size_of
+
+HOLD_NS = NS_PER_S
+"""A message is waited for until one is read that was sent so much later (decision)."""
+MOST_HELD = 20_000
+MOST_HELD_BYTES = 64 << 20
+"""What waits at most, in messages and in bytes (decision)."""
+
+Source = TypeVar("Source")
+
+
+def in_sent_order(records: Iterator[tuple[Source, RawMessage]]) -> Iterator[tuple[Source, RawMessage]]:
+    """Return the messages by their times of sending; those of one time in the order in which they stand.
+
+    Raises:
+        BagError: ``records`` has raised it; everything before has been handed out.
+    """
+    waiting: list[tuple[int, int, Source, RawMessage]] = []
+    held = newest = 0
+    failure: BagError | None = None
+    try:
+        for number, (source, taken) in enumerate(records):
+            heapq.heappush(waiting, (taken.publish_time, number, source, taken))
+            held += len(taken.data)
+            newest = max(newest, taken.publish_time)
+            while waiting and (waiting[0][0] <= newest - HOLD_NS or len(waiting) > MOST_HELD or held > MOST_HELD_BYTES):
+                *_, its_source, record = heapq.heappop(waiting)
+                held -= len(record.data)
+                yield its_source, record
+    except BagError as error:  # what was read before the damage is handed out first
+        failure = error
+    while waiting:
+        *_, its_source, record = heapq.heappop(waiting)
+        yield its_source, record
+    if failure is not None:
+        raise failure
+
+
+ORDER_HINT = "`automax bag repair` leaves out what does not follow on what stands before it"
+MAX_METADATA_BYTES = 4 << 20
+"""Longest metadata.yaml that is read, in bytes (decision: a bound on memory for untrusted recordings)."""
+_MAX_YAML_NODES = 2_000_000
+"""More keys and values than MAX_METADATA_BYTES hold."""
+_MAX_FILES = 10_000
+_PROGRESS_MASK = 0x3FF
+"""Progress is reported once per this many records."""
+
+
+class BagMessage(NamedTuple):
+    """One message of a recording; times in nanoseconds.
+
+    ``stamp`` is the time at which it was sent, ``log_time`` that of the log, which is unique in our own recordings.
+    """
+
+    topic: str
+    type_name: str
+    stamp: int
+    log_time: int
+    message: Message
+
+
+class BagReader:
+    """A recording: a rosbag2 folder or one .mcap file. It may be read any number of times, always as a stream.
+
+    ``on_progress``, if set, is called now and then while messages are read, with the share of all bytes that is read by
+    then (0 to 1).
+    ``order`` follows the files' times while messages are read; a part of a recording goes on with that of another.
+    ``last_stamp`` is the stamp of the message read last, be it wanted or not; None before the first.
+
+    Raises:
+        BagError: there is no recording at the path, or its metadata.yaml cannot be used.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._information: dict[str, Any] | None = None
+        self.on_progress: Callable[[float], None] | None = None
+        self.last_stamp: int | None = None
+        self.order: FileOrder | None = None
+        self._after: FileOrder | None = None
+        if path.is_dir():
+            self._information = read_information(path)
+            self.files = _data_files(path, self._information)
+        elif path.is_file():
+            self.files = [path]
+        else:
+            raise no_recording(path)
+
+    def part(self, first: int, end: int, after: BagReader | None = None) -> BagReader:
+        """Return a reader of the files from number ``first`` to before ``end``, counted from 0.
+
+        ``after`` has read the files before: the order in time is checked over both.
+        """
+        other = self.again()
+        other.files = self.files[first:end]
+        other._after = after.order if after is not None else None
+        return other
+
+    def again(self) -> BagReader:
+        """Return a reader of the same recording that tells nobody of its progress."""
+        other = copy.copy(self)
+        other.on_progress = other.last_stamp = other.order = other._after = None
+        return other
+
+    @cached_property
+    def custom_data(self) -> dict[str, str]:
+        """What the recorder wrote into metadata.yaml, or for a single file into its copy there; empty without one."""
+        information = self._information
+        if information is None:
+            try:
+                information = next(filter(None, map(told_information, self.metadata_records())), {})
+            except BagError:  # whoever reads the messages is told
+                information = {}
+        return custom_data_of(information)
+
+    @cached_property
+    def is_ours(self) -> bool:
+        """Whether a recorder of ours made it: then the order of the file is the order of sending."""
+        return "version" in self.custom_data
+
+    def messages(
+        self, *, topics: Collection[str] | None = None, types: Collection[str] | None = None
+    ) -> Iterator[BagMessage]:
+        """Return the decoded messages in the order of sending, of all topics and types or only of those given.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits, its files do not follow each other in
+                time, or it holds a wanted message of a type that we do not know or that was recorded with another
+                definition.
+        """
+        records = self._sourced()
+        for source, record in records if self.is_ours else in_sent_order(records):
+            self.last_stamp = record.publish_time
+            channel = source.channel(record, types, topics)
+            if channel.wanted:
+                yield channel.decoded(record)
+
+    def records(self) -> Iterator[RawMessage]:
+        """Return the messages as they stand in the files.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits, or its files overlap in time.
+        """
+        for _, record in self._sourced():
+            yield record
+
+    def _sourced(self) -> Iterator[tuple[DataSource, RawMessage]]:
+        """The messages as they stand in the files, each with its file."""
+        total = sum(size_of(file) for file in self.files)
+        before = 0
+        order = self.new_order()
+        for file in self.files:
+            source = DataSource(file)
+            last_log: int | None = None
+            data = McapFile(file)
+            for number, record in enumerate(data.records()):
+                if not number & _PROGRESS_MASK and self.on_progress is not None:
+                    self.on_progress(min(1.0, (before + data.position) / total))
+                if not isinstance(record, RawMessage):
+                    continue
+                if last_log is None:
+                    order.begin(file, record.log_time)
+                elif record.log_time <= last_log and self.is_ours:
+                    raise goes_backwards(file, record.log_time, last_log)
+                last_log = record.log_time
+                yield source, record
+            before += data.position
+            order.end(last_log)
+
+    def new_order(self) -> FileOrder:
+        """Begin with what checks that the files follow each other in time, and on those before them; return it."""
+        self.order = copy.copy(self._after) or FileOrder(0 if self.is_ours else HOLD_NS)
+        return self.order
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Return the files stored in the recording; messages are not unpacked.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits.
+        """
+        for file in self.files:
+            for record in McapFile(file).records(messages=False):
+                if isinstance(record, Attachment):
+                    yield record
+
+    def metadata_records(self) -> Iterator[Metadata]:
+        """Return the metadata records of the mcap files.
+
+        Raises:
+            BagError: the recording is truncated, damaged or beyond the limits.
+        """
+        for file in self.files:
+            for record in McapFile(file).records(messages=False):
+                if isinstance(record, Metadata):
+                    yield record
+
+
+def goes_backwards(file: Path, log_time: int, before: int) -> BagError:
+    """Return the error of a message of one of our recordings that is not later than the one before it."""
+    if log_time == before:
+        text = f"two messages have the log time {log_time} ns; in a recording of ours each has its own"
+    else:
+        text = f"log times go backwards: {log_time} ns after {before} ns"
+    return BagError("AMX6813", file, text, ORDER_HINT)
+
+
+class FileOrder:
+    """Checks that the files of a recording follow each other in time: only then they can be read as one stream."""
+
+    def __init__(self, slack_ns: int) -> None:
+        """Let a file begin by ``slack_ns`` before the end of the one before it."""
+        self._slack_ns = slack_ns
+        self._name = ""
+        self._first = self._last = 0
+
+    def begin(self, file: Path, log_time: int) -> None:
+        """Take the log time of a file's first message.
+
+        Raises:
+            BagError: the file before ends later.
+        """
+        if self._name and log_time < self._last - self._slack_ns + (not self._slack_ns):
+            if log_time < self._first:
+                text = f"is out of order: its messages begin before those of {self._name}, which is listed before it"
+                hint = "`automax bag repair` writes a metadata.yaml that lists the files in the order of their times"
+            else:
+                text = f"overlaps {self._name}, the file before it: its messages begin before that one ends"
+                hint = "read each file by its own name"
+            raise BagError("AMX6813", file, text, hint)
+        self._name, self._first = printable(file.name[:80]), log_time
+
+    def end(self, log_time: int | None) -> None:
+        """Take the log time of the last message of that file; None where it holds none."""
+        if log_time is not None:
+            self._last = log_time
+
+
+class DataSource:
+    """One file of a recording, with the readers of its channels by their numbers."""
+
+    __slots__ = ("channels", "path")
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.channels: dict[int, ChannelReader] = {}
+
+    def channel(
+        self, record: RawMessage, types: Collection[str] | None, topics: Collection[str] | None = None
+    ) -> ChannelReader:
+        """Return the reader of a message's channel; it is made at the channel's first message.
+
+        Raises:
+            BagError: messages of the type are wanted and cannot be read.
+        """
+        channel = self.channels.get(record.channel.id)
+        if channel is None:
+            wanted = _is_wanted(record, topics, types)
+            channel = self.channels[record.channel.id] = ChannelReader(self.path, record.channel, record.schema, wanted)
+        return channel
+
+
+class ChannelReader:
+    """Decodes the messages of one channel of one file."""
+
+    def __init__(self, file: Path, channel: Channel, schema: Schema | None, wanted: bool) -> None:
+        self.topic = channel.topic
+        self.type_name = schema.name if schema else ""
+        self.wanted = wanted
+        self._file = file
+        self._decode: Callable[[bytes], Message] | None = None
+        if wanted:
+            _check_encoding(file, channel)
+            require_known(file, channel.topic, schema)
+            self._decode = decoder(self.type_name)
+
+    def decoded(self, record: RawMessage) -> BagMessage:
+        """Return a record of this channel with its message.
+
+        Raises:
+            BagError: it is malformed.
+        """
+        message = self.message(record.data, record.log_time)
+        return BagMessage(self.topic, self.type_name, record.publish_time, record.log_time, message)
+
+    def message(self, payload: bytes, log_time: int) -> Message:
+        """Return a message of this channel.
+
+        Raises:
+            BagError: it is malformed.
+        """
+        assert self._decode is not None
+        try:
+            return self._decode(payload)
+        except CdrError as error:
+            raise BagError(
+                "AMX6816",
+                self._file,
+                f"the message on {self.topic[:247]} at {log_time} ns is malformed: {error}",
+                "`automax bag repair` leaves such messages out",
+            ) from error
+
+
+def _is_wanted(record: RawMessage, topics: Collection[str] | None, types: Collection[str] | None) -> bool:
+    type_name = record.schema.name if record.schema else ""
+    return (topics is None or record.channel.topic in topics) and (types is None or type_name in types)
+
+
+def _check_encoding(file: Path, channel: Channel) -> None:
+    if channel.message_encoding != "cdr":
+        raise BagError(
+            "AMX6811",
+            file,
+            f"the messages of {channel.topic[:247]} are in {channel.message_encoding[:40]!r}, not in CDR",
+        )
+
+
+def read_information(folder: Path) -> dict[str, Any]:
+    """Return the content of a folder's metadata.yaml, checked as far as it is used; all scalars are strings.
+
+    Raises:
+        BagError: it is not there, cannot be read, or describes no mcap files.
+    """
+    path = folder / METADATA_FILE
+    if not path.exists():
+        hint = (
+            "the recording was not finished: `automax bag repair` completes it; or this is another folder; "
+            "a single .mcap file can be read by its own name"
+        )
+        raise BagError("AMX6810", folder, "has no metadata.yaml", hint)
+    with opened(path) as file:
+        text = file.read(MAX_METADATA_BYTES + 1)
+    if len(text) > MAX_METADATA_BYTES:
+        raise BagError("AMX6814", path, f"is longer than {MAX_METADATA_BYTES} bytes")
+    data = load_yaml(path, text)
+    information = data.get("rosbag2_bagfile_information") if isinstance(data, dict) else None
+    if not isinstance(information, dict):
+        raise BagError("AMX6813", path, "does not describe a recording (rosbag2_bagfile_information is missing)")
+    compressed = str(information.get("compression_mode", "")).lower() not in {"", "none"}
+    if information.get("storage_identifier") != "mcap" or compressed:
+        hint = "convert it with `ros2 bag convert` to storage mcap without compression of files or messages"
+        raise BagError("AMX6811", path, "is stored in another way than mcap", hint)
+    return information
+
+
+def told_information(record: Metadata) -> dict[str, Any] | None:
+    """Return the copy of metadata.yaml that a data file holds of itself; None if the record is another one or bad."""
+    text = record.metadata.get("serialized_metadata", "") if record.name == "rosbag2" else ""
+    if not text or len(text) > MAX_METADATA_BYTES:
+        return None
+    try:
+        information = load_yaml("rosbag2", text.encode("utf-8", "replace"))
+    except BagError:
+        return None
+    return information if isinstance(information, dict) else None
+
+
+def custom_data_of(information: Mapping[str, Any]) -> dict[str, str]:
+    """Return the custom data in what metadata.yaml tells."""
+    custom = information.get("custom_data")
+    return {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}
+
+
+def load_yaml(path: object, text: bytes) -> Any:
+    """Load YAML without aliases and of bounded depth, which keeps the loader's effort and stack in bounds.
+
+    Raises:
+        BagError: it is not YAML of that kind; ``path`` names it.
+    """
+    try:
+        return read_data(text.decode(), nodes=_MAX_YAML_NODES)
+    except YamlFault as fault:
+        code = "AMX6813" if fault.flaw is Flaw.SYNTAX else "AMX6814"
+        raise BagError(code, path, f"is not readable YAML: {fault.message}", fault.hint) from fault
+    except UnicodeDecodeError as error:
+        raise BagError("AMX6813", path, f"is not readable YAML: {error.reason}") from error
+
+
+def _data_files(folder: Path, information: dict[str, Any]) -> list[Path]:
+    """The mcap files of a folder; a name that leads out of it is refused."""
+    names = information.get("relative_file_paths")
+    if not isinstance(names, list) or not 0 < len(names) <= _MAX_FILES:
+        raise BagError("AMX6813", folder / METADATA_FILE, "names no data files (relative_file_paths)")
+    for name in names:
+        if not isinstance(name, str) or "\0" in name or PurePath(name).name != name or name in {"", ".", ".."}:
+            raise BagError(
+                "AMX6813", folder / METADATA_FILE, f"names a data file outside of its folder: {str(name)[:80]!r}"
+            )
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        hint = "`automax bag repair` writes metadata.yaml again"
+        raise BagError("AMX6813", folder / METADATA_FILE, f"lists the data file {twice[:80]!r} twice", hint)
+    missing = next((name for name in names if not (folder / name).is_file()), None)
+    if missing is not None:
+        if (folder / missing).exists():
+            raise no_recording(folder / missing)
+        raise BagError("AMX6810", folder, f"lacks the data file {missing[:80]!r} that metadata.yaml names")
+    return [folder / name for name in names]

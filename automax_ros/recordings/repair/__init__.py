@@ -1,0 +1,1 @@
+"""Recordings that were cut or damaged: what is sound is saved."""

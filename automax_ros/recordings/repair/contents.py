@@ -1,0 +1,183 @@
+"""What one data file of a recording holds, counted message by message, for its description.
+
+Where a recording comes from, found again in its files when metadata.yaml is lost.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from mcap.records import Attachment, Channel, Metadata, Schema
+
+from automax_ros.core.yaml_text import YamlFault, read_data
+from automax_ros.messages.cdr.cdr import CdrError, decode, decoder
+from automax_ros.messages.cdr.message_headers import scan_head, write_head
+from automax_ros.messages.types.rack_files import RACK_FILE, RackFile, fingerprint
+from automax_ros.recordings.mcap.channels import is_known
+from automax_ros.recordings.mcap.metadata import FileSummary, TopicSummary
+from automax_ros.recordings.read.reader import custom_data_of, told_information
+
+_MAX_FILES = 200
+_MAX_BYTES = 16 << 20
+
+
+class Provenance:
+    """Takes what the files of a recording tell of it, and answers with ``custom_data`` for metadata.yaml."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, str] = {}
+        self._files: dict[str, RackFile] = {}
+        self._bytes = 0
+
+    def take(self, record: Attachment | Metadata) -> None:
+        """Look at an attachment or metadata record of a data file."""
+        if isinstance(record, Metadata):
+            information = None if self._told else told_information(record)
+            if information is not None:
+                self.take_information(information)
+        elif record.name not in self._files and (record.name == RACK_FILE or record.name.endswith((".BLK", ".BAS"))):
+            self._bytes += len(record.data)
+            if self._bytes <= _MAX_BYTES and len(self._files) < _MAX_FILES:
+                self._files[record.name] = RackFile(record.name, record.data.decode("utf-8", "replace"))
+
+    def take_information(self, information: Mapping[str, Any]) -> None:
+        """Look at a readable metadata.yaml, or its copy in a data file."""
+        self._told = custom_data_of(information) or self._told
+
+    def custom_data(self, rack: str) -> dict[str, str]:
+        """Return what was told, or what can be found out of the files and the rack's name."""
+        if self._told or not rack:
+            return dict(self._told)
+        return {"rack": rack, "fingerprint": f"{fingerprint(list(self._files.values())):016x}"}
+
+
+SCAN, WRITE, TABLE = (f"automax_msgs/msg/{name}" for name in ("Scan", "CommonWrite", "VariableTable"))
+_MAX_QOS_TEXT = 1 << 14
+_MAX_QOS = 100
+_MOST_RUNS = 1000
+
+
+class FileSequence:
+    """What each message of one of our recordings has to follow: log times and the numbers of writes increase."""
+
+    def __init__(self) -> None:
+        """Nothing has come."""
+        self._last_log = -1
+        self._writes: dict[int, int] = {}
+
+    def fault(self, log_time: int, type_name: str, payload: bytes) -> str:
+        """Return why a message does not follow those before it; empty where it does, and the next follows it."""
+        if log_time <= self._last_log:
+            return "log times that go backwards" if log_time < self._last_log else "log times that stand twice"
+        if type_name == WRITE:
+            with contextlib.suppress(CdrError):
+                head = write_head(payload)
+                if head.sequence <= self._writes.get(head.run_id, -1):
+                    return "numbers of writes that go backwards or stand twice"
+                if head.run_id in self._writes or len(self._writes) < _MOST_RUNS:
+                    self._writes[head.run_id] = head.sequence
+        self._last_log = log_time
+        return ""
+
+
+@dataclass
+class FileContents:
+    """Counts of one file; times in nanoseconds, ``stamp`` is a message's own, ``log`` that of the log."""
+
+    name: str
+    messages: int = 0
+    scans: int = 0
+    first_log: int = 0
+    last_log: int = 0
+    first_stamp: int = 0
+    last_stamp: int = 0
+    run_start: int | None = None
+    """The stamp inside the first VariableTable: when the run began."""
+    rack: str = ""
+    counts: dict[int, int] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    _decoders: dict[int, Callable[[bytes], object] | None] = field(default_factory=dict)
+
+    def type_of(self, channel: int) -> str:
+        """Return the name of a channel's messages, empty if nothing is known of them."""
+        known = self.channels.get(channel)
+        schema = self.schemas.get(known.schema_id) if known else None
+        return schema.name if schema else ""
+
+    def fault(self, channel: int, payload: bytes) -> str:
+        """Return why a message is malformed; empty where it is not, or its type is not known here."""
+        if channel not in self._decoders:
+            known = self.channels.get(channel)
+            schema = self.schemas.get(known.schema_id) if known and known.message_encoding == "cdr" else None
+            self._decoders[channel] = decoder(schema.name) if schema and is_known(schema) else None
+        decode_message = self._decoders[channel]
+        try:
+            if decode_message is not None:
+                decode_message(payload)
+            elif self.type_of(channel) == SCAN:
+                scan_head(payload)  # whatever its definition says, nobody reads it otherwise
+        except CdrError as error:
+            return str(error)
+        return ""
+
+    def count(self, channel: int, log_time: int, stamp: int, payload: bytes) -> None:
+        """Count a message."""
+        if not self.messages:
+            self.first_log = self.last_log = log_time
+            self.first_stamp = self.last_stamp = stamp
+        self.messages += 1
+        self.first_log, self.last_log = min(self.first_log, log_time), max(self.last_log, log_time)
+        self.last_stamp = max(self.last_stamp, stamp)
+        self.counts[channel] = self.counts.get(channel, 0) + 1
+        kind = self.type_of(channel)
+        if kind == SCAN:
+            self.scans += 1
+        elif kind == TABLE and self.run_start is None:
+            with contextlib.suppress(CdrError):
+                table: Any = decode(TABLE, payload)
+                self.run_start, self.rack = table.stamp, table.rack
+
+    def summary(self) -> FileSummary:
+        """Return the file's line in metadata.yaml."""
+        return FileSummary(self.name, self.first_log, self.last_log - self.first_log, self.messages)
+
+
+def topics_of(files: Sequence[FileContents]) -> list[TopicSummary]:
+    """Return the topics of a recording's files, each with the messages of all of them."""
+    found: dict[str, TopicSummary] = {}
+    for file in files:
+        for number, channel in file.channels.items():
+            before = found.get(channel.topic)
+            metadata = channel.metadata
+            found[channel.topic] = TopicSummary(
+                channel.topic,
+                file.type_of(number),
+                metadata.get("topic_type_hash", ""),
+                before.qos if before else _qos(metadata.get("offered_qos_profiles", "")),
+                (before.message_count if before else 0) + file.counts.get(number, 0),
+            )
+    return list(found.values())
+
+
+@functools.lru_cache(maxsize=64)
+def _qos(text: str) -> list[dict[str, object]]:
+    """Return the profiles that a channel tells in YAML; what is not of their form is left out."""
+    profiles: Any = None
+    if len(text) <= _MAX_QOS_TEXT:
+        with contextlib.suppress(YamlFault):
+            profiles = read_data(text, typed=True)
+    if not isinstance(profiles, list):
+        return []
+    return [item for item in profiles[:_MAX_QOS] if isinstance(item, dict) and all(map(_is_policy, item.items()))]
+
+
+def _is_policy(item: tuple[object, object]) -> bool:
+    key, value = item
+    if isinstance(value, dict):
+        return isinstance(key, str) and all(isinstance(part, (str, int)) for pair in value.items() for part in pair)
+    return isinstance(key, str) and isinstance(value, (str, int))

@@ -1,0 +1,1 @@
+"""Recordings as tables: commons over time, scans, locals, signals of plants."""

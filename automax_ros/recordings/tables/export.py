@@ -1,0 +1,183 @@
+"""Recordings as CSV tables: common memory over time, or the scans of a task.
+
+Columns of the tables that a recording is exported to, and what is common to all formats of tables.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from automax_ros.core.text import printable
+from automax_ros.core.ticks import seconds_text
+from automax_ros.core.types import DataType
+from automax_ros.core.values import real_text
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.recordings.mcap.whole_file import open_at_once, written_whole
+from automax_ros.recordings.read.common_log import Cell
+from automax_ros.recordings.tables.series import WHOLE_RUN, Progress, Series, Window
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its heading, the engineer's unit, the type code of its numbers, how a cell is written.
+
+    The type code is that of ``array``; texts have an empty one.
+    """
+
+    label: str
+    unit: str
+    typecode: str
+    text: Callable[[Cell], str]
+
+
+class Table(Protocol):
+    """What can be exported: rows of a time in ns and the cells that differ from the row before, None for unknown."""
+
+    @property
+    def columns(self) -> Sequence[Column]:
+        """The columns after the time."""
+
+    def rows(self) -> Iterator[tuple[int, Mapping[int, Cell | None]]]:
+        """The rows, to be read once."""
+
+
+def column(label: str, kind: DataType, unit: str = "") -> Column:
+    """Return the column of a variable."""
+    return Column(label, unit, _TYPECODES[kind], _TEXTS[kind])
+
+
+def count_column(label: str, unit: str = "") -> Column:
+    """Return a column of numbers that may pass 32 bits."""
+    return Column(label, unit, "q", _whole)
+
+
+def require_another_file(bag: Path, output: Path) -> None:
+    """Refuse to write over the recording that is read.
+
+    Raises:
+        BagError: the output is one of its files.
+    """
+    own = [bag] if bag.is_file() else [*bag.glob("*.mcap*"), bag / "metadata.yaml"]
+    for file in own:
+        with contextlib.suppress(OSError):  # one of them does not exist
+            if output.samefile(file):
+                raise BagError("AMX6824", output, "belongs to the recording itself", "name another file")
+
+
+def unwritable(output: Path, error: OSError) -> BagError:
+    """Return the error that says why an output cannot be written."""
+    return BagError("AMX6824", output, f"cannot be written: {error.strerror or error}")
+
+
+def _whole(value: Cell) -> str:
+    return f"{value:.0f}"
+
+
+def _real(value: Cell) -> str:
+    assert isinstance(value, float)
+    return real_text(value)
+
+
+def _text(value: Cell) -> str:
+    return printable(str(value))
+
+
+_TEXTS: dict[DataType, Callable[[Cell], str]] = {
+    DataType.INTEGER: _whole,
+    DataType.DOUBLE: _whole,
+    DataType.REAL: _real,
+    DataType.BOOLEAN: _whole,
+    DataType.STRING: _text,
+}
+_TYPECODES: dict[DataType, str] = {
+    DataType.INTEGER: "i",
+    DataType.DOUBLE: "i",
+    DataType.REAL: "d",
+    DataType.BOOLEAN: "b",
+    DataType.STRING: "",
+}
+
+
+TIME = "time_s"
+"""Heading of the times, which count from the start of the run."""
+
+
+class CommonTable:
+    """Common memory as a table: a row for each instant at which a watched variable changed, or of the window's grid.
+
+    A value holds until it changes. Without ``watch`` all simple numeric and boolean variables are taken.
+
+    Raises:
+        BagError: the recording cannot be read or has no common memory, or a name in ``watch`` is unknown.
+    """
+
+    def __init__(
+        self,
+        bag: Path,
+        watch: Sequence[str] | None = None,
+        window: Window = WHOLE_RUN,
+        progress: Progress | None = None,
+    ) -> None:
+        self._series = Series(bag, watch, window, progress)
+        self.columns: Sequence[Column] = [column(item.label, item.kind, item.unit) for item in self._series.columns]
+
+    def rows(self) -> Iterator[tuple[int, Mapping[int, Cell | None]]]:
+        """Return the rows: time, and the cells that differ from the row before.
+
+        Raises:
+            BagError: the recording is damaged, or the window holds nothing.
+        """
+        yield from self._series.changes()
+
+
+def export_csv(
+    bag: Path,
+    output: Path,
+    watch: Sequence[str] | None = None,
+    window: Window = WHOLE_RUN,
+    progress: Progress | None = None,
+) -> int:
+    """Write the watched variables of a recording to a CSV file; return the number of rows below the header.
+
+    Columns are ``time_s``, counted from the start of the run, and the variables with their type characters. A value
+    holds until it changes; a cell is empty as long as the recording has not told the value. Booleans are 0 and 1.
+    Without ``watch`` all simple numeric and boolean variables are taken; array elements are named like ``TABLE%(3)``.
+    Memory does not grow with the recording.
+
+    Raises:
+        BagError: the recording cannot be read or has no common memory, a name in ``watch`` is unknown, the window holds
+            nothing, or the output cannot be written.
+    """
+    require_another_file(bag, output)
+    return write_csv(CommonTable(bag, watch, window, progress), output)
+
+
+def write_csv(table: Table, output: Path) -> int:
+    """Write a table to a CSV file, which appears when it is whole; return the number of its rows.
+
+    Raises:
+        BagError: the recording is damaged, or the output cannot be written.
+    """
+    formats = [item.text for item in table.columns]
+    cells = [""] * len(formats)
+    count = 0
+    try:
+        with (
+            written_whole(output) as place,
+            open(place, "w", encoding="utf-8", newline="", opener=open_at_once) as file,
+        ):
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow([TIME, *(item.label for item in table.columns)])
+            for time, changed in table.rows():
+                for index, value in changed.items():
+                    cells[index] = "" if value is None else formats[index](value)
+                writer.writerow([seconds_text(time), *cells])
+                count += 1
+    except OSError as error:
+        raise unwritable(output, error) from error
+    return count

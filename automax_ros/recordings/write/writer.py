@@ -1,0 +1,380 @@
+"""Writes a recording: a folder with ``scans_0.mcap``, ... and ``metadata.yaml``, as rosbag2 makes them.
+
+The same messages give the same bytes: nothing depends on the folder's name, the host or the wall clock. Chunks end by
+size or with half a second, always between two instants. One reaches the operating system while the next is filled, or
+before that, so that a killed process loses a second at most and no instant by half.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Final
+
+from mcap.records import Attachment, Metadata, Schema
+from mcap.records import Channel as ChannelRecord
+
+import automax_ros
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.messages.types.definitions import message_types, schema_text
+from automax_ros.messages.types.topics import QosProfile
+from automax_ros.recordings.mcap.chunk_builder import ChunkBuilder
+from automax_ros.recordings.mcap.errors import RecordingError
+from automax_ros.recordings.mcap.mcap_output import McapOutput
+from automax_ros.recordings.mcap.metadata import (
+    METADATA_FILE,
+    BagMetadata,
+    FileSummary,
+    TopicSummary,
+    data_file_name,
+    qos_text,
+    yaml_text,
+)
+from automax_ros.recordings.write.chunk_thread import ChunkThread
+from automax_ros.recordings.write.data_file import COMPRESSIONS, DataFile, StorageOptions, sync_path
+
+AT_ONCE_BYTES: Final = 1 << 16
+"""A chunk of up to this many bytes, uncompressed, is written by whoever fills it where no clock is kept pace with
+(decision): it takes 0.1 ms, and handing it to a thread takes longer than that."""
+CHUNK_BYTES: Final = 1 << 20
+"""A chunk ends before the next instant when it holds more bytes than this, uncompressed."""
+LONGEST_CHUNK_BYTES: Final = 24 << 20
+"""A chunk of more bytes than this ends even inside an instant, so that every reader takes it."""
+MAX_PAYLOAD_BYTES = 32 << 20
+"""Longest message and longest attachment that is written, in bytes (decision: our own reader is sure to accept it)."""
+MAX_STAMP = (2**31 - 1) * NS_PER_S
+"""Latest time of a message in nanoseconds: the seconds of a ROS time have 31 bits."""
+_TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+_MAX_TOPIC = 247
+
+
+def _always() -> bool:
+    return True
+
+
+class Channel:
+    """One topic of a recording; :meth:`BagWriter.channel` makes them. ``message_count`` counts over all files."""
+
+    __slots__ = ("message_count", "number", "qos", "topic", "type_name")
+
+    def __init__(self, number: int, topic: str, type_name: str, qos: QosProfile) -> None:
+        self.number = number
+        self.topic = topic
+        self.type_name = type_name
+        self.qos = qos
+        self.message_count = 0
+
+
+class BagWriter:
+    """A recording being written; a context manager that finishes the files at its end.
+
+    ``custom_data`` goes into the metadata (provenance: hashes of program and YAML file, version). ``keeps_pace`` tells
+    whether whoever writes follows a clock and may not wait for a chunk to be compressed, however small.
+
+    To begin a further file the caller asks ``split_due`` between two instants (or has reasons of its own), calls
+    ``split`` and repeats the facts without which that file could not be read alone.
+
+    Raises:
+        RecordingError: the folder exists already, or cannot be written.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        custom_data: Mapping[str, str] | None = None,
+        options: StorageOptions | None = None,
+        keeps_pace: Callable[[], bool] = _always,
+    ) -> None:
+        self.folder = folder
+        self._keeps_pace = keeps_pace
+        self.custom_data = dict(custom_data or {})
+        self._options = options or StorageOptions()
+        self._channels: dict[str, Channel] = {}
+        self._definitions: list[Schema | ChannelRecord] = []
+        self._schemas: dict[str, int] = {}
+        self._attachments: list[Attachment] = []
+        self._files: list[FileSummary] = []
+        self._own_text = ""
+        """What the last file tells of itself."""
+        self._counts_before: dict[str, int] = {}
+        self._last_time = -1
+        self._stamp: int | None = None
+        """Time of the message before; None when the next one has to be looked at closely."""
+        self._chunk_end = 0
+        self._open = True
+        self._chunks = ChunkThread()
+        self._sync_error: OSError | None = None
+        self._finished: list[Path] = []
+        """Files, and the folder with their names, that ``sync`` has not yet seen to the disk."""
+        try:
+            folder.mkdir(parents=True)
+            self._begin_file()
+        except FileExistsError:
+            hint = "record into another folder, or move this one away"
+            raise RecordingError("AMX6800", folder, "exists already, not overwriting", hint) from None
+        except OSError as error:
+            raise self._write_error(error) from error
+
+    def __enter__(self) -> BagWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def channel(self, topic: str, type_name: str, qos: QosProfile) -> Channel:
+        """Return the channel of a topic; the first call for a topic makes it.
+
+        Raises:
+            RecordingError: the topic is not a ROS name or has another type already, or recordings do not know the type.
+        """
+        channel = self._channels.get(topic)
+        if channel is not None:
+            if (channel.type_name, channel.qos) != (type_name, qos):
+                raise self._refusal(f"topic {topic} holds {channel.type_name}, not {type_name}, or has another QoS")
+            return channel
+        if len(topic) > _MAX_TOPIC or not _TOPIC.fullmatch(topic):
+            raise self._refusal(f"{topic!r} is not the full name of a ROS topic")
+        kind = message_types().get(type_name)
+        if kind is None:
+            raise self._refusal(f"messages of type {type_name!r} cannot be recorded")
+        schema = self._schemas.get(type_name)
+        if schema is None:
+            schema = self._schemas[type_name] = len(self._schemas) + 1
+            self._define(Schema(id=schema, data=schema_text(type_name).encode(), encoding="ros2msg", name=type_name))
+        metadata = {"offered_qos_profiles": qos_text(qos), "topic_type_hash": kind.hash}
+        number = len(self._channels) + 1
+        self._define(ChannelRecord(id=number, topic=topic, message_encoding="cdr", metadata=metadata, schema_id=schema))
+        channel = self._channels[topic] = Channel(number, topic, type_name, qos)
+        return channel
+
+    def write(self, channel: Channel, stamp: int, payload: bytes) -> None:
+        """Add a message (CDR bytes) at a time in nanoseconds; messages of one time belong to one instant.
+
+        Its log time is the stamp, or one nanosecond after the message before if that is later: log times increase.
+
+        Raises:
+            RecordingError: time or length out of range, writer closed, or the disk refuses.
+        """
+        if stamp != self._stamp:
+            self._begin_instant(channel, stamp, payload)
+        log_time = self._last_time + 1
+        if stamp > log_time or not log_time:
+            log_time = stamp
+        chunk = self._chunk
+        if len(payload) + chunk.size > LONGEST_CHUNK_BYTES:
+            chunk = self._relieved_chunk(channel, stamp, payload)
+        channel.message_count = count = channel.message_count + 1
+        chunk.add_message(channel.number, count & 0xFFFFFFFF, log_time, stamp, payload)
+        self._last_time = log_time
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Store a file that belongs to the recording, such as the rack's YAML or a task's source; in each data file.
+
+        One of the same name takes the place of the former in the data files to come.
+
+        Raises:
+            RecordingError: it is too long, the writer is closed, or the disk refuses.
+        """
+        if not self._open or len(data) > MAX_PAYLOAD_BYTES:
+            raise self._refusal(
+                f"attachment {name} of {len(data)} bytes: the limit is {MAX_PAYLOAD_BYTES}, before close()"
+            )
+        attachment = Attachment(
+            create_time=0, log_time=max(self._last_time, 0), name=name, media_type=media_type, data=data
+        )
+        self._attachments = [*(item for item in self._attachments if item.name != name), attachment]
+        try:
+            self._chunks.settle()
+            self._mcap.add_attachment(attachment)
+        except OSError as error:
+            raise self._failed(error) from error
+
+    @property
+    def split_due(self) -> bool:
+        """Whether the file has reached the size at which another one begins; the open chunk does not count."""
+        return 0 < self._options.split_bytes <= self._file.tell()
+
+    def split(self) -> None:
+        """Finish the file and begin the next one, with the same attachments and channels; between two instants only.
+
+        Raises:
+            RecordingError: the writer is closed, or the disk refuses.
+        """
+        if not self._open:
+            raise self._refusal("a new file after the recording was closed")
+        try:
+            self._finish_file()
+            self._begin_file()
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def flush(self, now: int | None = None) -> None:
+        """Hand the open chunk to the operating system; with a time only if the chunk's own time is over by then.
+
+        Without a time it has it when this returns, else soon, and what the disk refuses the next call tells.
+
+        Raises:
+            RecordingError: the disk refuses.
+        """
+        if self._open and (now is None or now >= self._chunk_end or self._chunks.failed):
+            self._flush(wait=now is None)
+
+    def sync(self) -> None:
+        """Wait until what was flushed is on the disk itself; from another thread too, for it may take long.
+
+        When the disk refuses, the next ``write``, ``close`` or ``require_synced`` tells.
+        """
+        try:
+            self._chunks.settle()
+            while self._finished:
+                sync_path(self._finished.pop())
+            self._file.sync()
+        except OSError as error:
+            self._sync_error = error
+
+    def require_synced(self) -> None:
+        """Tell whether the disk has refused a ``sync``.
+
+        Raises:
+            RecordingError: it has.
+        """
+        if self._sync_error is not None:
+            raise self._failed(self._sync_error)
+
+    def close(self) -> None:
+        """Finish the files. After a failed write only what stands on disk is kept.
+
+        Raises:
+            RecordingError: the disk refuses, or has refused a ``sync``; the files are finished nevertheless.
+        """
+        if not self._open:
+            return
+        self._open, self._stamp = False, None
+        try:
+            self._finish_file()
+            self._chunks.end()
+            text = self._metadata(self._files).document(self._own_text if len(self._files) == 1 else None)
+            (self.folder / METADATA_FILE).write_text(text, encoding="utf-8", newline="\n")
+            self._finished += [self.folder / METADATA_FILE, self.folder]
+        except OSError as error:
+            raise self._failed(error) from error
+        self.require_synced()
+
+    def _begin_file(self) -> None:
+        self._file = DataFile(self.folder / data_file_name(len(self._files)))
+        self._finished.append(self.folder)
+        self._mcap = McapOutput(
+            self._file,
+            library=f"automax_ros {automax_ros.__version__}",
+            compression=COMPRESSIONS[self._options.compression],
+        )
+        for attachment in self._attachments:
+            self._mcap.add_attachment(attachment)
+        self._chunk = ChunkBuilder()
+        self._counts_before = {topic: channel.message_count for topic, channel in self._channels.items()}
+        definitions, self._definitions = self._definitions, []
+        for definition in definitions:
+            self._define(definition)
+
+    def _finish_file(self) -> None:
+        """Write what is after the messages of a file: description, index, summary."""
+        self._end_chunk(wait=True)
+        statistics = self._mcap.statistics
+        start, end = statistics.message_start_time, statistics.message_end_time
+        summary = FileSummary(self._file.path.name, start, end - start, statistics.message_count)
+        self._files.append(summary)
+        self._own_text = own = yaml_text(self._metadata([summary]).information())
+        self._mcap.add_metadata(Metadata(name="rosbag2", metadata={"serialized_metadata": own}))
+        self._mcap.finish()
+        self._file.close()
+        self._finished.append(self._file.path)
+
+    def _define(self, record: Schema | ChannelRecord) -> None:
+        """Put a schema or channel into the open chunk, so that it stands before the first message that needs it."""
+        self._definitions.append(record)
+        if isinstance(record, Schema):
+            self._mcap.schemas[record.id] = record
+        else:
+            self._mcap.channels[record.id] = record
+        self._chunk.add_record(record)
+
+    def _begin_instant(self, channel: Channel, stamp: int, payload: bytes) -> None:
+        """End the chunk before a message at another time than the one before, if its time is over or it is full."""
+        if not self._open or not 0 <= stamp <= MAX_STAMP:
+            raise self._bad_message(channel, stamp, payload)
+        if self._sync_error is not None:
+            raise self._failed(self._sync_error)
+        time = self._last_time + 1
+        time = max(time, stamp)
+        if time >= self._chunk_end or self._chunk.size > CHUNK_BYTES:
+            self._flush(wait=self._options.split_bytes > 0)
+            period = self._options.chunk_ns
+            self._chunk_end = (time // period + 1) * period
+        self._stamp = stamp
+
+    def _relieved_chunk(self, channel: Channel, stamp: int, payload: bytes) -> ChunkBuilder:
+        """Return an empty chunk for a long message, if it is not too long."""
+        if len(payload) > MAX_PAYLOAD_BYTES:
+            raise self._bad_message(channel, stamp, payload)
+        self.flush()
+        return self._chunk
+
+    def _flush(self, *, wait: bool) -> None:
+        try:
+            self._end_chunk(wait=wait)
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _end_chunk(self, *, wait: bool) -> None:
+        """Let the open chunk be written; ``wait`` until it is: then the file may be asked for its size, or written."""
+        chunk = self._chunk
+        if chunk.has_messages:
+            if chunk.size <= AT_ONCE_BYTES and not self._keeps_pace():
+                self._chunks.settle()
+                self._mcap.add_chunk(chunk)
+            else:
+                self._chunks.hand(partial(self._mcap.add_chunk, chunk))
+            self._chunk = ChunkBuilder()
+        if wait or self._chunks.failed:
+            self._chunks.settle()
+
+    def _metadata(self, files: list[FileSummary]) -> BagMetadata:
+        """Describe the whole recording, or its last file alone."""
+        before = self._counts_before if len(files) < len(self._files) else {}
+        counts = {item: item.message_count - before.get(item.topic, 0) for item in self._channels.values()}
+        kinds = message_types()
+        topics = [
+            TopicSummary(item.topic, item.type_name, kinds[item.type_name].hash, [item.qos.as_yaml_data()], count)
+            for item, count in counts.items()
+        ]
+        return BagMetadata(files, topics, self.custom_data)
+
+    def _bad_message(self, channel: Channel, stamp: int, payload: bytes) -> RecordingError:
+        if not self._open:
+            return self._refusal(f"message on {channel.topic} after the recording was closed")
+        if len(payload) > MAX_PAYLOAD_BYTES:
+            return self._refusal(
+                f"message on {channel.topic} of {len(payload)} bytes: the limit is {MAX_PAYLOAD_BYTES}"
+            )
+        return self._refusal(f"message on {channel.topic} at {stamp} ns: times lie from 0 to {MAX_STAMP} ns")
+
+    def _refusal(self, message: str) -> RecordingError:
+        return RecordingError("AMX6802", self.folder, message)
+
+    def _failed(self, error: OSError) -> RecordingError:
+        self._open, self._stamp = False, None
+        self._chunks.end()
+        with contextlib.suppress(OSError):
+            self._file.close()
+        kept = "what was recorded so far is kept, `automax bag repair` makes a whole recording of it"
+        return self._write_error(error, f"check free space and permissions; {kept}")
+
+    def _write_error(self, error: OSError, hint: str = "check free space and permissions") -> RecordingError:
+        return RecordingError("AMX6801", self.folder, f"cannot write the recording: {error.strerror or error}", hint)

@@ -1,0 +1,217 @@
+"""Which recorded commons carry the inputs and outputs of a drive: the stored sources and the rack file tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from automax_ros.core.names import NameFault, element
+from automax_ros.core.text import quoted
+from automax_ros.core.types import DataType
+from automax_ros.drive.base.errors import ParameterError
+from automax_ros.drive.base.nameplate import DriveParameters
+from automax_ros.drive.pmi.registers import COMMAND_REGISTERS, CURRENT, FEEDBACK_REGISTERS, SPEED
+from automax_ros.language.printer import print_expression
+from automax_ros.language.program import Program
+from automax_ros.language.tree.tree import Element, Expression, Reference, Scope, Unary
+from automax_ros.rackfile.checks.drives import RackDrive, given_inputs, rack_drives
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.rackfile.reading.scale import Scale
+from automax_ros.recordings.mcap.errors import BagError
+from automax_ros.replay.scans.stored_rack import StoredRack
+
+SPEED_REF = "SPEED_REF"
+"""The keyword of the speed reference: the block has no such input, so the rack file or a person names it."""
+SECOND_DRIVE = 1000
+"""What is added to a register of drive A for that of drive B."""
+PMI_REGISTERS = range(100, 300)
+"""Command and feedback registers of drive A of a UDC (S-3056)."""
+MOST_REGISTERS = 12
+"""Most of them that a report shows (decision: more cannot be told apart)."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A common that carries a signal of a drive.
+
+    Attributes:
+        keyword: the parameter of DC_DRIVE_CML, or ``register 207`` of a UDC.
+        variable: the common, or the element of one, as a recording names it.
+        inverted: whether the CALL turns it round.
+        text: what the signal is, in words.
+        scale: what its counts mean in rpm, None for one that is not counts of rpm.
+        is_rpm: whether it is a speed in rpm, by its scale or as it is.
+    """
+
+    keyword: str
+    variable: str
+    inverted: bool = False
+    text: str = ""
+    scale: Scale | None = None
+    is_rpm: bool = False
+
+
+@dataclass(frozen=True)
+class ReportDrive:
+    """A drive of a recording.
+
+    Attributes:
+        name: its plant, or its loop's task.
+        where: the module that drives it, in words.
+        task: the task with its loop, "" where there is none.
+        signals: by keyword, those that are commons.
+        unseen: keywords whose variables are not commons, so that a recording does not have their course.
+        parameters: motor and line, None where they are not known.
+        lim_bar: LIM_BAR in %, None where it is not known.
+        line_hz: frequency of the line in Hz, as far as it is known, else 60.
+    """
+
+    name: str
+    where: str
+    task: str = ""
+    signals: Mapping[str, Signal] = field(default_factory=dict)
+    unseen: tuple[str, ...] = ()
+    parameters: DriveParameters | None = None
+    lim_bar: float | None = None
+    line_hz: float = 60.0
+
+
+def report_drives(
+    stored: StoredRack, task: str | None = None, references: Mapping[str, str] | None = None
+) -> list[ReportDrive]:
+    """Return the drives of a recorded rack in the order of slots, or the one whose loop is in ``task``.
+
+    ``references`` are the commons with the drives' speed references, by the drive's name, "" for the only one.
+
+    Raises:
+        BagError: no such task, or it has no current minor loop; a reference is of no drive, or not a common.
+    """
+    programs = stored.programs()
+    drives = rack_drives(stored.config, programs)
+    loops = [drive.program.name for drive in drives if drive.program is not None]
+    if task is not None:
+        stored.require_tasks([task])
+        drives = [drive for drive in drives if drive.program is not None and drive.program.name == task]
+        if not drives:
+            named = f"give --task {' or '.join(loops)}, or leave it out: " if loops else ""
+            hint = f"{named}without --task the report is of the whole rack"
+            raise BagError("AMX6860", stored.bag, f"task {task} of it has no DC_DRIVE_CML", hint)
+    given = _given_references(stored, [drive.name for drive in drives], references or {})
+    return [_report_drive(drive, stored.config, programs, given.get(drive.name)) for drive in drives]
+
+
+def _given_references(stored: StoredRack, drives: Sequence[str], references: Mapping[str, str]) -> dict[str, Signal]:
+    """Return the speed references that a person names, by drive."""
+    found: dict[str, Signal] = {}
+    for drive, name in references.items():
+        owner = drives[0] if not drive and len(drives) == 1 else drive
+        if owner not in drives:
+            what = (
+                f"{quoted(drive)} is not a drive of the report" if drive else f"the report is of {len(drives)} drives"
+            )
+            hint = f"write {' or '.join(f'{item}={name}' for item in drives)}" if drives else None
+            raise BagError("AMX6841", stored.bag, f"speed reference {quoted(name)}: {what}", hint)
+        try:
+            meant = element(name, stored.config.by_name, "speed reference: the rack has no common variable")
+        except NameFault as fault:
+            raise BagError("AMX6841", stored.bag, fault.message, fault.hint) from fault
+        if meant.variable.type in (DataType.STRING, DataType.BOOLEAN):
+            raise BagError("AMX6841", stored.bag, f"speed reference: {meant.label} is {meant.variable.type.word}")
+        found[owner] = Signal(SPEED_REF, meant.label, is_rpm=meant.variable.unit.strip().lower() == "rpm")
+    return found
+
+
+def _named_reference(drive: RackDrive, config: RackConfig) -> Signal | None:
+    """Return the speed reference that the rack file names: the common of the velocity of its plant's joint."""
+    for command in config.joint_commands:
+        if drive.plant is not None and (command.plant, command.interface) == (drive.plant.name, "velocity"):
+            return Signal(SPEED_REF, command.common, scale=command.scale, is_rpm=True)
+    return None
+
+
+def _report_drive(
+    drive: RackDrive, config: RackConfig, programs: Sequence[Program], reference: Signal | None
+) -> ReportDrive:
+    try:
+        data = drive.data
+    except ParameterError:  # the rack file was right when it was recorded; the report does without
+        data = None
+    inputs = given_inputs(drive, config, programs, {})
+    lim_bar, line_hz = inputs.get("LIM_BAR"), inputs.get("AC_LINE_FREQ")
+    signals, unseen = _of_call(drive, config)
+    if drive.letter:
+        signals = _of_registers(drive, config)
+    reference = reference or _named_reference(drive, config)
+    if reference is not None:
+        signals[SPEED_REF] = reference
+    hertz = data.parameters.line_hz if data is not None else line_hz.value if line_hz is not None else None
+    return ReportDrive(
+        drive.name,
+        drive.where,
+        drive.program.name if drive.program is not None else "",
+        signals,
+        unseen,
+        data.parameters if data is not None else None,
+        lim_bar.value if lim_bar is not None else None,
+        hertz or 60.0,
+    )
+
+
+def _of_call(drive: RackDrive, config: RackConfig) -> tuple[dict[str, Signal], tuple[str, ...]]:
+    signals: dict[str, Signal] = {}
+    unseen: list[str] = []
+    call = drive.call
+    if call is None or drive.program is None:
+        return signals, ()
+    texts = {item.name: item.text for item in call.block.inputs} | {item.name: item.text for item in call.block.outputs}
+    for keyword, text in texts.items():
+        given = call.arguments.get(keyword)
+        operand = given.operand if isinstance(given, Unary) else given
+        if not isinstance(operand, (Reference, Element)):
+            continue
+        label = _common(operand, drive.program, config)
+        if label is None:
+            unseen.append(keyword)
+        else:
+            signals[keyword] = Signal(keyword, label, isinstance(given, Unary), text)
+    return signals, tuple(unseen)
+
+
+def _common(expression: Expression, program: Program, config: RackConfig) -> str | None:
+    """Return the common, or element, that an expression names; None where it is a local or not one element."""
+    name = print_expression(expression)
+    symbol = program.symbols.get(name.partition("(")[0])
+    if symbol is None or symbol.scope is not Scope.COMMON:
+        return None
+    try:
+        return element(name, config.by_name, "the rack has no common variable").label
+    except NameFault:
+        return None
+
+
+def _of_registers(drive: RackDrive, config: RackConfig) -> dict[str, Signal]:
+    """Return the command and feedback registers of a UDC's drive that have commons."""
+    found = sorted(_registers(drive, config))[:MOST_REGISTERS]
+    return {
+        (keyword := _KEYWORDS.get(register, f"register {register}")): Signal(
+            keyword, name, text=_WORDS.get(register, "")
+        )
+        for register, name in found
+    }
+
+
+_KEYWORDS = {CURRENT: "I_FDBK", SPEED: "SPEED_FDBK"}
+"""What registers of a PMI are that a current minor loop has too; 4095 counts are full scale of both (36)."""
+_WORDS = {item.number: item.meaning for item in (*COMMAND_REGISTERS, *FEEDBACK_REGISTERS) if item.bits}
+"""Registers of a PMI that are words of bits: a number says nothing next to others."""
+
+
+def _registers(drive: RackDrive, config: RackConfig) -> Iterator[tuple[int, str]]:
+    """Yield register, counted as drive A's, and common."""
+    base = SECOND_DRIVE * (drive.letter == "B")
+    for variable in config.declared:
+        point = variable.point
+        if point is None or point.slot != drive.slot or point.bit is not None or variable.is_array:
+            continue
+        if point.register - base in PMI_REGISTERS:
+            yield point.register - base, variable.name

@@ -1,0 +1,135 @@
+"""What happened in a recorded run: events of states, faults, errors, operations, and values that were set."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from automax_ros.core.kinds import WriterKind
+from automax_ros.core.problems import PROBLEMS
+from automax_ros.core.ticks import NS_PER_S, seconds_text
+from automax_ros.core.values import source_text
+from automax_ros.messages.types.messages import Operation
+from automax_ros.rack.operator.faults import meaning_of
+from automax_ros.recordings.read.common_log import Cell
+
+MOST_EVENTS = 2000
+"""Most events of a kind, and faults, of one drive that are kept; the first ones are (decision: a bound on memory)."""
+LONGEST = 300
+"""Longest text of an event."""
+TOGETHER_NS = NS_PER_S // 10
+"""Values that follow each other as closely are one course: the samples of a ramp or a sine (decision)."""
+_WHO = {WriterKind.ROS: "ROS sets", WriterKind.OPERATOR: "set"}
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened, s of the run. ``kind``: ``state``, ``fault``, ``error``, ``plant`` or ``operation``."""
+
+    time_s: float
+    kind: str
+    text: str
+
+
+@dataclass
+class _Written:
+    """A value that was written, and those that followed it closely."""
+
+    begin_ns: int
+    writer: WriterKind
+    first: Cell
+    end_ns: int
+    last: Cell
+    more: int = 0
+
+
+class ValuesSet:
+    """What operators, stimuli and ROS have written, each value once; values that follow closely are one course."""
+
+    def __init__(self) -> None:
+        """Begin with nothing written."""
+        self._open: dict[str, _Written] = {}
+        self._told: list[tuple[int, str]] = []
+        self._values: dict[str, Cell] = {}
+        self.untold = 0
+
+    def take(self, time_ns: int, writer: WriterKind, values: Sequence[tuple[str, Cell]]) -> None:
+        """Take a write; what ROS says again and again is told once."""
+        for name, value in values:
+            if writer is WriterKind.ROS and self._values.get(name) == value:
+                continue
+            self._values[name] = value
+            before = self._open.get(name)
+            if before is not None and before.writer is writer and time_ns - before.end_ns < TOGETHER_NS:
+                before.end_ns, before.last, before.more = time_ns, value, before.more + 1
+                continue
+            self._tell(name)
+            self._open[name] = _Written(time_ns, writer, value, time_ns, value)
+
+    def events(self) -> list[Event]:
+        """Return all that was written, in the order of time."""
+        for name in list(self._open):
+            self._tell(name)
+        told = sorted(self._told, key=lambda item: item[0])
+        return [Event(time_ns / NS_PER_S, "operation", cut(text)) for time_ns, text in told]
+
+    def _tell(self, name: str) -> None:
+        written = self._open.pop(name, None)
+        if written is None:
+            return
+        if len(self._told) >= MOST_EVENTS:
+            self.untold += 1
+            return
+        text = f"{_WHO[written.writer]} {name} = {source_text(written.first)}"
+        if written.more:
+            end = seconds_text(written.end_ns)
+            text += f", then {written.more} more values to {source_text(written.last)} at {end} s"
+        self._told.append((written.begin_ns, text))
+
+
+@dataclass
+class Happenings:
+    """The events of a run while it is read, at most ``MOST_EVENTS`` of a kind; ``untold`` counts the rest."""
+
+    events: list[Event] = field(default_factory=list)
+    untold: int = 0
+    _told: Counter[str] = field(default_factory=Counter)
+
+    def tell(self, time_s: float, kind: str, text: str) -> None:
+        """Note an event."""
+        self._told[kind] += 1
+        if self._told[kind] <= MOST_EVENTS:
+            self.events.append(Event(time_s, kind, cut(text)))
+        else:
+            self.untold += 1
+
+    def finish(self, values_set: ValuesSet) -> None:
+        """Bring all into the order of time; of one instant what was set comes first, for the rest follows from it."""
+        self.events[:0] = values_set.events()
+        self.untold += values_set.untold
+        self.events.sort(key=lambda event: event.time_s)
+
+
+def cut(text: str) -> str:
+    """Return a text no longer than an event's."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+def error_text(code: int, line: int) -> str:
+    """Return an entry of a task's error log in words."""
+    name = f"AMX{code:04d}"
+    problem = PROBLEMS.get(name)
+    title = f": {problem.title}" if problem is not None else ""
+    hardware = f", code {problem.hardware}" if problem is not None and problem.hardware else ""
+    return f"{name}{title} (line {line}{hardware})"
+
+
+def operation_text(operation: Operation) -> str:
+    """Return an operation in words, "" for a value that was set: the write log has it."""
+    if operation.what == "set" and operation.ok:
+        return ""
+    words = " ".join(text for text in (operation.what, operation.task, operation.detail) if text)
+    if operation.what == "stop_all" and operation.detail:
+        words += f": code {operation.detail}, {meaning_of(operation.detail)}"
+    return words if operation.ok else f"{words}: refused, {operation.reason}"

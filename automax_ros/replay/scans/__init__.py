@@ -1,0 +1,1 @@
+"""Replay scan by scan: what a scan saw, and what differs."""

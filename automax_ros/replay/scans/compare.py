@@ -1,0 +1,262 @@
+"""Counts what differs between recorded and replayed scans: first, greatest, how often, and where it settles.
+
+What is kept does not grow with the recording: a tally for each thing that differs, up to a limit; the rest is counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from typing import NamedTuple
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.core.types import Value
+from automax_ros.replay.scans.report import (
+    Difference,
+    FirstScan,
+    Greatest,
+    Kind,
+    NamedValue,
+    Point,
+    Settled,
+)
+
+BAND_COUNTS = 2
+"""A difference of whole numbers counts as settled within this many counts (decision) ..."""
+BAND_SHARE = 0.05
+"""... or, for REALs too, within this share of the recorded value (decision)."""
+SETTLED_SCANS = 10
+"""Scans that a difference must stay within that band to count as settled (decision)."""
+_MOST_COUNTED = 100_000
+"""Most things beyond the limit that are told apart; there may be more, but nobody reads that."""
+
+
+class Found(NamedTuple):
+    """What differs after one scan; ``counts`` is FALSE where it lies within the tolerance."""
+
+    kind: Kind
+    key: Hashable
+    recorded: Value
+    replayed: Value
+    counts: bool = True
+
+
+class Label(NamedTuple):
+    """How the report calls a thing: name, unit, and the BASIC lines that can write it."""
+
+    name: str
+    unit: str = ""
+    lines: tuple[int, ...] = ()
+
+
+class Seen(NamedTuple):
+    """What a scan saw: latched values and reads, with their names."""
+
+    latched: tuple[NamedValue, ...] = ()
+    read: tuple[NamedValue, ...] = ()
+
+
+class _Run:
+    """The stretch of scans, up to now, in which a difference has stayed in its band; ``floor`` is its least width."""
+
+    def __init__(self, scan: int, time_s: float, difference: float, floor: float) -> None:
+        self._floor = floor
+        self._scan, self._time_s = scan, time_s
+        self._low = self._high = self._begin = self._latest = difference
+        self._scans = self._same = 1
+        self._zero_scan, self._zero_time_s, self._zeros = scan, time_s, 0
+
+    def add(self, scan: int, time_s: float, difference: float) -> None:
+        """Go on by a scan; outside of the band, and after a stretch of equality, a new stretch begins."""
+        if difference:
+            was_equal, self._zeros = self._zeros >= SETTLED_SCANS, 0
+        else:
+            was_equal = False
+            if not self._zeros:
+                self._zero_scan, self._zero_time_s = scan, time_s
+            self._zeros += 1
+        low, high = min(self._low, difference), max(self._high, difference)
+        if was_equal or high - low > max(self._floor, BAND_SHARE * max(abs(low), abs(high))):
+            self._scan, self._time_s, self._scans = scan, time_s, 1
+            self._low = self._high = self._begin = difference
+        else:
+            self._low, self._high = low, high
+            self._scans += 1
+        self._same = self._same + 1 if difference == self._latest else 1
+        self._latest = difference
+
+    def settled(self) -> Settled | None:
+        """Return the stretch, None where it is too short to be called settled."""
+        if self._zeros >= SETTLED_SCANS:
+            return Settled(self._zero_scan, self._zero_time_s, 0, 0)
+        moves = self._high - self._low > self._floor and self._same < SETTLED_SCANS
+        drifts = moves and {self._begin, self._latest} == {self._low, self._high}
+        if self._scans < SETTLED_SCANS or drifts:
+            return None
+        return Settled(self._scan, self._time_s, self._low, self._high)
+
+
+class _Tally:
+    """One thing that differs in at least one scan."""
+
+    def __init__(self, task: str, kind: Kind, label: Label, first: Point) -> None:
+        self.task, self.kind, self.label, self.first = task, kind, label, first
+        self._scans = 0
+        self._greatest: Greatest | None = None
+        self._run: _Run | None = None
+
+    def differs(self, found: Found, scan: int, time_s: float) -> None:
+        """Count a scan after which it differs."""
+        self._scans += found.counts
+        if self.kind is not Kind.VARIABLE:
+            return
+        difference = _difference(found.recorded, found.replayed)
+        if difference is None:
+            self._goes_on(scan, time_s, 1, 0)
+            return
+        if self._greatest is None or abs(difference) > abs(self._greatest.difference):
+            self._greatest = Greatest(scan, time_s, difference)
+        self._goes_on(scan, time_s, difference, BAND_COUNTS if isinstance(difference, int) else 0)
+
+    def agrees(self, scan: int, time_s: float) -> None:
+        """Count a scan after which it does not differ."""
+        if self._run is not None:
+            self._run.add(scan, time_s, 0)
+
+    def result(self) -> Difference:
+        """Return what was counted."""
+        settled = self._run.settled() if self._run else None
+        label = self.label
+        return Difference(
+            self.task,
+            self.kind,
+            label.name,
+            self.first,
+            self._scans,
+            label.unit,
+            label.lines,
+            self._greatest,
+            settled,
+        )
+
+    def _goes_on(self, scan: int, time_s: float, difference: float, floor: float) -> None:
+        if self._run is None:
+            self._run = _Run(scan, time_s, difference, floor)
+        else:
+            self._run.add(scan, time_s, difference)
+
+
+class Tallies:
+    """All that differs in one replay; times count from ``origin`` (ns), at most ``limit`` things are told in full."""
+
+    def __init__(self, origin: int, limit: int) -> None:
+        self.origin = origin
+        self._limit = limit
+        self._by_task: dict[str, dict[tuple[Kind, Hashable], _Tally]] = {}
+        self._count = 0
+        self._beyond: set[tuple[str, Kind, Hashable]] = set()
+        self._first: tuple[str, int, float, Seen] | None = None
+
+    def time_s(self, stamp: int) -> float:
+        """Return the time of a stamp since the start of the run."""
+        return (stamp - self.origin) / NS_PER_S
+
+    def is_clean(self, task: str) -> bool:
+        """Return whether nothing of a task has differed so far."""
+        return not self._by_task.get(task)
+
+    def scan(
+        self,
+        task: str,
+        scan: int,
+        stamp: int,
+        found: Sequence[Found],
+        label: Callable[[Kind, Hashable], Label],
+        seen: Callable[[], Seen],
+    ) -> bool:
+        """Count one scan; return whether it differs. ``label`` and ``seen`` are asked at a thing's first difference."""
+        tallies = self._by_task.setdefault(task, {})
+        if not found and not tallies:
+            return False
+        time_s = self.time_s(stamp)
+        now: set[tuple[Kind, Hashable]] = set()
+        for item in found:
+            key = (item.kind, item.key)
+            tally = tallies.get(key) or (self._new(task, item, scan, time_s, label) if item.counts else None)
+            if tally is not None:
+                tally.differs(item, scan, time_s)
+                now.add(key)
+        for key, tally in tallies.items():
+            if key not in now:
+                tally.agrees(scan, time_s)
+        differs = any(item.counts for item in found)
+        if differs and self._first is None:
+            self._first = (task, scan, time_s, seen())
+        return differs
+
+    def states(
+        self,
+        task: str,
+        scan: int,
+        stamp: int,
+        found: Sequence[Found],
+        label: Callable[[Kind, Hashable], Label],
+        seen: Callable[[], Seen],
+    ) -> None:
+        """Count the fields in which one recorded state differs."""
+        tallies = self._by_task.setdefault(task, {})
+        time_s = self.time_s(stamp)
+        for item in found:
+            tally = tallies.get((item.kind, item.key)) or self._new(task, item, scan, time_s, label)
+            if tally is not None:
+                tally.differs(item, scan, time_s)
+        if found and self._first is None:
+            self._first = (task, scan, time_s, seen())
+
+    def differences(self) -> tuple[Difference, ...]:
+        """Return everything that was told in full, by the time of its first difference."""
+        tallies = [tally for by_key in self._by_task.values() for tally in by_key.values()]
+        return tuple(sorted((tally.result() for tally in tallies), key=lambda item: item.first.time_s))
+
+    @property
+    def more(self) -> int:
+        """How many things differ beyond the limit."""
+        return len(self._beyond)
+
+    def first(self) -> FirstScan | None:
+        """Return the first scan that differs."""
+        if self._first is None:
+            return None
+        task, scan, time_s, seen = self._first
+        here = (task, scan, time_s)
+        differences = [item for item in self.differences() if (item.task, item.first.scan, item.first.time_s) == here]
+        return FirstScan(task, scan, time_s, tuple(differences), seen.latched, seen.read)
+
+    def _new(
+        self, task: str, item: Found, scan: int, time_s: float, label: Callable[[Kind, Hashable], Label]
+    ) -> _Tally | None:
+        """Begin a tally; None beyond the limit."""
+        if self._count >= self._limit:
+            if len(self._beyond) < _MOST_COUNTED:
+                self._beyond.add((task, item.kind, item.key))
+            return None
+        self._count += 1
+        first = Point(scan, time_s, item.recorded, item.replayed)
+        tally = _Tally(task, item.kind, label(item.kind, item.key), first)
+        self._by_task[task][item.kind, item.key] = tally
+        return tally
+
+
+def within(recorded: Value, replayed: Value, tolerance: float) -> bool:
+    """Whether two numbers differ by at most a tolerance; booleans and strings never do."""
+    difference = _difference(recorded, replayed) if tolerance else None
+    return difference is not None and abs(difference) <= tolerance
+
+
+def _difference(recorded: Value, replayed: Value) -> float | None:
+    """How much is replayed more than was recorded; None if they are not numbers."""
+    for value in (recorded, replayed):
+        if isinstance(value, (bool, str)):
+            return None
+    assert not isinstance(recorded, str)
+    assert not isinstance(replayed, str)
+    return replayed - recorded

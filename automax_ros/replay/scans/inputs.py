@@ -1,0 +1,315 @@
+"""What a recorded scan saw: common memory as the write log tells it, and the four memory operations of one scan on it.
+
+In the log a scan stands before the writes that it caused, so common memory as rebuilt so far is what the scan saw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.types import Latched, Value, same_bits
+from automax_ros.messages.types.messages import Scan
+from automax_ros.recordings.read.common_log import Entry, Key
+from automax_ros.replay.scans.channels import CHANNELS, RecordedChannels
+from automax_ros.replay.scans.commons import RecordedCommons
+from automax_ros.replay.scans.drives import DRIVES, RecordedDrive
+from automax_ros.runtime.memory.views import LatchPlan, latch_plan
+
+_APART = CHANNELS | DRIVES
+"""The views of what a scan got from elsewhere than memory."""
+
+
+class ScanMemory:
+    """Common memory as one task's recorded scans saw it; what the task does to it is kept apart.
+
+    A scan reads what it wrote itself, in this scan or an earlier one as long as nobody else has written there since. As
+    long as it reads and writes in the recorded order, its other reads are the recorded ones; but where the recorded
+    scan wrote the variable itself, an edited one, which may not have done so, reads the memory of the recording.
+
+    ``apart`` are the values that the task's own writes left different from the recorded ones. ``channels`` are those of
+    a BASIC task, ``drive`` is that of a current minor loop task.
+
+    A modeled scan stands in the log where it ended, some of its own writes before it. An edited one reads what memory
+    is there, without these: others may have written it since the latch (decision).
+    """
+
+    def __init__(self, commons: RecordedCommons, *, edited: bool = False) -> None:
+        """Take the memory of the recording; ``edited``: another source runs than the recorded one."""
+        self.now_ns = 0
+        self.channels = RecordedChannels()
+        self.drive = RecordedDrive()
+        self._edited = edited
+        self.apart: dict[Key, Value] = {}
+        self._commons = commons
+        self._index = {variable.name: view for view, variable in enumerate(commons.rack)}
+        self._views: tuple[int, ...] = ()
+        self._positions: dict[int, int] = {}
+        self._recorded: list[Value] = []
+        self._untold: set[int] = set()
+        self._in_step = False
+        self._reads: list[Entry] = []
+        self._read_count = 0
+        self._writes: list[Entry] = []
+        self._rewritten: frozenset[Key] = frozenset()
+        self._write_count = 0
+        self._committed: list[Entry] = []
+        self._own: dict[Key, Value] = {}
+        self._forced: frozenset[Key] = frozenset()
+        self._on_forces: list[Callable[[], None]] = []
+        self._before: dict[Key, Value] = {}
+        """What stood where the recorded scan that is still to come has written already."""
+
+    @property
+    def carried(self) -> tuple[object, ...]:
+        """What was left by scans before, but for what the next full scan tells again."""
+        return sorted(self.apart.items()), sorted(self._before.items())
+
+    def view(self, name: str) -> int:
+        """Return the view of a variable by its full name; KeyError if the rack has none."""
+        return self._index[name]
+
+    def is_forced(self, view: int) -> bool:
+        """Return whether a force held a simple view when the recorded scan latched."""
+        return (view, 0) in self._forced
+
+    def under_force(self, view: int) -> Value:
+        """Return what the recorded scan found under a force."""
+        return self.read_now(view)
+
+    def watch_forces(self, changed: Callable[[], None]) -> None:
+        """Call ``changed`` whenever another set of forces holds for a scan than for the one before."""
+        self._on_forces.append(changed)
+
+    def plan(self, views: Sequence[int]) -> LatchPlan:
+        """Remember what the task latches."""
+        self._views = tuple(views)
+        self._positions = {view: position for position, view in enumerate(self._views)}
+        self._recorded = [0] * len(self._views)
+        self.forget_latch()
+        return latch_plan(views)
+
+    def forget_latch(self) -> None:
+        """Scans are missing: what the task latched last is not known any more."""
+        self._untold = set(range(len(self._views)))
+
+    def follow(self, scan: Scan) -> None:
+        """Take over what a scan newly latched; to be called for each scan, executed or not.
+
+        Raises:
+            BagError: the scan does not fit the variables of the rack.
+        """
+        if not scan.scan:
+            return
+        if scan.full:
+            self.forget_latch()
+        for view, _, value in self._commons.entries(scan.latched, scan.stamp):
+            position = self._positions.get(view)
+            if position is not None:
+                self._recorded[position] = value
+                self._untold.discard(position)
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether all that a scan sees is what the recorded one latched and read."""
+        return not (self._untold or self.apart or self._before or self._forced)
+
+    @property
+    def latched_last(self) -> Sequence[Value]:
+        """What the task latched last."""
+        return self._recorded
+
+    def follow_skipped(self, latched: Sequence[Value]) -> None:
+        """Take over what the last of the scans latched that were executed elsewhere."""
+        self._recorded[:] = latched
+
+    def begin(self, scan: Scan) -> None:
+        """Prepare for the execution of a scan that ``follow`` was told of.
+
+        Raises:
+            BagError: the scan does not fit the variables of the rack.
+        """
+        commons = self._commons
+        reads = commons.reads(scan.read, scan.stamp)
+        self._reads = [entry for entry in reads if entry[0] not in _APART]
+        self.channels.begin(entry for entry in reads if entry[0] in CHANNELS)
+        self.drive.begin(entry for entry in reads if entry[0] in DRIVES)
+        self._writes = commons.entries(scan.written, scan.stamp)
+        self._committed = commons.entries(scan.committed, scan.stamp)
+        self._rewritten = frozenset(entry[:2] for entry in self._writes) if self._edited else frozenset()
+        self._read_count = self._write_count = 0
+        self._in_step = True
+        self._own.clear()
+        forced = commons.forced_at(scan.stamp) if scan.duration_ns else commons.forced
+        if forced != self._forced:
+            self._forced = forced
+            for changed in self._on_forces:
+                changed()
+
+    def latch(self, plan: LatchPlan) -> Latched:  # noqa: ARG002
+        """Return what the recorded scan latched, and of what only this task latches or has changed, what it sees."""
+        if not self._untold and not self.apart:
+            return tuple(self._recorded)
+        values = list(self._recorded)
+        for position in self._untold:
+            if (self._views[position], 0) not in self.apart:
+                values[position] = self._told((self._views[position], 0))
+        for (view, _), value in self.apart.items():
+            latched_at = self._positions.get(view)
+            if latched_at is not None:
+                values[latched_at] = value
+        return tuple(values)
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Return what the scan sees now."""
+        key = (view, element)
+        number = self._read_count
+        if self._in_step:
+            self._read_count = number + 1
+            self._in_step = number < len(self._reads) and self._reads[number][:2] == key
+        if self._in_step and not self._edited and key not in self.apart:
+            return self._reads[number][2]  # others may have written since the scan itself did
+        if key in self._own:
+            return self._own[key]
+        if key in self.apart:
+            return self.apart[key]
+        if self._in_step and key not in self._rewritten:
+            return self._reads[number][2]
+        return self._told(key)
+
+    def write_now(
+        self,
+        view: int,
+        value: Value,
+        writer: int,  # noqa: ARG002
+        element: int = 0,
+        kind: WriteKind = WriteKind.BASIC,  # noqa: ARG002
+    ) -> None:
+        """Keep what a BASIC statement writes."""
+        self._take(view, element, value)
+        number = self._write_count
+        self._write_count = number + 1
+        if self._in_step:
+            if number < len(self._writes):
+                recorded = self._writes[number]
+                self._in_step = recorded[0] == view and recorded[1] == element and same_bits(recorded[2], value)
+            else:
+                self._in_step = False
+
+    def commit(self, changes: Iterable[tuple[int, Value]], writer: int) -> None:  # noqa: ARG002
+        """Keep what blocks changed."""
+        for view, value in changes:
+            self._take(view, 0, value)
+
+    def finish(self, commits: Sequence[tuple[int, Value]]) -> list[tuple[Key, Value, Value]]:
+        """End a scan; return what differs from the recorded memory now: key, recorded and replayed value.
+
+        Raises:
+            UnknownValue: a value is needed that the recording has not told.
+        """
+        if not self.apart and self.writes_agree and self._commits_agree(commits):
+            self._before.clear()
+            return []
+        recorded = self._recorded_changes()
+        different: list[tuple[Key, Value, Value]] = []
+        for key in sorted({*recorded, *self._own, *self.apart}):
+            before = None if key in recorded else self._commons.value(key)
+            its = recorded[key] if before is None else before
+            if key in self._own:
+                own = self._own[key]
+            elif key in self.apart:
+                own = self.apart[key]
+            else:
+                own = self._told(key)
+            if same_bits(its, own):
+                self.apart.pop(key, None)
+            else:
+                self.apart[key] = own
+                different.append((key, its, own))
+        self._before.clear()
+        return different
+
+    @property
+    def writes_agree(self) -> bool:
+        """Whether the scan's BASIC statements wrote just what the recorded ones did, in the same order."""
+        return self._in_step and self._write_count == len(self._writes)
+
+    @property
+    def recorded_writes(self) -> list[Entry]:
+        """What the recorded scan's BASIC statements wrote, in their order."""
+        return self._writes
+
+    def after_recorded(self, key: Key) -> Value:
+        """Return a value as it was after the recorded scan.
+
+        Raises:
+            UnknownValue: the recording has not told it.
+        """
+        changes = self._recorded_changes()
+        return changes[key] if key in changes else self._commons.value(key)
+
+    @property
+    def is_apart(self) -> bool:
+        """Whether a write of somebody else matters to what the task finds."""
+        return bool(self.apart or self._before)
+
+    def overwritten(self, entries: Iterable[Entry]) -> None:
+        """Somebody else has written: what the task wrote there before is gone."""
+        for view, element, _ in entries:
+            self.apart.pop((view, element), None)
+            self._before.pop((view, element), None)
+
+    def written_early(self, key: Key) -> None:
+        """The recorded scan that is still to come is about to write a value in the log: remember what stands there."""
+        if self._edited and key not in self._before and self._commons.is_known(key):
+            self._before[key] = self._commons.value(key)
+
+    def _told(self, key: Key) -> Value:
+        """Return what the recording tells of a value, without what the recorded scan itself has written by now."""
+        return self._before[key] if key in self._before else self._commons.value(key)
+
+    def _take(self, view: int, element: int, value: Value) -> None:
+        """Keep what the scan writes, and what else shows the same registers; a force keeps its value."""
+        if (view, element) in self._commons.forced:
+            return
+        if view in self._commons.registers.views:
+            self._own.update(self._spread(view, element, value, self._present))
+        else:
+            self._own[view, element] = value
+
+    def _recorded_changes(self) -> dict[Key, Value]:
+        """Return what the recorded scan changed: its writes, and what else shows the same registers."""
+        commons, changes = self._commons, dict[Key, Value]()
+
+        def read(view: int, element: int) -> Value:
+            key = (view, element)
+            return changes[key] if key in changes else commons.value(key)
+
+        for view, element, value in (*self._writes, *self._committed):
+            if (view, element) in commons.forced:
+                continue
+            if view in commons.registers.views:
+                changes.update(self._spread(view, element, value, read))
+            else:
+                changes[view, element] = value
+        return changes
+
+    def _spread(self, view: int, element: int, value: Value, read: Callable[[int, int], Value]) -> dict[Key, Value]:
+        """Return what a write of registers changes: them, and what else shows them; a force keeps its value."""
+        registers, forced = self._commons.registers, self._commons.forced
+        value = registers.keeping(view, element, value, forced, read)
+        others = {entry[:2]: entry[2] for entry in registers.consequences(view, element, value, read)}
+        return {**{key: shown for key, shown in others.items() if key not in forced}, (view, element): value}
+
+    def _present(self, view: int, element: int) -> Value:
+        """Return a value as the task has left it, else as the recording has it."""
+        key = (view, element)
+        if key in self._own:
+            return self._own[key]
+        return self.apart[key] if key in self.apart else self._told(key)
+
+    def _commits_agree(self, commits: Sequence[tuple[int, Value]]) -> bool:
+        recorded = self._committed
+        return len(commits) == len(recorded) and all(
+            one[0] == other[0] and one[1] == other[2] for one, other in zip(commits, recorded, strict=True)
+        )

@@ -1,0 +1,107 @@
+"""What a replay has counted, over the whole recording or a part of it; parts are added up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from automax_ros.replay.scans.report import Difference, FirstScan, TaskReport
+
+MOST_NOTES = 200
+"""Notes about one task that are kept; a report shows the first of them."""
+_NOTES_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class TaskTotals:
+    """One task: scans and states compared, scans that differ, scans that could not be executed, notes, each once."""
+
+    name: str
+    source: str
+    edited: bool
+    compared: int
+    different: int
+    states: int
+    left_out: int
+    notes: tuple[str, ...]
+
+    def since(self, base: TaskTotals) -> TaskTotals:
+        """Return what was counted after ``base``."""
+        notes = tuple(note for note in self.notes if note not in base.notes)
+        return self._counted(base, -1, notes)
+
+    def and_then(self, other: TaskTotals) -> TaskTotals:
+        """Return this and what was counted later."""
+        notes = tuple(dict.fromkeys((*self.notes, *other.notes)))[:MOST_NOTES]
+        return self._counted(other, 1, notes)
+
+    def report(self) -> TaskReport:
+        """Return the task's part of the report."""
+        notes = list(self.notes)
+        if self.left_out:
+            scans, them = (f"{self.left_out} scans", "them") if self.left_out > 1 else ("1 scan", "it")
+            left = f"{scans} could not be executed again: the state before {them} is not recorded"
+            notes = list(dict.fromkeys([*notes, left])) if len(notes) < MOST_NOTES else notes
+        if len(notes) > _NOTES_SHOWN:
+            notes = [*notes[:_NOTES_SHOWN], f"and {len(notes) - _NOTES_SHOWN} notes more"]
+        return TaskReport(self.name, self.source, self.edited, self.compared, self.different, self.states, tuple(notes))
+
+    def _counted(self, other: TaskTotals, sign: int, notes: tuple[str, ...]) -> TaskTotals:
+        return replace(
+            self,
+            compared=self.compared + sign * other.compared,
+            different=self.different + sign * other.different,
+            states=self.states + sign * other.states,
+            left_out=self.left_out + sign * other.left_out,
+            notes=notes,
+        )
+
+
+@dataclass(frozen=True)
+class Totals:
+    """All tasks by their names, and what differs.
+
+    ``first_stamp`` is that of the first message, ``last_stamp`` that of the last scan; None before there was one.
+    """
+
+    first_stamp: int | None
+    last_stamp: int | None
+    tasks: Mapping[str, TaskTotals]
+    first: FirstScan | None = None
+    differences: tuple[Difference, ...] = ()
+    more: int = 0
+
+    @property
+    def clean(self) -> bool:
+        """Whether nothing differs."""
+        return self.first is None and not self.differences and not self.more
+
+    @property
+    def full(self) -> bool:
+        """Whether there are as many notes as are kept: some may have been left out."""
+        return any(len(task.notes) >= MOST_NOTES for task in self.tasks.values())
+
+    def since(self, base: Totals) -> Totals:
+        """Return what was counted after ``base``, in which nothing differs."""
+        return replace(self, tasks={name: task.since(base.tasks[name]) for name, task in self.tasks.items()})
+
+    def forgetting_notes(self) -> Totals:
+        """Return these counts without the notes."""
+        return replace(self, tasks={name: replace(task, notes=()) for name, task in self.tasks.items()})
+
+    def and_then(self, other: Totals) -> Totals:
+        """Return this, in which nothing differs, and what was counted later."""
+        return replace(
+            other,
+            first_stamp=self.first_stamp if self.first_stamp is not None else other.first_stamp,
+            last_stamp=other.last_stamp if other.last_stamp is not None else self.last_stamp,
+            tasks={name: task.and_then(other.tasks[name]) for name, task in self.tasks.items()},
+        )
+
+
+def added_up(parts: Iterable[Totals]) -> Totals:
+    """Return what parts have counted together, in their order; there is at least one."""
+    first, *others = parts
+    for part in others:
+        first = first.and_then(part)
+    return first

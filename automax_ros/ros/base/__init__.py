@@ -1,0 +1,1 @@
+"""What the nodes of all modules share: the node, topics that write, lifecycle, diagnostics, the clock."""

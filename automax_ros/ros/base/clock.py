@@ -1,0 +1,172 @@
+"""A rack's time and ``/clock``: which of its paces a rack has, told to others or heard from them.
+
+- On the wall clock ``/clock`` is nobody's business.
+- Simulated (``automax run --simulated --ros``) the rack sends ``/clock`` after all messages of the instant.
+- With ``use_sim_time`` the rack follows another's ``/clock``: it begins with the first message, and each further one
+  lets all happen that happens up to it (``FollowingPacer``). Writes that have come before a message of the clock are
+  taken before it (``Door``).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.messages.cdr.cdr import CdrError, decode, encoder
+from automax_ros.messages.types.messages import Clock
+from automax_ros.messages.types.topics import QosProfile
+from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.qos import message_class, ros_qos
+from automax_ros.ros.intake.guard import Throttle
+from automax_ros.ros.intake.rack_lock import Turns
+from automax_ros.ros.intake.raw_messages import taker_of
+from automax_ros.ros.intake.rcl import library
+from automax_ros.runtime.time.following_pacer import FollowingPacer
+from automax_ros.runtime.time.pacer import Pace, Pacer
+from automax_ros.runtime.time.scheduler import Scheduler
+from automax_ros.runtime.time.simulated_pacer import SimulatedPacer, SimulatedTime
+
+CLOCK = "/clock"
+_TYPE = "rosgraph_msgs/msg/Clock"
+_TOLD = QosProfile("reliable", "volatile", "keep_last", 10)
+_HEARD = QosProfile("best_effort", "volatile", "keep_last", 1000)
+"""Publishers of ``/clock`` may be of either kind; this many wait while the rack is busy."""
+_MOST_BYTES = 64
+_LATEST_NS = ((1 << 31) - 366 * 24 * 3600) * NS_PER_S
+"""The stamps of ROS end in 2038: a clock that leaves a rack less than a year until then is refused (decision)."""
+_WAIT_S = 0.05
+_LOOK_INTERVAL_S = 1.0
+"""Time between two looks for other publishers of ``/clock``."""
+JUMP = "clock jump"
+TAKEN = "other /clock"
+MALFORMED = "malformed /clock"
+"""What ``Health`` counts."""
+
+
+class RackClock:
+    """Makes the pace of one rack, and joins it with ``/clock``."""
+
+    def __init__(self, scheduler: Scheduler, turns: Turns, *, follows: bool, simulated: SimulatedTime | None) -> None:
+        """Make the pace; simulated time is the rack's own, even where all nodes are to follow ``/clock``."""
+        self._site: Site | None = None
+        self._node: ModuleNode | None = None
+        self._topic = CLOCK
+        self._publish: Callable[[bytes], object] = _unsent
+        self._encode = encoder(_TYPE)
+        self._throttle, self._telling = Throttle(_LOOK_INTERVAL_S), Throttle(_LOOK_INTERVAL_S)
+        self._follower: FollowingPacer | None = None
+        self.pace: Pace
+        if simulated is not None:
+            self.pace = SimulatedPacer(scheduler, self._tell, rate=simulated.rate, turn=turns.scanner)
+        elif follows:
+            self.pace = self._follower = FollowingPacer(scheduler, self._jumped, turn=turns.scanner)
+        else:
+            self.pace = Pacer(scheduler, turn=turns.scanner)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the rack can begin: where it follows a clock, that has been heard."""
+        return self._follower is None or self._follower.has_clock
+
+    def join(self, site: Site, node: ModuleNode) -> None:
+        """Send or hear ``/clock`` by a node of the rack."""
+        self._site, self._node = site, node
+        if isinstance(self.pace, SimulatedPacer):
+            publisher = node.create_publisher(message_class(_TYPE), CLOCK, ros_qos(_TOLD))
+            self._publish, self._topic = publisher.publish, publisher.topic_name
+        elif self._follower is not None:
+            subscription = node.own_subscription(message_class(_TYPE), CLOCK, ros_qos(_HEARD))
+            self._topic = subscription.topic_name
+            site.door.add(_ClockWay(subscription, self._hear), last=True)
+
+    def wait(self, should_stop: Callable[[], bool], on_idle: Callable[[int], None] | None = None) -> bool:
+        """Wait until the rack can begin; FALSE where asked to stop. ``on_idle`` gets rack time meanwhile, 0."""
+        while not self.is_there:
+            if on_idle is not None:
+                on_idle(self.pace.now_ns)
+            if should_stop():
+                return False
+            time.sleep(_WAIT_S)
+        return True
+
+    def _tell(self, now_ns: int) -> None:
+        assert self._site is not None
+        self._publish(self._encode(Clock(self._site.stream.stamp(now_ns))))
+        self._look_around(own=1)
+
+    def _hear(self, payload: bytes | None) -> None:
+        assert self._site is not None
+        try:
+            message = decode(_TYPE, payload or b"")
+            assert isinstance(message, Clock)
+            if not 0 <= message.clock < _LATEST_NS:
+                raise CdrError(f"{message.clock} ns is not a time that a clock tells")
+            self._follow(message.clock)
+        except CdrError as error:
+            text = f"{CLOCK}: {error}"
+            self._site.health.note(MALFORMED, CLOCK, lambda: text)
+            return
+        self._look_around(own=0)
+
+    def _follow(self, clock_ns: int) -> None:
+        """Take a time of the clock.
+
+        Raises:
+            CdrError: stamps, which are ahead of a clock that went back, would come to the end of what ROS can tell.
+        """
+        assert self._site is not None
+        assert self._follower is not None
+        with self._site.lock.scanner:
+            stamp = self._site.stream.stamp(self._follower.now_ns) + self._follower.ahead_ns(clock_ns)
+            if stamp >= _LATEST_NS:
+                raise CdrError(f"{clock_ns} ns comes after a clock that went back, and would be a stamp of {stamp} ns")
+            self._follower.heard(clock_ns)
+
+    def _look_around(self, own: int) -> None:
+        """Warn where more than one node sends ``/clock``."""
+        assert self._node is not None
+        assert self._site is not None
+        if self._throttle.passes() and self._node.count_publishers(self._topic) > 1:
+            text = "another node sends /clock too" if own else "several nodes send /clock"
+            if not self._site.health.counts[TAKEN]:
+                self._node.get_logger().warning(text)
+            self._site.health.note(TAKEN, CLOCK, lambda: text)
+
+    def _jumped(self, by_ns: int) -> None:
+        assert self._site is not None
+        assert self._node is not None
+        if by_ns > 0:
+            self._site.stream.leave_out(by_ns)
+            text = f"/clock went ahead by {by_ns / NS_PER_S:.9g} s: the rack leaves that time out"
+        else:
+            text = f"/clock went back by {-by_ns / NS_PER_S:.9g} s: rack time and stamps go on from where they are"
+        self._site.health.note(JUMP, by_ns > 0, lambda: text)
+        if self._telling.passes():
+            self._node.get_logger().warning(text)
+
+
+class _ClockWay:
+    """The subscription of ``/clock``, as the door serves it."""
+
+    def __init__(self, subscription: Any, hear: Callable[[bytes | None], None]) -> None:
+        self.name, self.handle = subscription.topic_name, subscription.handle
+        self._taker, self._hear = taker_of(subscription, _MOST_BYTES), hear
+
+    def take(self) -> bool:
+        """Take the next message."""
+        taken = self._taker.take()
+        if taken is not None:
+            self._hear(taken.payload)
+        return taken is not None
+
+    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
+        """Let rcl call a function for each message."""
+        rcl = library()
+        assert rcl is not None
+        return int(rcl.on_message(pointer, callback, data))
+
+
+def _unsent(_: bytes) -> None:
+    """Send nothing: the rack has no node yet."""

@@ -1,0 +1,153 @@
+"""``/diagnostics`` of one process: one message with the health of the rack, its modules, tasks and plants.
+
+It is sent once per second of rack time, and at once when a level has changed, five times per second at most (decision).
+While the rack is halted it goes by the wall clock, so that nobody takes a halted rack for a dead one. A status is named
+``RACK/NODE: PART``, ``pm1/processor_1: LINE``, in the form that diagnostic_aggregator groups; its ``hardware_id`` is
+``PM1 slot 1``. Levels are those of REP-107; STALE is never sent: it is the reader's word for what does not come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.operator.halting import Haltable, is_halted
+from automax_ros.rack.rack import Rack
+from automax_ros.ros.intake.guard import Throttle
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.tasks.task import ScanRecord, Task
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent
+
+PERIOD_NS = NS_PER_S
+"""How often all statuses are sent, rack time."""
+SHORTEST_NS = 200 * NS_PER_MS
+"""Least time from one message to a look at the levels ..."""
+LOOK_NS = 50 * NS_PER_MS
+"""... and from one look to the next, rack time."""
+TOPIC = "/diagnostics"
+_DEPTH = 10
+_KEY = EventKey(EventClass.OBSERVE, 0, "diagnostics")
+Source = Callable[[int], list[DiagnosticStatus]]
+"""Returns statuses at a rack time (ns)."""
+
+
+class Diagnostics:
+    """Sends what sources tell. ``begin`` once, with the node that publishes."""
+
+    def __init__(self) -> None:
+        """Begin without sources."""
+        self._sources: list[Source] = []
+        self._levels: dict[str, bytes] = {}
+        self._counts: dict[str, int] = {}
+        self._sent_counts: dict[str, int] = {}
+        self._next_look_ns = 0
+        self._pending: ScheduledEvent | None = None
+        self._changed = False
+        self._halted_period, self._halted_look = Throttle(PERIOD_NS / NS_PER_S), Throttle(SHORTEST_NS / NS_PER_S)
+        self._publisher: Any = None
+
+    @property
+    def begun(self) -> bool:
+        """Whether somebody publishes."""
+        return self._publisher is not None
+
+    def begin(self, rack: Rack, stream: RackStream, pace: object, node: Node) -> None:
+        """Publish from now on, by a node's publisher; observe the rack and what keeps its pace."""
+        self._rack, self._stream, self._pace = rack, stream, pace
+        self._publisher = node.create_publisher(DiagnosticArray, TOPIC, _DEPTH)
+        rack.scheduler.every(PERIOD_NS, rack.now_ns, _KEY, lambda now, _: self._report(now))
+        rack.observe(self)
+        if isinstance(pace, Haltable):
+            pace.while_halted = self._while_halted
+
+    def add(self, source: Source) -> None:
+        """Send what a source tells, too, after the others'."""
+        self._sources.append(source)
+
+    def newly(self, what: str, count: int) -> int:
+        """Return by how much a count has risen since the last report of a second; ``what`` tells counts apart."""
+        self._counts[what] = count
+        return count - self._sent_counts.get(what, 0)
+
+    def look(self) -> None:
+        """Send at the next opportunity if a level has changed."""
+        self._changed = True
+        if self._pending is None and not is_halted(self._pace):
+            at_ns = max(self._rack.now_ns, self._next_look_ns)
+            self._pending = self._rack.scheduler.at(at_ns, _KEY, self._look_at)
+
+    # RackObserver
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:  # noqa: ARG002
+        """Look where a scan had errors or came late."""
+        if record.errors or record.skipped:
+            self.look()
+
+    def written(self, writes: list[WriteGroup]) -> None:
+        """Writes from outside change the health of nothing."""
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """A tunable that is set changes the health of nothing."""
+
+    def operated(self, operation: Operation) -> None:  # noqa: ARG002
+        """Look after whatever was done."""
+        self.look()
+
+    def _report(self, now_ns: int) -> None:
+        self._send(self._statuses(now_ns), now_ns)
+        self._sent_counts = dict(self._counts)
+
+    def _look_at(self, now_ns: int) -> None:
+        self._pending = None
+        self._next_look_ns = now_ns + (SHORTEST_NS if self._look(now_ns) else LOOK_NS)
+
+    def _look(self, now_ns: int) -> bool:
+        """Send if a level has changed, and say so."""
+        self._changed = False
+        statuses = self._statuses(now_ns)
+        if {item.name: item.level for item in statuses} == self._levels:
+            return False
+        self._send(statuses, now_ns)
+        return True
+
+    def _while_halted(self) -> None:
+        now = self._rack.now_ns
+        if self._halted_period.passes():
+            self._changed = False
+            self._report(now)
+        elif self._changed and self._halted_look.passes():
+            self._look(now)
+
+    def _statuses(self, now_ns: int) -> list[DiagnosticStatus]:
+        return [status for source in self._sources for status in source(now_ns)]
+
+    def _send(self, statuses: list[DiagnosticStatus], now_ns: int) -> None:
+        self._levels = {item.name: item.level for item in statuses}
+        stamp = self._stream.stamp(now_ns)
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = Time(sec=stamp // NS_PER_S, nanosec=stamp % NS_PER_S)
+        self._publisher.publish(message)
+
+
+def status_of(name: str, hardware: str, level: bytes, text: str, values: Mapping[str, str]) -> DiagnosticStatus:
+    """Return a status (REP-107)."""
+    return DiagnosticStatus(
+        level=level,
+        name=name,
+        message=text,
+        hardware_id=hardware,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+
+
+def worst(statuses: list[DiagnosticStatus]) -> bytes:
+    """Return the worst level of statuses, OK without any."""
+    levels: list[bytes] = [item.level for item in statuses]
+    return max(levels, default=bytes(DiagnosticStatus.OK))

@@ -1,0 +1,74 @@
+"""The health of a rack as a whole, as ``/diagnostics`` has it: ``pm1/rack: PM1``.
+
+Of a rack in several processes each other process has a status of its own in its place: ``pm1/processor_3: process``.
+"""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from automax_ros.core.text import count_of
+from automax_ros.rack.operator.halting import is_halted
+from automax_ros.ros.base.diagnostics import status_of
+from automax_ros.ros.base.node import Site
+from automax_ros.runtime.tasks.task import Status
+
+OVERRUNS = "overruns"
+
+
+class RackHealth:
+    """Says how one rack stands, and what went wrong around it, as far as it is in this process.
+
+    ERROR while a fault has stopped it; WARN while it is halted, without power or stopped by command, and where scans
+    were skipped or something was refused since the last report; else OK.
+    """
+
+    def __init__(self, site: Site, part: str) -> None:
+        """Take a rack; ``part`` is what the status is called, without the rack's namespace."""
+        self._site, self._part = site, part
+
+    def statuses(self, now_ns: int) -> list[DiagnosticStatus]:
+        """Return the rack's status."""
+        rack, operations = self._site.rack, self._site.rack.operations
+        counts = self._site.health.counts
+        skipped = sum(item.skipped for item in rack.statistics.values())
+        level, text = self._judged(skipped, sum(counts.values()))
+        cause = operations.stopped
+        values = {
+            "time_s": f"{now_ns / 1e9:.3f}",
+            "run_id": str(self._site.stream.run_id),
+            "powered": str(operations.powered),
+            "halted": str(is_halted(self._site.pacer)),
+            "tasks": str(len(rack.tasks)),
+            "running": str(sum(task.status is Status.RUNNING for task in rack.tasks)),
+            "forced": str(len(rack.forces())),
+            "errors": str(sum(task.errors.count for task in rack.tasks)),
+            OVERRUNS: str(skipped),
+            "stopped_reason": cause.reason if cause is not None else "",
+            "stopped_code": (cause.code or "") if cause is not None else "",
+            "stopped_by": cause.task if cause is not None else "",
+        }
+        values |= {kind: str(number) for kind, number in sorted(counts.items())}
+        name = f"{rack.config.namespace}/{self._part}"
+        return [status_of(name, rack.config.name, level, text, values)]
+
+    def _judged(self, skipped: int, troubles: int) -> tuple[bytes, str]:
+        """Return level and text; what counts most first."""
+        operations, diagnostics = self._site.rack.operations, self._site.diagnostics
+        newly_skipped = diagnostics.newly(OVERRUNS, skipped)
+        newly_troubled = diagnostics.newly("troubles", troubles)
+        cause = operations.stopped
+        if cause is not None and cause.is_fault:
+            return DiagnosticStatus.ERROR, f"{cause.title}: {cause.reason}"
+        if not operations.powered:
+            return DiagnosticStatus.WARN, "the power is off"
+        if is_halted(self._site.pacer):
+            return DiagnosticStatus.WARN, "halted: rack time stands still"
+        if cause is not None:
+            return DiagnosticStatus.WARN, f"{cause.title}: {cause.reason}"
+        if newly_skipped:
+            return DiagnosticStatus.WARN, f"{count_of(newly_skipped, 'scan')} skipped since the last report"
+        if newly_troubled:
+            kinds = ", ".join(f"{number} {kind}" for kind, number in sorted(self._site.health.counts.items()))
+            return DiagnosticStatus.WARN, f"since the start: {kinds}"
+        return DiagnosticStatus.OK, "running"

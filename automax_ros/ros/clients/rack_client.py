@@ -1,0 +1,173 @@
+"""Operates a rack that runs in another process, through the services of its node ``operator``."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.ros.clients import recorded_run as participants
+from automax_ros.ros.clients.recorded_run import racks_of
+from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.ros.setup.process import joined_context
+
+_LOOK_S = 0.05
+_SETTLED_NS = 2 * NS_PER_S
+"""A rack whose nodes have been seen for so long without its operator has none (decision)."""
+ALONE_NS = participants.ALONE_NS
+_TABLE_TYPE = "automax_msgs/msg/VariableTable"
+_HOME, _OPERATOR = "common_memory", "operator"
+
+
+class NotOperable(Fault):
+    """There is no such rack, it has no operator, there are several of the name, or it does not answer."""
+
+
+class Interrupted(Exception):
+    """The person does not wait any longer."""
+
+
+class RackClient:
+    """One program's access to the operator of a rack; a context manager. ``space`` is the namespace with its slash.
+
+    ``should_stop`` ends all waiting.
+
+    Raises:
+        RosUnavailable: ROS cannot be initialised.
+        Interrupted: ``find`` and ``call``, where asked to stop.
+    """
+
+    def __init__(
+        self, space: str, arguments: RosArguments = NO_ARGUMENTS, should_stop: Callable[[], bool] = lambda: False
+    ) -> None:
+        """Join the graph."""
+        self._space, self._should_stop = space, should_stop
+        self._context = joined_context(arguments)
+        quiet = [Parameter("start_type_description_service", value=False)]
+        self._node = Node(
+            arguments.name_of(f"ctl_{os.getpid()}", main=True),
+            context=self._context,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=quiet,
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._clients: dict[str, Any] = {}
+
+    def __enter__(self) -> RackClient:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def find(self, wait_ns: int, alone_ns: int = 0) -> None:
+        """Wait until the rack is seen with its operator, and no other of its name for ``alone_ns`` from then on.
+
+        Raises:
+            NotOperable: no such rack within the time, one without an operator, or several of the name.
+        """
+        deadline = time.monotonic_ns() + wait_ns
+        seen: int | None = None
+        met: int | None = None
+        while True:
+            now = time.monotonic_ns()
+            racks, operators = self._racks(), self._nodes(_OPERATOR)
+            # The names of a program's nodes come in a message of their own, on a busy host long after its topics.
+            if seen is None and racks and self._nodes(_HOME):
+                seen = now
+            self.refuse_several(max(racks, operators))
+            if operators:
+                met = met or now
+                if now - met >= alone_ns:
+                    return
+            elif (seen is not None and now - seen > _SETTLED_NS) or (racks and now > deadline):
+                hint = "say `operator: true` in its YAML file and start it again"
+                raise NotOperable(f"rack {self._space} has no operator's services", hint)
+            elif now > deadline:
+                raise self._absent(wait_ns)
+            self._go_on()
+            time.sleep(_LOOK_S)
+
+    def refuse_twins(self, node: str) -> None:
+        """Look for ``ALONE_NS`` whether a node of the rack, which may have no operator, is there more than once.
+
+        Raises:
+            NotOperable: there are several racks of the name.
+        """
+        until = time.monotonic_ns() + ALONE_NS
+        while True:
+            self.refuse_several(max(self._racks(), self._nodes(node)))
+            if time.monotonic_ns() > until:
+                return
+            self._go_on()
+            time.sleep(_LOOK_S)
+
+    def refuse_several(self, racks: int) -> None:
+        """Do nothing where at most one rack of the name is known.
+
+        Raises:
+            NotOperable: there are several.
+        """
+        if racks > 1:
+            hint = "stop one of them, or give one another ROS_DOMAIN_ID"
+            raise NotOperable(f"{racks} racks are called {self._space}", hint)
+
+    def call(self, kind: Any, name: str, request: Any, wait_ns: int) -> Any:
+        """Ask a service of the rack and return its answer.
+
+        Raises:
+            NotOperable: no answer within the time, or none that can be read.
+        """
+        asking = self._clients.get(name)
+        if asking is None:
+            asking = self._clients[name] = self._node.create_client(kind, f"{self._space}/{name}")
+        deadline = time.monotonic_ns() + wait_ns
+        while not asking.service_is_ready():
+            self._spin(deadline, name)
+        future = asking.call_async(request)
+        while not future.done():
+            self._spin(deadline, name)
+        return future.result()
+
+    def _go_on(self) -> None:
+        if self._should_stop():
+            raise Interrupted
+
+    def _spin(self, deadline: int, name: str) -> None:
+        self._go_on()
+        if time.monotonic_ns() > deadline:
+            hint = "it may be busy or gone; --timeout waits longer. What was asked may still happen"
+            raise NotOperable(f"rack {self._space} does not answer on {name}", hint)
+        try:
+            self._executor.spin_once(timeout_sec=_LOOK_S)
+        except Exception as error:  # whatever rclpy makes of malformed bytes
+            if not self._context.ok():
+                raise
+            hint = "look who else serves its operator's services in this ROS domain"
+            raise NotOperable(f"what rack {self._space} answers on {name} cannot be read", hint) from error
+
+    def _racks(self) -> int:
+        return len(racks_of(self._node, self._space))
+
+    def _nodes(self, name: str) -> int:
+        """Return how many nodes of this name the rack has."""
+        count: int = self._node.get_node_names_and_namespaces().count((name, self._space))
+        return count
+
+    def _absent(self, wait_ns: int) -> NotOperable:
+        tables = [name for name, types in self._node.get_topic_names_and_types() if _TABLE_TYPE in types]
+        there = sorted(name.removesuffix("/variables") for name in tables if self._node.count_publishers(name))
+        hint = f"there are {', '.join(there)}" if there else "start it first, or set its ROS_DOMAIN_ID"
+        return NotOperable(f"no rack {self._space} is seen within {wait_ns / NS_PER_S:g} s", hint)

@@ -1,0 +1,161 @@
+"""Binds a recorder to the run that it records: only what this run's programs send is the rack's.
+
+The rack's program is the participant that publishes all topics of a rack (``racks_of``); where it is cut into
+processes, the others are those whose presence on the bus names the same run. What others publish on the rack's topics
+is left out, counted and told once for each topic. Where the middleware does not tell senders (rcl is not found) all
+pass, and the person is told.
+
+Who sends what in the graph: publishers told apart by their GID, programs by the part of it that they share.
+
+The first 12 bytes of a GID are the DDS participant's, which is a program's context; the graph and each message tell
+them. A program that wants to be taken for another one's participant must send with its GID: against that helps SROS 2
+alone (docs/ros.md).
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+
+from rclpy.node import Node
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.ros.intake.raw_messages import Taken
+from automax_ros.ros.intake.rcl import library
+
+PREFIX_BYTES = 12
+ALONE_NS = NS_PER_S
+"""A rack that is to be operated must be the only one of its name for so long (decision): programs of a host answer one
+that joins at once, but not in the same moment."""
+HOME_TOPICS = ("variables", "config", "backplane", "backplane/snapshot", "operations")
+"""Whoever publishes all of these below a namespace is the rack of that name, or its process of common memory."""
+
+
+def participant(gid: bytes) -> bytes:
+    """Return what the GIDs of one program have in common; empty where the GID is not known."""
+    return gid[:PREFIX_BYTES]
+
+
+def publishing(node: Node, topic: str) -> set[bytes]:
+    """Return the participants that publish a topic."""
+    return {participant(bytes(info.endpoint_gid)) for info in node.get_publishers_info_by_topic(topic)}
+
+
+def racks_of(node: Node, space: str) -> set[bytes]:
+    """Return the participants that are a rack with a namespace (with its slash): one, unless two have one name."""
+    found: set[bytes] | None = None
+    for topic in HOME_TOPICS:
+        there = publishing(node, f"{space}/{topic}")
+        found = there if found is None else found & there
+        if not found:
+            return set()
+    return found or set()
+
+
+SILENT_NS = 3 * NS_PER_S
+"""A rack that sends nothing for so long while another of its name sends a table has been started again (decision: one
+that was killed stands in the graph for up to 20 s)."""
+LOOK_NS = NS_PER_S // 4
+GRACE_NS = NS_PER_S
+"""A process of the rack may be heard for so long before its presence is."""
+MOST_TABLES = 16
+"""Most tables of others that are kept."""
+MOST_PROCESSES = 64
+"""Most processes of one rack."""
+
+
+@dataclass
+class Stranger:
+    """A program that is not known to be the rack's: since when (ns), and how much it sent on each topic."""
+
+    since_ns: int
+    sent: Counter[str] = field(default_factory=Counter)
+
+
+class Binding:
+    """The programs of one run of one rack."""
+
+    def __init__(self, node: Node, space: str) -> None:
+        """Bound to nobody; ``space`` is the rack's namespace with its slash."""
+        self._node, self._space = node, space
+        self._home = b""
+        self._others: set[bytes] = set()
+        self._last_ns = self._next_ns = 0
+        self._has_rival = False
+        self._tables: dict[bytes, Taken] = {}
+        self._strangers: dict[bytes, Stranger] = {}
+        self._told: set[str] = set()
+        self.news: list[str] = []
+        self.tells_senders = library() is not None
+
+    def racks(self) -> set[bytes]:
+        """Return the participants that are racks of this name."""
+        return racks_of(self._node, self._space)
+
+    def bind(self, sender: bytes) -> None:
+        """Bind to the program that sent a rack's table."""
+        self._home, self._others, self._last_ns = participant(sender), set(), time.monotonic_ns()
+
+    def admit(self, sender: bytes) -> None:
+        """Let another process of the same run be one of the rack's."""
+        if len(self._others) < MOST_PROCESSES:
+            self._others.add(participant(sender))
+            self._strangers.pop(participant(sender), None)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the rack's program is in the graph. Another rack of its name is told once."""
+        racks = self.racks()
+        if self._home in racks and len(racks) > 1 and not self._has_rival:
+            self._has_rival = True
+            self.news.append(f"another rack is called {self._space} too: it is not recorded")
+        return not self.tells_senders or self._home in racks
+
+    def is_ours(self, topic: str, taken: Taken) -> bool:
+        """Return whether a message comes from the rack; one of another's is counted and told."""
+        if not self.tells_senders:
+            return True
+        sender = participant(taken.sender)
+        if sender == self._home or sender in self._others:
+            self._last_ns = time.monotonic_ns()
+            return True
+        if sender not in self._strangers and len(self._strangers) >= MOST_PROCESSES:
+            sender = b""
+        self._strangers.setdefault(sender, Stranger(time.monotonic_ns())).sent[topic] += 1
+        return False
+
+    @property
+    def refused(self) -> int:
+        """How many messages of other programs were left out."""
+        return sum(stranger.sent.total() for stranger in self._strangers.values())
+
+    def look(self) -> None:
+        """Tell of programs that publish on the rack's topics and have not turned out to be processes of it."""
+        now = time.monotonic_ns()
+        for stranger in self._strangers.values():
+            if now - stranger.since_ns > GRACE_NS:
+                for topic in stranger.sent.keys() - self._told:
+                    self._told.add(topic)
+                    self.news.append(
+                        f"left out what another program publishes on {topic}: it is not of the recorded rack"
+                    )
+
+    def keep(self, table: Taken) -> None:
+        """Keep a table that is not ours: it may turn out to be that of the rack's next run."""
+        self._tables[participant(table.sender)] = table
+        if len(self._tables) > MOST_TABLES:
+            racks = self.racks()
+            self._tables = {sender: kept for sender, kept in self._tables.items() if sender in racks}
+
+    def successor(self) -> Taken | None:
+        """Return the table of the rack's next run once there is one: ours has gone, or is silent."""
+        now = time.monotonic_ns()
+        if not self._tables or now < self._next_ns:
+            return None
+        self._next_ns = now + LOOK_NS
+        racks = self.racks()
+        if self._home in racks and now - self._last_ns < SILENT_NS:
+            return None
+        found = next((sender for sender in self._tables if sender in racks), None)
+        return None if found is None else self._tables.pop(found)

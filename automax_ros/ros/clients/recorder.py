@@ -1,0 +1,398 @@
+"""The node ``recorder``: records a rack that runs in another process, over DDS.
+
+Subscribes to the rack's ``variables``, ``config``, ``backplane``, ``backplane/snapshot``, ``scans``, ``states`` and to
+the topics of all common variables; publishes nothing. Messages are taken as bytes, in a look at all topics every 25 ms:
+that costs a fraction of one callback each, and one look says how far the topics have come. Each message brings the
+time at which it was sent, which is the order of the rack's own log.
+
+Whether a recorder hears all that this process of a distributed rack is going to send.
+
+Its subscriptions are looked for in the graph: a reliable writer that has met a reader before its first message sends it
+all of them, or sends them again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.messages.cdr.cdr import CdrError, decode
+from automax_ros.messages.cdr.message_headers import table_of
+from automax_ros.messages.types.messages import Presence, VariableTable
+from automax_ros.messages.types.rack_files import RackFile, RackFilesError, files_from_text
+from automax_ros.messages.types.topics import LATCHED, SCAN
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.recordings.live.arrival import ArrivalOrder
+from automax_ros.recordings.live.recording import LiveRecording
+from automax_ros.recordings.live.topics import LiveTopics, TopicKind
+from automax_ros.recordings.write.data_file import StorageOptions
+from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.qos import message_class
+from automax_ros.ros.clients.recorded_run import MOST_TABLES, Binding, participant
+from automax_ros.ros.intake.raw_messages import Taken, taker_of
+from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.ros.setup.process import joined_context
+
+_LOOK_NS = 100 * NS_PER_MS
+"""Time between two looks (decision): the graph is asked for each topic."""
+
+
+class RecorderWait:
+    """Looks for the recorder of one process."""
+
+    def __init__(self, site: Site, node: ModuleNode, *others: str) -> None:
+        """Look for readers of what the stream of this process sends, and of ``others``, topics of the rack."""
+        self._node = node
+        self._space, self._name = f"/{site.rack.config.namespace}", recorder_name(site.arguments)
+        recorded = LiveTopics.expected(self._space, site.rack.config).all
+        sent = [topic.name for topic in site.stream.topics if topic.name in recorded]
+        self._unheard = [*dict.fromkeys(sent), *(f"{self._space}/{topic}" for topic in others)]
+        self._next_ns = 0
+
+    def is_over(self) -> bool:
+        """Return whether the recorder hears all of it."""
+        now = time.monotonic_ns()
+        if self._unheard and now >= self._next_ns:
+            self._next_ns = now + _LOOK_NS
+            self._unheard = [topic for topic in self._unheard if not self._is_heard(topic)]
+        return not self._unheard
+
+    def _is_heard(self, topic: str) -> bool:
+        readers = self._node.get_subscriptions_info_by_topic(topic)
+        return any(item.node_name == self._name and item.node_namespace == self._space for item in readers)
+
+
+LOOK_S = 0.025
+"""Time between two looks at the topics."""
+HOLD_NS = 250 * NS_PER_MS
+"""How long a message waits for those that were sent before it and came later."""
+MOST_BYTES = 64 << 20
+"""Longest message that is read (decision: an image of the largest rack is a fraction of it)."""
+READER_DEPTH = 10_000
+"""Messages of one topic that wait in this process when it is held up."""
+FILES_WAIT_NS = 3 * NS_PER_S
+"""How long a rack's files are waited for once its table has come."""
+_KNOCK_NS = NS_PER_S
+_SLOW_KNOCK_NS = 10 * _KNOCK_NS
+_MOST_KNOCKS = 5
+"""How often it asks each second; then it asks each ten seconds."""
+_TABLE_TYPE = "automax_msgs/msg/VariableTable"
+_FILES = TopicKind("std_msgs/msg/String", LATCHED)
+_PRESENCE = TopicKind("automax_msgs/msg/Presence", SCAN)
+
+
+class SeveralRacks(Fault):
+    """Several racks have one name in this ROS domain."""
+
+
+def recorder_name(arguments: RosArguments) -> str:
+    """Return the name of the node ``recorder`` in a process with these arguments."""
+    return arguments.name_of("recorder", main=True)
+
+
+class RawSubscription:
+    """Takes the messages of one topic as bytes."""
+
+    def __init__(self, node: Node, topic: str, kind: TopicKind) -> None:
+        self.topic, self.kind = topic, kind
+        self._node = node
+        self._class = message_class(kind.type_name)
+        latched = kind.qos.durability == "transient_local"
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=READER_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        )
+        self._subscription = node.create_subscription(self._class, topic, _nothing, qos, raw=True)
+        self._taker = taker_of(self._subscription, MOST_BYTES)
+
+    def taken(self) -> Iterator[Taken]:
+        """Return the messages that have come; one that is longer than any of a rack's has no bytes."""
+        while (found := self._taker.take()) is not None:
+            yield found
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._node.destroy_subscription(self._subscription)
+
+
+class RecorderNode(Node):  # type: ignore[misc]
+    """The node in the graph; it has no services, for nothing spins it."""
+
+    def __init__(self, space: str, context: Context, name: str = "recorder") -> None:
+        quiet = [Parameter("start_type_description_service", value=False)]
+        super().__init__(
+            name,
+            namespace=space,
+            context=context,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=quiet,
+        )
+
+    def racks(self) -> list[str]:
+        """Return the namespaces of the racks that are there, such as ``/pm1``."""
+        tables = [name for name, types in self.get_topic_names_and_types() if _TABLE_TYPE in types]
+        spaces = [name.removesuffix("/variables") for name in tables if self.count_publishers(name)]
+        return sorted(space for space in spaces if f"{space}/variables" in tables)
+
+
+class LiveRecorder:
+    """Finds a rack and records it; ``close`` in any case.
+
+    ``recording`` is None until ``open``.
+
+    Raises:
+        RosUnavailable: ROS cannot be initialised.
+    """
+
+    def __init__(self, space: str, arguments: RosArguments = NO_ARGUMENTS) -> None:
+        """Join the graph; ``space`` is the rack's namespace with its slash."""
+        self.recording: LiveRecording | None = None
+        self.lost_values: Counter[str] = Counter()
+        self._space = space
+        self._context = joined_context(arguments)
+        self._node = RecorderNode(space, self._context, recorder_name(arguments))
+        self._topics = LiveTopics(space)
+        self._table = b""
+        self._order: ArrivalOrder[tuple[str, bytes]] = ArrivalOrder(HOLD_NS)
+        self._subscriptions: list[RawSubscription] = []
+        self._files: RawSubscription | None = None
+        self._numbers: dict[str, int] = {}
+        self._last_due = 0
+        self._knocks: list[RawSubscription] = []
+        self._next_knock = 0
+        self._knock_count = 0
+        self._files_begun = 1
+        self.binding = Binding(self._node, space)
+        self._presences: RawSubscription | None = None
+        self._early: dict[str, RawSubscription] = {}
+        self._run_id = 0
+
+    def racks(self) -> list[str]:
+        """Return the namespaces of the racks that are there."""
+        return self._node.racks()
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the rack that is recorded is in the graph."""
+        return self.binding.is_there
+
+    def expect(self, config: RackConfig) -> None:
+        """Hear a rack that need not be there yet, so that nothing of its beginning is lost.
+
+        What it sends waits until ``open``, ``READER_DEPTH`` messages of each topic.
+        """
+        topics = LiveTopics.expected(self._space, config)
+        kinds = topics.all
+        self._hear_processes()
+        self._files = RawSubscription(self._node, topics.config, _FILES)
+        self._early = {name: RawSubscription(self._node, name, kinds[name]) for name in topics.in_order}
+
+    def find(self, wait_ns: int, stopping: Callable[[], bool]) -> VariableTable | None:
+        """Wait for the rack's table; None if it does not come. From then on only that rack's messages count.
+
+        Raises:
+            CdrError: what comes is not a table.
+            SeveralRacks: several racks have this name.
+        """
+        topic = self._topics.variables
+        source = self._early.pop(topic, None) or RawSubscription(self._node, topic, self._topics.all[topic])
+        tables: dict[bytes, Taken] = {}
+        deadline = time.monotonic_ns() + wait_ns
+        try:
+            while not stopping() and time.monotonic_ns() < deadline:
+                for found in source.taken():
+                    tables[participant(found.sender)] = found
+                racks = self.binding.racks() if self.binding.tells_senders else set(tables)
+                if len(tables) > MOST_TABLES:
+                    tables = {sender: found for sender, found in tables.items() if sender in racks}
+                if len(racks) > 1:
+                    raise SeveralRacks(f"{len(racks)} racks are called {self._space}", "stop one of them")
+                for rack in racks & tables.keys():
+                    return self._bound_to(tables[rack])
+                time.sleep(LOOK_S)
+        finally:
+            source.close()
+        return None
+
+    def _bound_to(self, found: Taken) -> VariableTable:
+        self.binding.bind(found.sender)
+        self._table = found.payload or b""
+        table = table_of(self._table)
+        self._run_id = table.run_id
+        self._hear_processes()
+        return table
+
+    def _hear_processes(self) -> None:
+        if self._presences is None:
+            self._presences = RawSubscription(self._node, f"{self._space}/bus/presence", _PRESENCE)
+
+    def files(self, stopping: Callable[[], bool]) -> list[RackFile]:
+        """Return the files that the rack runs from; none if it does not offer them.
+
+        Raises:
+            RackFilesError: what it sends are none.
+        """
+        if self._files is None:
+            self._files = RawSubscription(self._node, self._topics.config, _FILES)
+        deadline = time.monotonic_ns() + FILES_WAIT_NS
+        while time.monotonic_ns() < deadline and not stopping():
+            found = [item.payload for item in self._ours(self._files) if item.payload]
+            if found:
+                return _files(found[-1])
+            time.sleep(LOOK_S)
+        return []
+
+    def open(
+        self,
+        folder: Path,
+        files: list[RackFile],
+        tasks: Collection[str] | None,
+        storage: StorageOptions,
+        split_ns: int = 0,
+    ) -> LiveRecording:
+        """Create the bag and subscribe; messages come with ``step``. ``split_ns`` is that of ``LiveRecording``.
+
+        Raises:
+            RecordingError: the folder exists already or cannot be written.
+        """
+        offered = dict(self._node.get_topic_names_and_types())
+        self._topics = topics = LiveTopics(self._space, table_of(self._table), offered)
+        self.recording = LiveRecording(folder, topics, self._table, files, tasks, storage, split_ns)
+        kinds = topics.all
+        early, self._early = self._early, {}
+        for name, subscription in list(early.items()):
+            if subscription.kind != kinds.get(name):
+                early.pop(name).close()  # the rack is not what its file says
+        self._subscriptions = [
+            early.get(name) or RawSubscription(self._node, name, kinds[name]) for name in topics.in_order
+        ]
+        self._files = self._files or RawSubscription(self._node, topics.config, _FILES)
+        return self.recording
+
+    def step(self) -> None:
+        """Take what has come and record what is due."""
+        assert self.recording is not None
+        now = time.monotonic_ns()
+        self._look()
+        self._look_at_files()
+        due = self._order.due(now)
+        for sent_ns, (topic, payload) in due:
+            self.recording.take(topic, sent_ns, payload)
+        if due:
+            self._last_due = now
+        elif now - self._last_due > HOLD_NS:
+            self.recording.flush(now - self._last_due)
+        if now >= self._next_knock or self.recording.files_begun > self._files_begun:
+            self._files_begun = self.recording.files_begun
+            self._knock(now)
+
+    def finish(self) -> None:
+        """Take and record what is still there, and finish the bag; a disk that refuses is the recording's failure."""
+        if self.recording is None:
+            return
+        self._look()
+        self._look_at_files()
+        for sent_ns, (topic, payload) in self._order.rest():
+            self.recording.take(topic, sent_ns, payload)
+        self.recording.close()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _look(self) -> None:
+        self._meet_processes()
+        self.binding.look()
+        table = self.binding.successor()
+        if table is not None:
+            self._order.add(table.sent_ns, (self._topics.variables, table.payload or b""))
+        for subscription in self._subscriptions:
+            topic = subscription.topic
+            for found in self._ours(subscription):
+                if topic in self._topics.values:
+                    self._count_lost(topic, found.number)
+                self._order.add(found.sent_ns, (topic, found.payload or b""))
+
+    def _ours(self, subscription: RawSubscription) -> Iterator[Taken]:
+        """Return what has come from the rack."""
+        topic, binding = subscription.topic, self.binding
+        for found in subscription.taken():
+            if binding.is_ours(topic, found):
+                yield found
+            elif topic == self._topics.variables:
+                binding.keep(found)
+
+    def _meet_processes(self) -> None:
+        """Learn which participants are the processes of a rack that is cut into several."""
+        if self._presences is None:
+            return
+        for found in self._presences.taken():
+            with suppress(CdrError):
+                presence = decode(_PRESENCE.type_name, found.payload or b"")
+                if isinstance(presence, Presence) and presence.run_id == self._run_id:
+                    self.binding.admit(found.sender)
+
+    def _look_at_files(self) -> None:
+        """Store the source of a task that was reloaded meanwhile: the rack tells its files again then."""
+        assert self._files is not None
+        assert self.recording is not None
+        for found in self._ours(self._files):
+            try:
+                self.recording.store(_files(found.payload or b""))
+            except RackFilesError as error:
+                self.recording.notes.append(f"left out what {self._topics.config} told: {error}")
+
+    def _count_lost(self, topic: str, number: int) -> None:
+        """Count values of a common that did not come: the sender keeps one of them only."""
+        before = self._numbers.get(topic, 0)
+        if before and number > before + 1:
+            self.lost_values[topic] += number - before - 1
+        if number:
+            self._numbers[topic] = number
+
+    def _knock(self, now: int) -> None:
+        """Ask the rack for what recording waits for: it answers a further reader as it answered the first."""
+        assert self.recording is not None
+        for knock in self._knocks:
+            knock.close()
+        self._knocks.clear()
+        self._next_knock = now + (_KNOCK_NS if self._knock_count < _MOST_KNOCKS else _SLOW_KNOCK_NS)
+        wanted = [self._topics.snapshot] if self.recording.wants_image else []
+        wanted += [self._topics.states] if self.recording.wants_states else []
+        if not wanted:
+            self._knock_count = 0
+        else:
+            self._knock_count += 1
+            kinds = self._topics.all
+            self._knocks = [RawSubscription(self._node, name, kinds[name]) for name in wanted]
+
+
+def _files(payload: bytes) -> list[RackFile]:
+    """Return the files that a rack offers.
+
+    Raises:
+        RackFilesError: it is not what a rack sends.
+    """
+    try:
+        return files_from_text(str(decode("std_msgs/msg/String", payload)[0]))
+    except CdrError as error:
+        raise RackFilesError(str(error)) from error
+
+
+def _nothing(_: Any) -> None:
+    """Stand in for a callback: messages are taken by looking."""

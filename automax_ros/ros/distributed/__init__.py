@@ -1,0 +1,1 @@
+"""A rack in several processes: its bus, who is there, requests passed on."""

@@ -1,0 +1,392 @@
+"""The bus of a distributed rack: what the processes of one rack tell each other in the graph.
+
+Each process publishes and hears ``bus`` (automax_msgs/BusWrite: its writes to common memory), ``bus/image``
+(automax_msgs/BusImage: all it holds, for one that asks) and ``bus/presence`` (automax_msgs/Presence each 20 ms, with
+liveliness by hand). The processes find each other by these topics in the rack's namespace; the home, where common
+memory is, gives the start when all are there. What is not of this run is refused and counted.
+
+``begin`` is called when the start is known; before it nothing is written to the rack.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from automax_msgs.msg import BusImage as BusImageClass
+from automax_msgs.msg import BusWrite as BusWriteClass
+from automax_msgs.msg import Presence as PresenceClass
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.qos import LivelinessPolicy, QoSProfile, ReliabilityPolicy
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
+from automax_ros.core.types import DataType
+from automax_ros.messages.bus.bus import (
+    AHEAD_NS,
+    BUS,
+    LONGEST_RUN_NS,
+    BusLimits,
+    batch_of,
+    image_message,
+    picture_of,
+    standing_of,
+    with_standing,
+    write_message,
+)
+from automax_ros.messages.bus.peers import BEAT_NS, Heard, Peer, Peers
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import BusImage, BusWrite, Presence, Stage
+from automax_ros.rack.distributed.link import Batch, BusLink, Picture
+from automax_ros.rackfile.model.config import ModuleLoss
+from automax_ros.rackfile.model.driven import driven_plants
+from automax_ros.rackfile.processes import part_name
+from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.qos import ros_qos
+from automax_ros.ros.clients.recorder import RecorderWait
+from automax_ros.ros.distributed.bus_topics import BusWay, Terms
+from automax_ros.ros.distributed.process_watch import ProcessWatch, this_host
+from automax_ros.runtime.health import FROM_STRANGERS
+
+LEASE_NS = 100 * NS_PER_MS
+"""Liveliness of a process's presence, for whoever looks from outside."""
+ALONE_NS = 3500 * NS_PER_MS
+"""A home that was not told of a run begins one when it has seen nobody for so long: discovery takes up to 3 s."""
+LEAD_NS = 400 * NS_PER_MS
+"""The start lies so far ahead of the moment at which all are there, so that all hear of it before."""
+ANSWER_NS = 100 * NS_PER_MS
+"""The same process gets an image at most this often."""
+MOST_BYTES = 64 << 20
+"""Longest image that is read; writes and presences may be a hundredth of it."""
+BATCHES_A_ROUND = 32
+"""Most batches that the door takes at a time: seven processes send 1000 in a second, and on a busy host it is late."""
+BATCHES_FIRST = 64
+"""Most batches that are taken because a process's word tells of some that have not come."""
+MODULE_LOST = "31"
+"""The hardware's code when a module does not answer on the backplane: bus error (decision: so is one that is lost)."""
+PRESENCE = "bus/presence"
+FOR_ALL = 0
+"""Asked by nobody: an image of what a process that was lost has written last, which some may not have."""
+
+
+class SeatTaken(Fault):
+    """Another process of this run has the same modules."""
+
+
+@dataclass(frozen=True)
+class Seating:
+    """How a rack is cut into processes.
+
+    ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the one that is there. ``is_common``
+    says whether what happens now happens in every process by itself, as stimuli do. ``lead_ns``: so far the start
+    lies ahead of the moment at which all are there, as the home says it. ``awaits_recorder``: it waits for one that
+    hears this process.
+    """
+
+    seats: Sequence[tuple[int, ...]]
+    run_id: int = 0
+    is_common: Callable[[], bool] = lambda: False
+    lead_ns: int = LEAD_NS
+    awaits_recorder: bool = False
+
+
+class RackBus:
+    """The bus as one process has it. ``fault`` is why the process cannot take part, if it cannot.
+
+    ``seats`` are the slots of all processes by the slot that names each, ``plants`` the slots whose drives turn them.
+    """
+
+    def __init__(self, site: Site, node: ModuleNode, seating: Seating) -> None:
+        """Join the bus.
+
+        Raises:
+            ValueError: the rack's part is not one of the seats.
+        """
+        rack, seats = site.rack, seating.seats
+        own = next((slots for slots in seats if set(slots) == rack.part.slots), None)
+        if own is None:
+            raise ValueError(f"slots {sorted(rack.part.slots)} are not a process of rack {rack.config.name}")
+        self._site, self._rack, self._node = site, rack, node
+        self.seats = {min(slots): tuple(slots) for slots in seats}
+        self._limits = BusLimits(self.seats)
+        self.plants = {item.name: item.slot for item in driven_plants(rack.config)}
+        process = int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        self._watch, self._lead_ns = ProcessWatch(), seating.lead_ns
+        self.peers = Peers(process, min(own), own, rack.installed, seating.run_id, lives=self._watch.lives)
+        self.link = BusLink(rack, min(own), self._send, seating.is_common, self._guarded)
+        self._recorder = RecorderWait(site, node, PRESENCE) if seating.awaits_recorder else None
+        self.stage, self.joining = Stage.JOINING, False
+        self.fault: SeatTaken | None = None
+        self._texts = frozenset(v for v, spec in enumerate(rack.memory.specs) if spec.type is DataType.STRING)
+        self._begun = self._has_image = False
+        self._waiting: list[Callable[[], None]] = []
+        self._answered: dict[int, int] = {}
+        self._participants: dict[int, bytes] = {}
+        self._since_ns = time.monotonic_ns()
+        qos = ros_qos(BUS)
+        self._writes = node.create_publisher(BusWriteClass, "bus", qos)
+        self._images = node.create_publisher(BusImageClass, "bus/image", qos)
+        self._presences = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
+        words = Terms(MOST_BYTES // 100, then=self._look_for_missing)
+        self._way = self._hear("bus", qos, BusWrite, self._take_write, Terms(MOST_BYTES // 100, BATCHES_A_ROUND))
+        self._hear("bus/image", qos, BusImage, self._take_image, Terms(MOST_BYTES))
+        self._hear(PRESENCE, presence_qos(), Presence, self._take_presence, words)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(BEAT_NS / NS_PER_S, node.inside("the bus", self._beat), clock=steady)
+
+    @property
+    def run_id(self) -> int:
+        """The number of the run, 0 while none is known."""
+        return self.peers.run_id
+
+    @property
+    def epoch_ns(self) -> int:
+        """The wall clock at rack time 0, ns; 0 while the start is not known."""
+        return self.peers.epoch_ns if self.stage is Stage.RUNNING else 0
+
+    @property
+    def missing(self) -> list[str]:
+        """The processes that are not there, by their first modules; with all of them, the recorder that is awaited."""
+        there = {*self.peers.by_seat, self.peers.seat}
+        found = [part_name(self._rack.config, slots) for seat, slots in self.seats.items() if seat not in there]
+        return found or ([] if self._recorder is None else ["the recorder"])
+
+    @property
+    def lost(self) -> list[str]:
+        """The processes that were lost and have not come back."""
+        return [part_name(self._rack.config, self.seats[seat]) for seat in sorted(self.peers.lost & set(self.seats))]
+
+    def begin(self) -> None:
+        """Take up what has come before the start: to be called as soon as the rack was started."""
+        self.link.starting = False
+        self._begun = True
+        waiting, self._waiting = self._waiting, []
+        for take in waiting:
+            take()
+
+    def catch_up(self) -> None:
+        """Take over the image and the standing of a rack that runs: between presets and the start of tasks."""
+        waiting, self._waiting = self._waiting, []
+        for take in waiting:
+            take()
+        for peer in self.peers.running():
+            self.link.adopt(standing_of(peer.presence))
+
+    def leave(self) -> None:
+        """Tell the others that this process ends in order."""
+        self.link.take_waiting()
+        self.stage = Stage.LEAVING
+        self._guarded(self._tell)
+        self._watch.close()
+
+    # what goes out
+
+    def _send(self, batch: Batch) -> None:
+        self._writes.publish(encode(write_message(batch, self.run_id, self.peers.process)))
+
+    def _tell(self, asks: int = 0) -> None:
+        peers = self.peers
+        presence = Presence(
+            time.time_ns(),
+            self._rack.config.name,
+            peers.run_id,
+            peers.process,
+            peers.seat,
+            tuple(sorted(peers.slots)),
+            peers.fingerprint,
+            int(self.stage),
+            self.epoch_ns,
+            self.link.sequence,
+            asks,
+        )
+        presence = presence._replace(host=this_host(), pid=os.getpid())
+        self._presences.publish(encode(with_standing(presence, self.link.standing)))
+
+    def _answer(self, asked_by: int) -> None:
+        now = time.monotonic_ns()
+        if not self._begun or now - self._answered.get(asked_by, -ANSWER_NS) < ANSWER_NS:
+            return
+        self._answered = {process: at for process, at in self._answered.items() if now - at < ANSWER_NS}
+        self._answered[asked_by] = now
+        self._show(self.link.picture(), asked_by)
+
+    def _show(self, picture: Picture, asked_by: int) -> None:
+        message = image_message(picture, self._rack.now_ns, self.run_id, self.peers.process, asked_by)
+        self._images.publish(encode(message))
+
+    # the beat
+
+    def _beat(self) -> None:
+        now = time.monotonic_ns()
+        for peer in self.peers.look(now):
+            self._lost(peer)
+        if self.stage in (Stage.JOINING, Stage.READY):
+            self._advance(now)
+        self._tell(self._asks())
+
+    def _advance(self, now: int) -> None:
+        peers = self.peers
+        if not peers.run_id and self._rack.part.is_home and not peers.by_seat and now - self._since_ns > ALONE_NS:
+            peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        if not peers.run_id and self._rack.part.is_home and peers.by_seat and not any(peers.running()):
+            peers.run_id = int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        if self._recorder is not None and self._recorder.is_over():
+            self._recorder = None
+        starting = peers.epoch_ns > time.time_ns()
+        if any(peers.running()):
+            if starting and self.stage is Stage.READY:
+                self.stage = Stage.RUNNING
+            elif self._has_image:
+                self.joining, self.stage = True, Stage.RUNNING
+        elif not self.missing and peers.run_id:
+            self.stage = Stage.READY
+            others = [peer.stage == Stage.READY for peer in peers.by_seat.values()]
+            if self._rack.part.is_home and all(others):
+                peers.epoch_ns = time.time_ns() + self._lead_ns
+                self.stage = Stage.RUNNING
+
+    def _asks(self) -> int:
+        """Return the process whose image is wanted, 0 for none."""
+        running = next(self.peers.running(), None)
+        # One that is ready, but heard of the start when it was over, joins as one that comes later does.
+        if self.stage in (Stage.JOINING, Stage.READY) and running is not None and not self._has_image:
+            return running.process
+        owing = self.peers.owing() if self._begun else None
+        return owing.process if owing is not None else 0
+
+    def _lost(self, peer: Peer) -> None:
+        self._watch.forget(peer.process)
+        self._participants.pop(peer.process, None)
+        name = part_name(self._rack.config, peer.presence.slots)
+        text = f"{name} is lost: its process has ended, or gives no sign of life"
+        self._site.health.note("lost process", (name, peer.process), lambda: text)
+        self._node.get_logger().error(text)
+        if self._begun:
+            self._show(self.link.last_of(peer.presence.seat), FOR_ALL)
+        operations = self._rack.operations
+        stops = self._rack.config.on_module_loss is ModuleLoss.STOP_ALL
+        if stops and self._begun and operations.powered and operations.stopped is None:
+            operations.stop_all(text, MODULE_LOST)
+
+    # what comes in
+
+    def _hear(
+        self, topic: str, qos: QoSProfile, kind: Any, receive: Callable[[Any, bytes], None], terms: Terms
+    ) -> BusWay:
+        return BusWay(self._node, topic, f"automax_msgs/msg/{kind.__name__}", qos, receive, self._refuse, terms)
+
+    def _guarded(self, take: Callable[[], None]) -> None:
+        try:
+            take()
+        except Exception as error:
+            self._node.guard.report("the bus", error)
+
+    def _refuse(self, topic: str, what: str) -> None:
+        self._site.health.note(
+            "refused bus message", (topic, what[:40]), lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS
+        )
+
+    def _take_write(self, message: BusWrite, sender: bytes) -> None:
+        if message.process == self.peers.process:
+            return
+        peer = self._peer(message, sender)
+        if peer is None or message.seat != peer.presence.seat:
+            self._refuse("bus", "a write of a process that is not of this run")
+            return
+        wrong = self._limits.of_write(message, self._latest_ns())
+        if wrong:
+            self._refuse("bus", wrong)
+            return
+        peer.got(message.sequence)
+        batch = batch_of(message, self._texts)
+        self._when_begun(lambda: self.link.receive(batch))
+
+    def _take_image(self, message: BusImage, sender: bytes) -> None:
+        peer = self._peer(message, sender)
+        if peer is None or message.asked_by not in (FOR_ALL, self.peers.process):
+            return
+        wrong = self._limits.of_image(message, self._latest_ns())
+        if wrong:
+            self._refuse("bus/image", wrong)
+            return
+        picture = picture_of(message, self._texts)
+        if message.asked_by != FOR_ALL:
+            peer.caught_up(message.sequence)
+            self._has_image = True
+        self._when_begun(lambda: self.link.merge(picture))
+
+    def _latest_ns(self, told_epoch_ns: int = 0) -> int:
+        """Return the latest rack time that another process can tell of."""
+        epoch_ns = self.peers.epoch_ns or told_epoch_ns
+        passed_ns = time.time_ns() - epoch_ns if epoch_ns else LONGEST_RUN_NS
+        return max(self._rack.now_ns, passed_ns) + AHEAD_NS
+
+    def _peer(self, message: BusWrite | BusImage, sender: bytes) -> Peer | None:
+        """Return the process that a message says it is of; None where that is not of this run, or not its sender."""
+        if message.run_id != self.run_id or self._participants.get(message.process, sender) != sender:
+            return None
+        return self.peers.of(message.process)
+
+    def _take_presence(self, presence: Presence, sender: bytes) -> None:
+        if self._participants.get(presence.process, sender) != sender:
+            self._refuse(PRESENCE, "a word in another process's name")
+            return
+        wall_ns = time.time_ns()
+        wrong = self._limits.of_presence(presence, wall_ns, self._latest_ns(presence.epoch_ns))
+        if wrong and presence.fingerprint == self.peers.fingerprint and presence.process != self.peers.process:
+            self._refuse(PRESENCE, wrong)
+            return
+        found = self.peers.heard(presence, time.monotonic_ns())
+        if found is Heard.OWN:
+            return
+        if found not in (Heard.KNOWN, Heard.NEW):
+            self._strange(found, presence)
+            return
+        if found is Heard.NEW:
+            self._participants[presence.process] = sender
+        if presence.asks == self.peers.process:
+            self._answer(presence.process)
+        if self._begun and presence.run_id == self.run_id:
+            self.link.adopt(standing_of(presence))
+
+    def _look_for_missing(self, presence: Presence) -> None:
+        """Take what waits on the bus before batches of which a process has told count as missing.
+
+        Where the host is busy they wait here: an image asked for each time would make it busier.
+        """
+        with self._site.lock:
+            is_short = self.peers.is_short(presence)
+        if is_short and not all(self._way.take() for _ in range(BATCHES_FIRST)):
+            with self._site.lock:
+                self.peers.missed(presence, time.monotonic_ns())
+
+    def _strange(self, found: Heard, presence: Presence) -> None:
+        name = part_name(self._rack.config, presence.slots)
+        if found is Heard.SEAT_TAKEN and self.stage is Stage.JOINING and presence.state == Stage.RUNNING:
+            self.fault = SeatTaken(f"{name} of this run is there already", "stop it first, or leave it as it is")
+        texts = {
+            Heard.OTHER_RUN: f"another rack is called {self._rack.config.name}: its {name} is not of this run",
+            Heard.OTHER_FILE: f"{name} has another rack file or other sources: it is not of this run",
+            Heard.SEAT_TAKEN: f"a second process has {name}",
+        }
+        self._site.health.note("other rack", (found, presence.process), lambda: texts[found], most=FROM_STRANGERS)
+
+    def _when_begun(self, take: Callable[[], None]) -> None:
+        if self._begun:
+            take()
+        else:
+            self._waiting.append(take)
+
+
+def presence_qos() -> QoSProfile:
+    """Return the quality of service of presences."""
+    return QoSProfile(
+        depth=10,
+        reliability=ReliabilityPolicy.RELIABLE,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+        liveliness_lease_duration=Duration(nanoseconds=LEASE_NS),
+    )

@@ -1,0 +1,328 @@
+"""Passes an operator's requests on to the processes of a distributed rack that hold what they are about.
+
+The operator asks in the process of common memory, as if the rack were in one piece. Each other process serves the same
+services under its first node, ``processor_3/operate/run``; ``Forwarding`` finds whom a request concerns, asks them all
+at once and answers when all have answered, or after ``ANSWER_S``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.text import quoted
+from automax_ros.rackfile.processes import part_name
+from automax_ros.ros.base.node import ModuleNode
+from automax_ros.ros.distributed.bus import RackBus
+from automax_ros.ros.intake.service_requests import Later, Respond
+
+ANSWER_S = 2.0
+"""How long another process is waited for."""
+FIND_S = 0.02
+"""How often a service that is not known yet is looked for."""
+RELOAD_ANSWER_S = 60.0
+"""The same where it has to compile."""
+HERE = -1
+"""This process, among those that a request concerns."""
+NOT_TOGETHER = "a rack of several processes keeps the wall clock: it cannot be halted or stepped"
+"""Why some requests are refused (decision)."""
+Local = Callable[[Any, Any], Any]
+"""Carries out a request in this process and returns the response."""
+
+
+def operate_name(module: str, service: str) -> str:
+    """Return the service, in the rack's namespace, by which a process carries out what another was asked for."""
+    return f"{module}/operate/{service}"
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one process is asked: its seat, ``HERE`` for this one, and the request."""
+
+    seat: int
+    request: Any
+
+
+class Forwarding:
+    """Forwards the requests of one node, that of the operator. ``bus`` knows who is there.
+
+    ``reloaded`` is called when the source of a task elsewhere is another.
+    """
+
+    def __init__(self, node: ModuleNode, bus: RackBus, reloaded: Callable[[], None]) -> None:
+        """Find out which process holds what."""
+        self._reloaded = reloaded
+        config = node.site.rack.config
+        self._node, self._bus, self._config = node, bus, config
+        home = bus.peers.seat
+        self._seats = [seat for seat in bus.seats if seat != home]
+        seat_of = {slot: HERE if seat == home else seat for seat, slots in bus.seats.items() for slot in slots}
+        self._tasks = {task.name: seat_of[module.slot] for module, task in config.placed_tasks}
+        self._slots = {str(slot): seat for slot, seat in seat_of.items()}
+        self._plants = dict(bus.plants)
+        self._clients: dict[tuple[int, str], Any] = {}
+
+    def answer(self, service: str, kind: Any, request: Any, response: Any, local: Local) -> Any:
+        """Answer a request: at once where it concerns this process alone, else when all concerned have answered."""
+        if service in _NOT_TOGETHER:
+            return _refused(response, NOT_TOGETHER)
+        shares = _SHARING.get(service, _mine)(self, request, kind)
+        if [share.seat for share in shares] == [HERE]:
+            return local(shares[0].request, response)
+        absent = [self._name(share.seat) for share in shares if share.seat not in (HERE, *self._bus.peers.by_seat)]
+        if absent and len(shares) == 1:
+            return _refused(response, f"{absent[0]} is not there: start its process again")
+        answers: dict[int, Any] = {share.seat: None for share in shares}
+        for share in shares:
+            if share.seat == HERE:
+                answers[HERE] = local(share.request, kind.Response())
+
+        def begin(respond: Respond) -> None:
+            _Round(self, service, kind, shares, answers, lambda: respond(end()))
+
+        def end() -> Any:
+            silent = [self._name(share.seat) for share in shares if answers[share.seat] is None]
+            found = _merged(response, request, shares, answers, silent)
+            if service == "reload" and _is_ok(found):
+                self._note_source(request)
+            return found
+
+        return Later(begin)
+
+    def _note_source(self, request: Any) -> None:
+        """Keep what a task elsewhere runs from now on: whoever records the rack asks here for its files."""
+        name = request.task.strip().upper()
+        sources = self._node.site.rack.operations.installation.sources
+        sources[name] = SourceText(sources[name].name, request.source)
+        self._reloaded()
+
+    def client(self, seat: int, service: str, kind: Any) -> Any:
+        """Return the client of a service of another process."""
+        key = seat, service
+        if key not in self._clients:
+            name = operate_name(self._name(seat), service)
+            self._clients[key] = self._node.create_client(kind, name)
+        return self._clients[key]
+
+    @property
+    def node(self) -> ModuleNode:
+        """The node that asks."""
+        return self._node
+
+    def is_there(self, seat: int) -> bool:
+        """Return whether a process lives."""
+        return seat in self._bus.peers.by_seat
+
+    def seat_of_task(self, text: str) -> int:
+        """Return the process that runs a task; this one for a name that the rack does not have, to say so."""
+        return self._tasks.get(text.strip().upper(), HERE)
+
+    def seat_of_name(self, text: str) -> int:
+        """Return the process that holds ``TASK.NAME``, this one for common variables."""
+        task, point, _ = text.partition(".")
+        return self.seat_of_task(task) if point else HERE
+
+    def seat_of_slot(self, text: str) -> int:
+        """Return the process that has the module in a slot."""
+        return self._slots.get(text.strip(), HERE)
+
+    def seat_of_plant(self, text: str) -> int:
+        """Return the process that has a plant."""
+        return self._slots.get(str(self._plants.get(text.strip().upper(), "")), HERE)
+
+    def everybody(self, request: Any) -> list[Share]:
+        """Return a request for all processes."""
+        return [Share(HERE, request), *(Share(seat, request) for seat in self._seats)]
+
+    def _name(self, seat: int) -> str:
+        return part_name(self._config, self._bus.seats[seat]) if seat in self._bus.seats else quoted(str(seat))
+
+
+class _Round:
+    """One request on its way: waits for all answers, at most a time.
+
+    A process is asked once its service is known here: DDS drops a request that is sent before.
+    """
+
+    def __init__(
+        self,
+        forwarding: Forwarding,
+        service: str,
+        kind: Any,
+        shares: Sequence[Share],
+        answers: dict[int, Any],
+        done: Callable[[], None],
+    ) -> None:
+        self._answers, self._done, self._node = answers, done, forwarding.node
+        asked = [share for share in shares if share.seat != HERE and forwarding.is_there(share.seat)]
+        self._open = {share.seat for share in asked}
+        self._unasked = [(share, forwarding.client(share.seat, service, kind)) for share in asked]
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        wait_s = RELOAD_ANSWER_S if service == "reload" else ANSWER_S
+        self._timers = [
+            self._node.create_timer(wait_s, self._end, clock=steady),
+            self._node.create_timer(FIND_S, self._ask, clock=steady),
+        ]
+        if asked:
+            self._ask()
+        else:
+            self._end()
+
+    def _ask(self) -> None:
+        """Ask the processes whose service is known by now."""
+        waiting, self._unasked = self._unasked, []
+        for share, client in waiting:
+            if client.service_is_ready():
+                future = client.call_async(share.request)
+                future.add_done_callback(lambda found, seat=share.seat: self._answered(seat, found))
+            else:
+                self._unasked.append((share, client))
+
+    def _answered(self, seat: int, future: Any) -> None:
+        with self._node.site.present():
+            if seat in self._open:
+                self._open.discard(seat)
+                self._answers[seat] = future.result()
+                if not self._open:
+                    self._end()
+
+    def _end(self) -> None:
+        """Answer with what has come."""
+        timers, self._timers = self._timers, []
+        if timers:
+            for timer in timers:
+                self._node.destroy_timer(timer)
+            self._open.clear()
+            self._done()
+
+
+def _merged(
+    response: Any, request: Any, shares: Sequence[Share], answers: dict[int, Any], silent: Sequence[str]
+) -> Any:
+    """Return one response: all lists one after the other, numbers of tasks added up, OK if all are.
+
+    A common that is forced is so in every process, and told once. Where processes are ``silent``, a response that can
+    name them (``absent``) holds what has come; any other is refused.
+    """
+    found = [answer for answer in answers.values() if answer is not None]
+    if len(shares) == 1 and found:
+        return found[0]
+    reasons = [reason for answer in found if (reason := _reason_of(answer)) and not _is_ok(answer)]
+    if silent:
+        reasons.append(f"{', '.join(silent)} did not answer")
+    first = found[0] if found else response
+    for name in first.get_fields_and_field_types():
+        values = [getattr(answer, name) for answer in found]
+        if values and isinstance(values[0], (list, tuple)):
+            items = [item for value in values for item in value]
+            setattr(response, name, list(dict.fromkeys(items)) if name == "forced" else items)
+        elif name in _ADDED:
+            setattr(response, name, sum(values))
+        elif values:
+            setattr(response, name, values[0])
+    if hasattr(response, "found"):
+        _in_order(response, list(request.names))
+    can_name = bool(found) and hasattr(response, "absent")
+    if can_name:
+        response.absent = list(silent)
+    ok = (can_name or not silent) and all(map(_is_ok, found))
+    return _concluded(response, ok=ok, reason="; ".join(dict.fromkeys(reasons)))
+
+
+def _in_order(response: Any, names: list[str]) -> None:
+    """Put what was read into the order in which it was asked for, each once."""
+    places = {name.strip().upper(): place for place, name in reversed(list(enumerate(names)))}
+    # A stranger may answer with fewer values than names.
+    read = {item[0]: item for item in zip(response.found, response.values, response.shown, strict=False)}
+    items = sorted(read.values(), key=lambda item: places.get(item[0].upper(), len(places)))
+    response.found, response.values, response.shown = ([item[column] for item in items] for column in range(3))
+
+
+def _is_ok(answer: Any) -> bool:
+    return bool(getattr(answer, "ok", getattr(answer, "success", True)))
+
+
+def _reason_of(answer: Any) -> str:
+    return str(getattr(answer, "reason", getattr(answer, "message", "")))
+
+
+def _refused(response: Any, reason: str) -> Any:
+    return _concluded(response, ok=False, reason=reason)
+
+
+def _concluded(response: Any, *, ok: bool, reason: str) -> Any:
+    for name, value in (("ok", ok), ("success", ok), ("reason", reason), ("message", reason)):
+        if hasattr(response, name) and (name != "message" or reason):
+            setattr(response, name, value)
+    return response
+
+
+def _mine(_: Forwarding, request: Any, __: Any) -> list[Share]:
+    return [Share(HERE, request)]
+
+
+def _by_task(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+    """An empty name is all tasks."""
+    if not request.task.strip():
+        return forwarding.everybody(request)
+    return [Share(forwarding.seat_of_task(request.task), request)]
+
+
+def _by_name(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+    return [Share(forwarding.seat_of_name(request.name), request)]
+
+
+def _by_names(forwarding: Forwarding, request: Any, kind: Any) -> list[Share]:
+    """Without names it is everything, wherever it is."""
+    if not request.names:
+        return forwarding.everybody(request)
+    groups: dict[int, list[str]] = {}
+    for name in request.names:
+        groups.setdefault(forwarding.seat_of_name(name), []).append(name)
+    return [Share(seat, kind.Request(names=names)) for seat, names in groups.items()]
+
+
+def _by_slot(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+    return [Share(forwarding.seat_of_slot(request.name), request)]
+
+
+def _by_plant(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+    return [Share(forwarding.seat_of_plant(request.name), request)]
+
+
+def _everybody(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+    return forwarding.everybody(request)
+
+
+def _status(forwarding: Forwarding, request: Any, _: Any) -> list[Share]:
+    return [Share(HERE, request)] if request.home_only else forwarding.everybody(request)
+
+
+_ADDED = ("tasks", "running", "ended")
+"""Numbers of a status that are those of one process each."""
+_NOT_TOGETHER = ("pause", "resume", "step")
+_SHARING: dict[str, Callable[[Forwarding, Any, Any], list[Share]]] = {
+    "run": _by_task,
+    "stop": _by_task,
+    "delete": _by_task,
+    "reload": _by_task,
+    "clear": _by_task,
+    "clear_errors": _by_task,
+    "errors": _by_task,
+    "run_all": _everybody,
+    "power": _everybody,
+    "force": _by_name,
+    "tune": _by_name,
+    "unforce": _by_names,
+    "get": _by_names,
+    "forces": _everybody,
+    "module": _by_slot,
+    "plant": _by_plant,
+    "tasks": _everybody,
+    "status": _status,
+}
+"""Whom the requests of each service concern; the others are for common memory alone."""

@@ -1,0 +1,56 @@
+"""A rack in one process says in the graph that it is there, and hears of others with its name.
+
+Two racks of one name, each started where the other's lock cannot be seen, mix up whoever listens to them: each says so,
+in a line and in its diagnostics. Racks in many processes do the same over their bus (``ros/distributed/bus``).
+"""
+
+from __future__ import annotations
+
+import os
+import time
+
+from automax_msgs.msg import Presence as PresenceClass
+from rclpy.clock import Clock, ClockType
+from rclpy.qos import QoSProfile
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.messages.cdr.cdr import encode
+from automax_ros.messages.types.messages import Presence, Stage
+from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.distributed.bus import PRESENCE, presence_qos
+from automax_ros.ros.distributed.bus_topics import BusWay, Terms
+from automax_ros.runtime.health import FROM_STRANGERS
+
+PERIOD_NS = NS_PER_S
+"""How often a rack in one process says that it is there (decision): nobody waits for it."""
+_MOST_BYTES = 1 << 16
+
+
+class Herald:
+    """Speaks for a rack that is whole in this process."""
+
+    def __init__(self, site: Site, node: ModuleNode) -> None:
+        """Join the graph; the first word comes after a second."""
+        self._site, self._process = site, int.from_bytes(os.urandom(8), "big") >> 1 or 1
+        self._publisher = node.create_publisher(PresenceClass, PRESENCE, presence_qos())
+        kind, terms = "automax_msgs/msg/Presence", Terms(_MOST_BYTES)
+        BusWay(node, PRESENCE, kind, QoSProfile(depth=10), self._heard, self._refuse, terms)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(PERIOD_NS / NS_PER_S, node.inside(PRESENCE, self._tell), clock=steady)
+
+    def _tell(self) -> None:
+        rack, run_id = self._site.rack, self._site.stream.run_id
+        slots = tuple(sorted(rack.part.slots))
+        word = Presence(
+            time.time_ns(), rack.config.name, run_id, self._process, slots[0], slots, rack.installed, int(Stage.RUNNING)
+        )
+        self._publisher.publish(encode(word))
+
+    def _heard(self, word: Presence, _: bytes) -> None:
+        if word.process != self._process:
+            name = self._site.rack.config.name
+            text = f"another rack is called {name}: what the two send cannot be told apart"
+            self._site.health.note("other rack", word.run_id, lambda: text, most=FROM_STRANGERS)
+
+    def _refuse(self, topic: str, what: str) -> None:
+        self._site.health.note("refused message", topic, lambda: f"{topic}: {what} was refused")

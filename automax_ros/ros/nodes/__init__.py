@@ -1,0 +1,1 @@
+"""A node per module, the operator, the rack's tables; `registry` says which module has which."""

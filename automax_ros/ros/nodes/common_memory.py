@@ -1,0 +1,133 @@
+"""The node ``common_memory``: the rack's common variables as topics.
+
+Publishes: ``variables`` (automax_msgs/VariableTable, latched), ``config`` (std_msgs/String, latched: the rack's YAML
+file and the tasks' sources as JSON), ``backplane`` (automax_msgs/CommonWrite), ``backplane/snapshot``
+(automax_msgs/CommonImage, latched, sent again to each late joiner of either), ``common/NAME`` (std_msgs, latched) for
+each variable with ``ros: out`` or ``ros: in``.
+
+Subscribes: ``common/NAME/set`` (std_msgs) for each variable with ``ros: in``, and for no other;
+``JOINT_velocity_controller/commands`` and ``JOINT_effort_controller/commands`` (std_msgs/Float64MultiArray) where a
+plant's joint is commanded (``ros/nodes/joint_commands.py``).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import String
+
+from automax_ros.core.kinds import Direction
+from automax_ros.core.types import Value
+from automax_ros.messages.types.rack_files import RackFile, files_of, files_text
+from automax_ros.messages.types.topics import LATCHED, Take, Topic
+from automax_ros.rackfile.model.config import CommonVariable
+from automax_ros.rackfile.model.ros_names import set_topic
+from automax_ros.rackfile.model.writers import ROS_WRITER
+from automax_ros.ros.base.node import MAIN_NODE, ModuleNode, Site
+from automax_ros.ros.base.qos import ros_qos
+from automax_ros.ros.base.rack_health import RackHealth
+from automax_ros.ros.base.write_topic import Inlet, ScaledInput
+from automax_ros.ros.nodes.joint_commands import joint_inlets
+from automax_ros.runtime.memory.views import MemoryValueError
+
+_NUMBER_BYTES = 8
+_LAYOUT_BYTES = 1024
+"""Longest layout of an array's message that is read (decision)."""
+
+
+class CommonMemoryNode(ModuleNode):
+    """Serves the topics of common memory; its callbacks run between scans."""
+
+    def __init__(self, site: Site) -> None:
+        """Create publishers and subscriptions; messages flow once the stream begins."""
+        super().__init__(site, "common_memory")
+        rack, stream = site.rack, site.stream
+        outlets: dict[Topic, Take] = {}
+        for own in stream.topics:
+            if own.slot is None:
+                joined = own in (stream.snapshot_topic, stream.backplane_topic)
+                # The image that waits for a late joiner may be as old as the run.
+                outlets[own] = self.outlet(own, stream.send_image if joined else None)
+        self._config = self.create_publisher(String, "config", ros_qos(LATCHED))
+        self._files: list[RackFile] = []
+        outlets[stream.operations_topic] = self._with_files(outlets[stream.operations_topic])
+        self.offer_files()
+        for view, variable in enumerate(rack.config.variables):
+            topic = stream.value_topic(view)
+            if variable.direction is Direction.IN and topic is not None:
+                _ValueInlet(self, view, variable, topic)
+        joint_inlets(self)
+        stream.add_sink(outlets.get)
+        self.diagnose(RackHealth(site, f"{MAIN_NODE}: {rack.config.name}").statuses)
+        self.diagnose(self._module_health)
+
+    def _with_files(self, publish: Take) -> Take:
+        """Return what publishes an operation and, where it was a reload, the files that the rack runs from now."""
+
+        def take(stamp: int, payload: bytes) -> None:
+            self.offer_files()
+            publish(stamp, payload)
+
+        return take
+
+    def _module_health(self, _: int) -> list[DiagnosticStatus]:
+        """Return the health of the module that holds common memory; a lone Processor tells its own."""
+        rack = self.site.rack
+        module = next(item for item in rack.config.modules if item.slot == rack.config.home_slot)
+        if module.tick_ns:
+            return []
+        good = rack.operations.battery_good
+        values = {"variables": str(len(rack.config.declared)), "battery_good": str(good)}
+        level, text = (DiagnosticStatus.OK, "running") if good else (DiagnosticStatus.WARN, "the battery was bad")
+        return [self.status(module.model, level, text, module.slot, values)]
+
+    def offer_files(self) -> None:
+        """Send the rack's files again if one of them is another now."""
+        rack = self.site.rack
+        files = files_of(rack)
+        if files != self._files:
+            self._files = files
+            self._config.publish(String(data=files_text(rack.config.name, files)))
+
+
+class _ValueInlet:
+    """Writes of one variable from ROS."""
+
+    def __init__(self, node: CommonMemoryNode, view: int, variable: CommonVariable, topic: Topic) -> None:
+        self._node, self._view, self._variable = node, view, variable
+        name, scale = set_topic(topic.name), variable.scale
+        self._scaled = None if scale is None else ScaledInput(node, name, variable, scale, variable.unit)
+        self._inlet = Inlet(node, name, topic.type_name, self._write, _most_bytes(variable))
+
+    def _write(self, message: Any) -> None:
+        rack, scaled = self._node.site.rack, self._scaled
+        try:
+            if not rack.operations.powered and not rack.config.is_input(self._variable):
+                raise MemoryValueError(f"the power is off, and {self._variable.name} is not an input")
+            values = _elements(self._variable, message) if scaled is None else [(0, scaled.counts(message.data))]
+            rack.write_view(self._view, values, ROS_WRITER)
+        except MemoryValueError as error:
+            self._inlet.refuse(self._variable.name, error)
+
+
+def _most_bytes(variable: CommonVariable) -> int:
+    """Return how long a message with a whole variable can be, bytes.
+
+    8 for each element are the most of any type, 4 for each character; an array's layout may have names of its own.
+    """
+    return _LAYOUT_BYTES * variable.is_array + variable.elements * (_NUMBER_BYTES + 4 * variable.length)
+
+
+def _elements(variable: CommonVariable, message: Any) -> list[tuple[int, Value]]:
+    """Return what a message writes: (element, value) of the whole variable.
+
+    Raises:
+        MemoryValueError: an array message of another length than the variable's.
+    """
+    if not variable.is_array:
+        return [(0, message.data)]
+    data = list(message.data)
+    if len(data) != variable.elements:
+        raise MemoryValueError(f"{variable.name} has {variable.elements} elements, the message has {len(data)}")
+    return list(enumerate(data))

@@ -1,0 +1,77 @@
+"""The node ``drive_plant_SLOT`` (``drive_plant_SLOT_A`` and ``_B`` of a UDC): the plant that a drive turns.
+
+Publishes: ``joint_states`` (sensor_msgs/JointState), the shaft as a joint with the plant's name, and ``plants/NAME``
+(automax_msgs/PlantState), both 100 times per second of rack time; its part of ``/diagnostics``.
+
+Subscribes: ``plants/NAME/load_torque/set`` (std_msgs/Float64, N m) where the plant's load says ``ros: in``, and no
+other topic. A torque counts from the instant at which it comes. Observers are told of no operation: PlantState shows
+the load (decision).
+
+The plant is the scheduler's: nothing here lets its time pass, and nothing waits for ROS.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.modules.drive import Timed
+from automax_ros.rack.operator.controls import Controls
+from automax_ros.rackfile.model.driven import DrivenPlant
+from automax_ros.rackfile.model.ros_names import load_topic
+from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.write_topic import Inlet
+
+
+class DrivePlantNode(ModuleNode):
+    """Serves the plant of one drive."""
+
+    def __init__(self, site: Site, driven: DrivenPlant) -> None:
+        """Create publishers and, where ROS may load the shaft, the subscription."""
+        super().__init__(site, "_".join(filter(None, ("drive_plant", str(driven.slot), driven.drive))))
+        self._driven, self._plant = driven, site.rack.plants[driven.name]
+        outlets = {topic: self.outlet(topic) for topic in site.stream.plants.topics if topic.plant == driven.name}
+        site.stream.add_sink(outlets.get)
+        modules = {module.config.slot: module for module in site.rack.modules}
+        module = modules[driven.slot]
+        self._timing = module.timing if isinstance(module, Timed) else None
+        self._controls = Controls(site.rack)
+        if driven.config.load.from_ros:
+            self._inlet = Inlet(self, load_topic(driven.name), "std_msgs/msg/Float64", self._load, 8)
+        self.diagnose(self._health)
+
+    def _load(self, message: Any) -> None:
+        try:
+            self._controls.load(self._driven.name, message.data)
+        except OperationRefused as refused:
+            self._inlet.refuse(f"the load of {self._driven.name}", refused)
+
+    def _health(self, _: int) -> list[DiagnosticStatus]:
+        """Return the plant's health: WARN with something broken, or where gates were newly fired late; else OK."""
+        state = self.site.stream.plants.last(self._driven.name)
+        if state is None:
+            return []
+        level, text = DiagnosticStatus.OK, "turns" if state.speed_rpm else "stands still"
+        shown = {
+            "speed_rpm": f"{state.speed_rpm:.6g}",
+            "current_percent": f"{100.0 * state.current_rms_a / self._plant.rated_amps:.4g}",
+            "contactor": "closed" if state.contactor else "open",
+            "line_hz": f"{state.line_hz:.6g}",
+            "line_v": f"{state.line_v:.6g}",
+            "faults": ", ".join(state.faults),
+        }
+        timing = self._timing
+        if timing is not None:
+            newly = self.site.diagnostics.newly(f"{self._driven.name} late", timing.late)
+            shown |= {
+                "interrupts": str(timing.interrupts),
+                "late": str(timing.late),
+                "latest_ms": f"{timing.greatest_ns / 1e6:.4g}",
+            }
+            if newly:
+                level, text = DiagnosticStatus.WARN, f"firings late by more than 1 ms since the last report: {newly}"
+        if state.faults:
+            level, text = DiagnosticStatus.WARN, ", ".join(state.faults)
+        return [self.status(f"plant {self._driven.name}", level, text, self._driven.slot, shown)]

@@ -1,0 +1,171 @@
+"""The node ``network_SLOT``: a network module 57C404, whose cable is a topic.
+
+Publishes: ``/dcsnet/NETWORK`` (automax_msgs/NetworkDrop), one message for each drop that the module sends, once per
+cycle of 5.5 ms; ``/diagnostics`` (diagnostic_msgs/DiagnosticArray) once per second, and at once when a drop is lost or
+heard again, or another module uses its drops.
+
+Subscribes: ``/dcsnet/NETWORK``. Messages are taken at the rack's door as bytes, longer ones than any of a station are
+dropped unread; the last ``MOST_WAITING`` wait for the next cycle, are read then, and given to the module between two
+scans.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from automax_ros.messages.cdr.cdr import MAX_TRAILING, CdrError, decode, encode
+from automax_ros.messages.types.messages import NetworkDrop
+from automax_ros.messages.types.topics import NETWORK, Topic
+from automax_ros.rack.modules.module import Module
+from automax_ros.rack.modules.network import CYCLE_NS
+from automax_ros.rack.modules.network_drops import Frame, NetworkStatus, Sender, Station
+from automax_ros.rackfile.model.ros_names import network_topic
+from automax_ros.rackfile.modules.network import HALF
+from automax_ros.rackfile.reading.names import is_rack_name
+from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.qos import message_class, ros_qos
+from automax_ros.ros.intake.guard import Throttle
+from automax_ros.ros.intake.raw_messages import taker_of
+from automax_ros.ros.intake.rcl import library
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
+
+TELL_INTERVAL_S = 0.2
+"""What changes on the network is logged at most this often."""
+TYPE = "automax_msgs/msg/NetworkDrop"
+MOST_WAITING = NETWORK.depth
+"""Messages that wait for the next cycle; of more the oldest are lost, as they would be on DDS's side."""
+MOST_BYTES = len(encode(NetworkDrop(0, 0, "R" * 8, 0, 0, 0, False, 0, 0, (0,) * HALF))) + MAX_TRAILING
+"""Length of the longest message that a station sends, with what a DDS may put after it."""
+
+
+class NetworkNode(ModuleNode):
+    """Serves one network module."""
+
+    def __init__(self, site: Site, module: Module) -> None:
+        """Join the network."""
+        super().__init__(site, module.config.name)
+        assert isinstance(module, Station)
+        self._module, self._slot, self._model = module, module.config.slot, module.config.model
+        name = network_topic(site.rack.config.namespace, module.network)
+        self._waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
+        self._told: tuple[object, ...] = ("", (), ())
+        self._throttle = Throttle(TELL_INTERVAL_S)
+        self._publish = self.outlet(Topic(name, TYPE, NETWORK, self._slot))
+        site.door.add(_Cable(self.own_subscription(message_class(TYPE), name, ros_qos(NETWORK)), self._waiting))
+        module.connect(self._send)
+        scheduler, key = site.rack.scheduler, EventKey(EventClass.IO, self._slot, "arrivals")
+        scheduler.every(CYCLE_NS, scheduler.now_ns, key, lambda *_: self._look())
+        self.diagnose(self._health)
+
+    def _send(self, now_ns: int, frames: Sequence[Frame]) -> None:
+        stream, rack = self.site.stream, self.site.rack.config.name
+        stamp = stream.stamp(now_ns)
+        for item in frames:
+            message = NetworkDrop(
+                stamp,
+                stream.run_id,
+                rack,
+                self._slot,
+                item.station,
+                item.depth,
+                item.defined,
+                item.sequence,
+                item.drop,
+                item.words,
+            )
+            self._publish(stamp, encode(message))
+
+    def _look(self) -> None:
+        """Give the module what has come, and tell how it stands where that has changed."""
+        waiting = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        if waiting:
+            arrived = [_read(payload) for payload in waiting]
+            own = (self.site.stream.run_id, self._slot)
+            known = [item for item in arrived if item is not None and (item[0].run_id, item[0].slot) != own]
+            self._module.receive(known, damaged=arrived.count(None))
+        status = self._module.status()
+        told = (status.code, status.lost, status.rivals)
+        if told != self._told and self._throttle.passes():
+            self._told = told
+            self._tell(status)
+            self.site.diagnostics.look()
+
+    def _tell(self, status: NetworkStatus) -> None:
+        network, log = self._module.network, self.get_logger()
+        if status.rivals:
+            who = ", ".join(map(str, status.rivals))
+            text = f"network {network}: drops of another module are used by {who}: give each module drops of its own"
+            self.site.health.note("two modules with one drop", network, lambda: text)
+            log.error(text)
+        if status.lost:
+            log.warning(f"network {network}: {_sentence(status)}")
+        elif not status.rivals:
+            log.info(f"network {network}: {_sentence(status)}")
+
+    def _health(self, _: int) -> list[DiagnosticStatus]:
+        """Return the module's health: ERROR where two modules have one drop, WARN with the code C, else OK."""
+        status = self._module.status()
+        level = DiagnosticStatus.WARN if status.code else DiagnosticStatus.OK
+        text = _sentence(status)
+        if status.rivals:
+            level = DiagnosticStatus.ERROR
+            text = f"drops of another module are used by {', '.join(map(str, status.rivals))}; {text}"
+        values = {
+            "network": self._module.network,
+            "drop": str(status.drop),
+            "depth": str(status.depth),
+            "depth_defined": str(status.defined).lower(),
+            "heard": _listed(status.heard),
+            "lost": _listed(status.lost),
+            "code": status.code,
+            **{name: str(count) for name, count in status.counters},
+        }
+        return [self.status(self._model, level, text, self._slot, values)]
+
+
+class _Cable:
+    """The network's topic, as the rack's door serves it: what comes joins those that wait."""
+
+    def __init__(self, subscription: Any, waiting: deque[bytes]) -> None:
+        self.name, self.handle, self._waiting = subscription.topic_name, subscription.handle, waiting
+        self._taker = taker_of(subscription, MOST_BYTES)
+
+    def take(self) -> bool:
+        """Take the next message, b"" in place of one that is too long."""
+        taken = self._taker.take()
+        if taken is not None:
+            self._waiting.append(taken.payload or b"")
+        return taken is not None
+
+    def wake(self, pointer: int, callback: Any, data: int | None) -> int:
+        """Let rcl call a function for each message."""
+        rcl = library()
+        assert rcl is not None
+        return int(rcl.on_message(pointer, callback, data))
+
+
+def _read(payload: bytes) -> tuple[Sender, Frame] | None:
+    """Return what a message says, None where it says nothing."""
+    try:
+        found = decode(TYPE, payload)
+    except CdrError:
+        return None
+    assert isinstance(found, NetworkDrop)
+    rack = found.rack if is_rack_name(found.rack) else ""
+    words = tuple(found.registers)
+    frame = Frame(found.station, found.depth, found.defined, found.drop, found.sequence, words)
+    return Sender(found.run_id, found.slot, rack), frame
+
+
+def _sentence(status: NetworkStatus) -> str:
+    if status.lost:
+        return f"code {status.code}: nothing comes from drops {_listed(status.lost)}"
+    return f"hears drops {_listed(status.heard)}" if status.heard else "hears nobody yet"
+
+
+def _listed(drops: Sequence[int]) -> str:
+    return ", ".join(map(str, drops))

@@ -1,0 +1,139 @@
+"""The node ``rack``: a whole rack as one managed node, which ROS 2 lifecycle managers configure and activate.
+
+Services, as every lifecycle node has them: ``~/change_state``, ``~/get_state``, ``~/get_available_states``,
+``~/get_available_transitions``, ``~/get_transition_graph`` (lifecycle_msgs). Publishes ``~/transition_event``.
+
+*configure* reads the rack's YAML file and compiles its tasks; *activate* puts all tasks into RUN; *deactivate* is STOP
+ALL between two scans, which makes all outputs 0; *cleanup* lets the nodes of the modules leave the graph;
+*shutdown* ends the program as SIGTERM does.
+
+A rack that a fault has stopped stays active (decision): a manager that finds a node inactive that it has not
+deactivated brings the whole system down, and ``/diagnostics`` tell of the fault. ``deactivate`` and ``activate`` put
+its tasks into RUN again, once the error log of the faulted one is cleared. Who puts tasks into RUN otherwise, as an
+operator does, makes the node active (decision): what is inactive does not run.
+
+What a lifecycle manager may ask of a rack that another program holds as a library (``RackNodes``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from rclpy.context import Context
+
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.base.stop_cause import OperationRefused
+from automax_ros.rack.rack import Rack
+from automax_ros.ros.base.lifecycle import ACTIVATE, ACTIVE, DEACTIVATE, Duties, Managed, Pending, TransitionRefused
+from automax_ros.ros.base.module_lifecycle import NOT_OPERATED
+from automax_ros.ros.base.node import MAIN_NODE, GuardedNode
+from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.runtime.health import Health
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.tasks.task import ScanRecord, Task
+
+
+class Held(Protocol):
+    """A rack with its nodes."""
+
+    rack: Rack
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the program has started it."""
+        ...
+
+    def activate(self) -> Pending | None:
+        """Put all tasks that rest into RUN."""
+        ...
+
+    def deactivate(self) -> None:
+        """STOP ALL."""
+        ...
+
+
+class HeldRack:
+    """RUN and STOP ALL of a started rack; its program alone starts, closes and exchanges it (decision)."""
+
+    def __init__(self, held: Held) -> None:
+        self._held = held
+
+    def refusal(self, transition: str) -> str | None:
+        """Return why a transition is refused."""
+        if not self._held.rack.config.operator:
+            return NOT_OPERATED
+        if transition not in (ACTIVATE, DEACTIVATE) or not self._held.has_begun:
+            return "the program that holds this rack starts and closes it"
+        return None
+
+    def activate(self) -> Pending | None:
+        """Put all tasks that rest into RUN."""
+        try:
+            return self._held.activate()
+        except OperationRefused as refused:
+            raise TransitionRefused(str(refused)) from refused
+
+    def deactivate(self) -> None:
+        """STOP ALL."""
+        try:
+            self._held.deactivate()
+        except OperationRefused as refused:
+            raise TransitionRefused(str(refused)) from refused
+
+    def configure(self) -> None:
+        """Nothing is left to configure."""
+
+    def cleanup(self) -> None:
+        """Nothing is left."""
+
+    def shutdown(self) -> None:
+        """Nothing ends."""
+
+    def fail(self) -> None:
+        """STOP ALL, so that no output stays on."""
+        if self._held.rack.operations.powered:
+            self._held.deactivate()
+
+
+_RUNS = ("run", "run_all")
+"""The operations that put tasks into RUN."""
+
+
+class RackNode(Managed, GuardedNode):
+    """The node of a whole rack."""
+
+    def __init__(
+        self,
+        namespace: str,
+        context: Context,
+        health: Health,
+        duties: Duties,
+        enter: Callable[[Callable[[], None]], None],
+        arguments: RosArguments = NO_ARGUMENTS,
+    ) -> None:
+        """Join the graph, unconfigured; the arguments are those of ``GuardedNode`` and ``Managed.manage``."""
+        GuardedNode.__init__(self, MAIN_NODE, namespace, context, health, arguments)
+        self.health = health
+        self.manage(duties, self.guard, enter)
+
+
+class Follower:
+    """Observes a rack, so that the node ``rack`` is active where somebody else has put tasks into RUN."""
+
+    def __init__(self, manager: Managed) -> None:
+        self._manager = manager
+
+    def operated(self, operation: Operation) -> None:
+        """Look whether it has put tasks into RUN."""
+        if operation.ok and operation.what in _RUNS:
+            self._manager.follow(ACTIVE)
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
+        """Scans change no state."""
+
+    def written(self, writes: list[WriteGroup]) -> None:
+        """Writes change no state."""
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """Tunables change no state."""

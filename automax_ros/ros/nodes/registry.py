@@ -1,0 +1,104 @@
+"""Which node a module has: one entry for each kind that has one of its own.
+
+The common memory is the rack's, with a module for it or without: its node is there always, and first.
+
+Facts about a rack as read-only parameters of its nodes, for whoever looks with ``ros2 param``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from automax_ros.core.ticks import NS_PER_MS
+from automax_ros.rack.modules.module import Module
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.model.module import ModuleConfig
+from automax_ros.rackfile.modules.common_memory import COMMON_MEMORY
+from automax_ros.rackfile.modules.drive import DRIVE_ANALOG, DRIVE_CONTROLLER
+from automax_ros.rackfile.modules.io import ANALOG_IO, DIGITAL_IO, PULSETACH, RESOLVER
+from automax_ros.rackfile.modules.kind import ModuleKind
+from automax_ros.rackfile.modules.network import NETWORK
+from automax_ros.rackfile.modules.processor import PC3000, PROCESSOR
+from automax_ros.rackfile.modules.registry import SUPPORTED
+from automax_ros.rackfile.modules.udc import UDC
+from automax_ros.ros.base.node import ModuleNode, Site
+from automax_ros.ros.base.rack_health import RackHealth
+from automax_ros.ros.nodes.common_memory import CommonMemoryNode
+from automax_ros.ros.nodes.drive_plant import DrivePlantNode
+from automax_ros.ros.nodes.io_module import IoModuleNode
+from automax_ros.ros.nodes.network import NetworkNode
+from automax_ros.ros.nodes.operator import OperatorNode
+from automax_ros.ros.nodes.processor import ProcessorNode, UdcNode
+from automax_ros.ros.nodes.tables import Tables
+
+Facts = dict[str, tuple[bool | int | float | str, str]]
+"""Value and description by name."""
+
+
+def run_facts(run_id: int) -> Facts:
+    """Return those of one run, which are known once it begins: processes of a distributed rack agree on its number."""
+    return {"run_id": (run_id, "number of the run, as in VariableTable")}
+
+
+def rack_facts(rack: Rack) -> Facts:
+    """Return those of a whole rack."""
+    config = rack.config
+    return {
+        "rack": (config.name, "the rack's name"),
+        "config": (str(config.path.absolute()), "its YAML file"),
+        "executive": (f"{config.executive / 10:.1f}", "version of its executive software"),
+        "execution": (config.execution.value, "what time a scan takes: none (ideal), or the manual's (modeled)"),
+        "operator": (config.operator, "whether it has the services of an operator"),
+    }
+
+
+def module_facts(module: ModuleConfig) -> Facts:
+    """Return those of a module."""
+    facts: Facts = {
+        "slot": (module.slot, "the slot it stands in"),
+        "model": (module.model, "its catalogue number"),
+    }
+    if module.tasks:
+        facts["tick_ms"] = (module.tick_ns / NS_PER_MS, "its tick in ms")
+    return facts
+
+
+NODES: dict[ModuleKind, Callable[[Site, Module], ModuleNode] | None] = {
+    PROCESSOR: ProcessorNode,
+    PC3000: ProcessorNode,
+    COMMON_MEMORY: None,
+    DIGITAL_IO: IoModuleNode,
+    ANALOG_IO: IoModuleNode,
+    RESOLVER: IoModuleNode,
+    PULSETACH: IoModuleNode,
+    DRIVE_CONTROLLER: IoModuleNode,
+    DRIVE_ANALOG: IoModuleNode,
+    NETWORK: NetworkNode,
+    UDC: UdcNode,
+}
+"""The node of each kind of module; None where the rack's common memory node is enough."""
+
+
+def nodes_of(site: Site) -> tuple[ModuleNode, ...]:
+    """Create the nodes of a rack's part: those of its modules by slot.
+
+    Where common memory is, its node and, if the rack has one, the operator's stand first.
+
+    After the modules stand those of the plants that drives turn, by slot and drive.
+    """
+    made: list[ModuleNode] = []
+    if site.is_home:
+        made.append(CommonMemoryNode(site))
+        made[0].declare_facts(rack_facts(site.rack))
+        if site.rack.config.operator:
+            made.append(OperatorNode(site))
+    for module in site.rack.modules:
+        node = NODES[SUPPORTED[module.config.model]]
+        if node is not None:
+            made.append(node(site, module))
+            made[-1].declare_facts(module_facts(module.config))
+    made += (DrivePlantNode(site, driven) for driven in site.rack.part.driven)
+    if not site.is_home:
+        made[0].diagnose(RackHealth(site, f"{made[0].get_name()}: process").statuses)
+    Tables(made[0])
+    return tuple(made)

@@ -1,0 +1,117 @@
+"""Parameters with which a rack starts: tunables get the values that the command line gives; what has no use is told.
+
+The order of what counts more (decision): a source's ``CURRENT=`` < the value kept from the last run < ``--params-file``
+and ``-p`` < ``--set`` of the command. They are set as a client would set them, before the rack runs, so that they are
+recorded with the states at the start, and kept. One that the task refuses keeps the rack from starting. A whole number
+is taken for a REAL (decision: ``KP: 1`` is meant, though ROS tells the types apart).
+
+Names of tasks are unique in a rack, so a tunable reaches its task from the node ``rack`` as well (decision: launch
+gives parameters to the node that it has named).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Protocol
+
+from automax_ros.core.text import did_you_mean, quoted
+from automax_ros.rackfile.model.config import RackConfig
+from automax_ros.ros.base.node import MAIN_NODE, SIM_TIME
+from automax_ros.ros.nodes.tunables import TunableParameters
+from automax_ros.ros.setup.arguments import RosArguments
+from automax_ros.ros.setup.parameter_files import GivenParameter, RosArgumentsError
+
+MOST_TOLD = 10
+"""Most parameters without use that are told one by one."""
+_ONE_TIME = "use_sim_time is for a whole rack: give it to all nodes, or to the node rack"
+_OWN_OF_ROS = (SIM_TIME, "start_type_description_service", "qos_overrides.")
+"""Parameters that rclpy declares, or may."""
+
+
+class Tuned(Protocol):
+    """A node whose parameters are tunables."""
+
+    own_name: str
+    """Its name in the rack, whatever it is called."""
+    tunables: TunableParameters
+
+
+def tune_at_start(arguments: RosArguments, namespace: str, nodes: Iterable[Tuned]) -> None:
+    """Give tunables what the command line says.
+
+    Raises:
+        RosArgumentsError: one of them is refused.
+    """
+    to_rack = arguments.given_to(MAIN_NODE, namespace, main=True)
+    for node in nodes:
+        given = {**to_rack, **arguments.given_to(node.own_name, namespace)}
+        for item in [given[name] for name in node.tunables.names if name in given]:
+            reason = node.tunables.begin_with(item.name, item.value)
+            if reason:
+                raise RosArgumentsError(f"{item.name}: {reason}", place=item.place)
+
+
+def without_use(arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]) -> list[str]:
+    """Return what to tell of parameters that reach nobody.
+
+    Args:
+        arguments: what gives them.
+        config: of the rack.
+        declared: the parameters of each node that is here, by its own name; other processes may have more nodes.
+    """
+    told: dict[tuple[str, str], str] = {}
+    for item in arguments.parameters:
+        if item.name == SIM_TIME and item.value is True and not _reaches_rack(item, arguments, config):
+            told[item.key, item.name] = f"{item.place}: {_ONE_TIME}"
+        if item.name.startswith(_OWN_OF_ROS):
+            continue
+        reached = _reached(item, arguments, config, declared)
+        if not reached:
+            told.setdefault((item.key, ""), _without_node(item, config, declared))
+        elif not reached - {MAIN_NODE} - set(declared):
+            told[item.key, item.name] = _without_name(item, reached, declared)
+    texts = [text for text in told.values() if text]
+    more = [f"{len(texts) - MOST_TOLD} more parameters reach nobody"] if texts[MOST_TOLD:] else []
+    return [*texts[:MOST_TOLD], *more]
+
+
+def _reaches_rack(item: GivenParameter, arguments: RosArguments, config: RackConfig) -> bool:
+    only = replace(arguments, parameters=(item,))
+    return bool(only.given_to(MAIN_NODE, config.namespace, main=True))
+
+
+def _names(config: RackConfig, declared: Mapping[str, Iterable[str]]) -> set[str]:
+    """Return the nodes of a rack, those in other processes included."""
+    return {MAIN_NODE, *declared, *(module.name for module in config.modules)}
+
+
+def _reached(
+    item: GivenParameter, arguments: RosArguments, config: RackConfig, declared: Mapping[str, Iterable[str]]
+) -> set[str]:
+    """Return the nodes that a parameter is for."""
+    only = replace(arguments, parameters=(item,))
+    return {name for name in _names(config, declared) if only.given_to(name, config.namespace, main=name == MAIN_NODE)}
+
+
+def _without_node(item: GivenParameter, config: RackConfig, declared: Mapping[str, Iterable[str]]) -> str:
+    """Return what to tell of a key that no node has; nothing where it may be for another program."""
+    space = f"/{config.namespace}/" if item.key.startswith("/") else ""
+    known = [f"{space}{name}" for name in sorted(_names(config, declared))]
+    hint = did_you_mean(item.key, known)
+    if item.is_for_all and hint is None:
+        return ""
+    return f"{item.place}: the rack has no node {quoted(item.key)}{f': {hint}' if hint else ''}"
+
+
+def _without_name(item: GivenParameter, reached: set[str], declared: Mapping[str, Iterable[str]]) -> str:
+    """Return what to tell of a name that its nodes do not declare; nothing where it may be for another program."""
+    having = [node for node, names in declared.items() if item.name in names]
+    if reached.intersection(having) or (having and MAIN_NODE in reached):
+        return ""
+    known = sorted({name for names in declared.values() for name in names})
+    hint = f"{having[0]} has it" if having else did_you_mean(item.name, known)
+    if item.is_for_all and hint is None:
+        return ""
+    nodes = ", ".join(sorted(reached)) if not item.is_for_all else "the rack"
+    return f"{item.place}: {nodes} has no parameter {quoted(item.name)}{f': {hint}' if hint else ''}"

@@ -1,0 +1,243 @@
+"""The tables of a live rack on topics: ``tasks`` and ``forces`` (latched, on change), ``statistics`` (each second).
+
+The process of common memory sends forces and the tasks of the whole rack, which it joins from the parts of the others
+(``joined_tasks``); each process sends the statistics of its own modules. A
+table is looked at once per second of rack time, and soon after each operation, ten times per second at most (decision).
+
+The tasks of other processes of a rack, in the table that the home sends.
+
+Each other process sends the table of its own modules on ``tasks/parts``, each second and when it changes; the home
+joins them by module. A module that has not been heard of for ``SILENT_NS`` is not in the table (decision): nobody knows
+how its tasks stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from automax_msgs.msg import Force, ForceTable, ScanStatistics, TaskInfo, TaskStatistics, TaskTable
+from builtin_interfaces.msg import Time
+
+from automax_ros.core.ticks import NS_PER_MS, NS_PER_S, NS_PER_US
+from automax_ros.core.values import source_text
+from automax_ros.messages.types.messages import NAMES
+from automax_ros.messages.types.messages import TaskInfo as RemoteTask
+from automax_ros.messages.types.messages import TaskTable as RemoteTable
+from automax_ros.messages.types.topics import LATCHED, QosProfile
+from automax_ros.rack.base.observers import Operation
+from automax_ros.rack.modules.module import Module
+from automax_ros.rack.operator.halting import is_halted
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.scheduled_task import ScheduledTask
+from automax_ros.rackfile.reading.executive import most_forces
+from automax_ros.ros.base.node import ModuleNode
+from automax_ros.ros.base.qos import ros_qos
+from automax_ros.ros.distributed.bus_topics import BusWay, Terms
+from automax_ros.runtime.health import FROM_STRANGERS
+from automax_ros.runtime.memory.views import WriteGroup
+from automax_ros.runtime.tasks.task import ScanRecord, Task
+from automax_ros.runtime.time.scheduler import EventClass, EventKey
+
+PARTS = "tasks/parts"
+"""The topic of the parts, in the rack's namespace."""
+PART = QosProfile("reliable", "transient_local", "keep_last", 32)
+"""The last parts of all processes wait for the home."""
+SILENT_NS = 3 * NS_PER_S
+MOST_BYTES = 1 << 20
+"""Longest part that is read."""
+
+
+class JoinedTasks:
+    """Hears the parts; ``changed`` is called when tasks have come. To be used where common memory is."""
+
+    def __init__(self, node: ModuleNode, changed: Callable[[], None]) -> None:
+        """Subscribe."""
+        self._site, self._changed = node.site, changed
+        rack = node.site.rack
+        self._tasks = {
+            (module.name, module.slot): {task.name for task in module.tasks}
+            for module in rack.config.modules
+            if module.slot not in rack.part.slots
+        }
+        self._heard: dict[str, tuple[int, list[RemoteTask]]] = {}
+        BusWay(node, PARTS, NAMES[RemoteTable], ros_qos(PART), self._take, self._refuse, Terms(MOST_BYTES))
+
+    def tasks(self, now_ns: int) -> Sequence[RemoteTask]:
+        """Return the tasks of all modules that were heard of lately."""
+        return [item for at_ns, items in self._heard.values() if now_ns - at_ns <= SILENT_NS for item in items]
+
+    def _take(self, table: RemoteTable, _: bytes) -> None:
+        if table.run_id != self._site.stream.run_id:
+            return  # the run before, whose part still waits: the bus tells of other racks
+        modules: dict[str, list[RemoteTask]] = {}
+        for item in table.tasks:
+            if item.task not in self._tasks.get((item.module, item.slot), ()):
+                self._refuse(PARTS, "a task that is not another process's")
+                return
+            modules.setdefault(item.module, []).append(item)
+        now_ns = self._site.rack.now_ns
+        self._heard |= {module: (now_ns, items) for module, items in modules.items()}
+        self._changed()
+
+    def _refuse(self, topic: str, what: str) -> None:
+        self._site.health.note("refused table", what[:40], lambda: f"{topic}: {what} was refused", most=FROM_STRANGERS)
+
+
+PERIOD_NS = NS_PER_S
+"""How often statistics go out and tables are looked at, rack time."""
+LOOK_NS = 100 * NS_PER_MS
+"""Least time between two looks after operations, rack time."""
+STATISTICS_DEPTH = 10
+DELETED = "deleted"
+"""The status of a task that was taken out of the rack."""
+_UNCOUNTED = frozenset({"scans", "skipped"})
+"""Fields whose change alone is not a reason to send a table of tasks."""
+
+
+class Tables:
+    """Sends the tables of what is in this process, by the publishers of one node."""
+
+    def __init__(self, node: ModuleNode) -> None:
+        """Create the publishers; the first tables go out with the rack's start."""
+        self._rack, self._stream, self._pace = node.site.rack, node.site.stream, node.site.pacer
+        part = self._rack.part
+        self._tasks = node.create_publisher(TaskTable, "tasks" if part.is_home else PARTS, ros_qos(LATCHED))
+        self._joined = JoinedTasks(node, self._soon) if part.is_home and not part.is_whole else None
+        self._statistics = node.create_publisher(ScanStatistics, "statistics", STATISTICS_DEPTH)
+        self._forces = (
+            node.create_publisher(ForceTable, "forces", ros_qos(LATCHED)) if self._rack.part.is_home else None
+        )
+        self._sent: dict[type, Any] = {}
+        self._reported_ns = self._next_look_ns = self._rack.now_ns
+        self._is_pending = False
+        self._key = EventKey(EventClass.OBSERVE, 0, "tables")
+        self._rack.scheduler.every(PERIOD_NS, self._rack.now_ns, self._key, lambda now, _: self._report(now))
+        self._rack.observe(self)
+
+    # RackObserver
+
+    def scanned(self, task: Task, record: ScanRecord, writes: list[WriteGroup]) -> None:
+        """What scans change is looked at each second."""
+
+    def written(self, writes: list[WriteGroup]) -> None:
+        """A force that a program sets is looked at within the second."""
+
+    def tuned(self, task: Task, now_ns: int) -> None:
+        """A tunable stands in no table."""
+
+    def operated(self, operation: Operation) -> None:  # noqa: ARG002
+        """Look at the tables after what happens at this instant."""
+        self._soon()
+
+    def _soon(self) -> None:
+        if is_halted(self._pace):
+            self.look(self._rack.now_ns)
+        elif not self._is_pending:
+            self._is_pending = True
+            self._rack.scheduler.at(max(self._rack.now_ns, self._next_look_ns), self._key, self._look_at)
+
+    def _look_at(self, now_ns: int) -> None:
+        self._is_pending, self._next_look_ns = False, now_ns + LOOK_NS
+        self.look(now_ns)
+
+    def look(self, now_ns: int) -> None:
+        """Send the tables that have changed."""
+        tasks = [(module, item) for module in self._rack.task_modules for item in module.tasks]
+        infos: list[Mapping[str, Any]] = [task_fields(self._rack, module, item) for module, item in tasks]
+        if self._joined is not None:
+            infos += [item._asdict() for item in self._joined.tasks(now_ns)]
+            infos.sort(key=lambda info: info["slot"])
+        counted = [{key: value for key, value in info.items() if key not in _UNCOUNTED} for info in infos]
+        if self._is_new(TaskTable, counted):
+            self._tasks.publish(TaskTable(**self._head(now_ns), tasks=[TaskInfo(**info) for info in infos]))
+        if self._forces is None:
+            return
+        forces = [(item.name, source_text(item.value), _text(item.under)) for item in self._rack.forces()]
+        if self._is_new(ForceTable, forces):
+            lines = [Force(name=name, value=value, under=under) for name, value, under in forces]
+            most = most_forces(self._rack.config.executive)
+            self._forces.publish(ForceTable(**self._head(now_ns), most=most, forces=lines))
+
+    def _report(self, now_ns: int) -> None:
+        if not self._rack.part.is_home:
+            self._sent.clear()  # so the home knows that this process lives
+        self.look(now_ns)
+        passed_ns, self._reported_ns = now_ns - self._reported_ns, now_ns
+        tasks = [statistics_of(module, item, passed_ns) for module in self._rack.task_modules for item in module.tasks]
+        if passed_ns:
+            self._statistics.publish(ScanStatistics(**self._head(now_ns), window_s=passed_ns / NS_PER_S, tasks=tasks))
+
+    def _is_new(self, kind: type, content: Any) -> bool:
+        if self._sent.get(kind) == content:
+            return False
+        self._sent[kind] = content
+        return True
+
+    def _head(self, now_ns: int) -> dict[str, Any]:
+        stamp = self._stream.stamp(now_ns)
+        return {
+            "stamp": Time(sec=stamp // NS_PER_S, nanosec=stamp % NS_PER_S),
+            "rack": self._rack.config.name,
+            "run_id": self._stream.run_id,
+        }
+
+
+def status_of_task(rack: Rack, task: Task) -> str:
+    """Return how a task stands, in a word."""
+    return DELETED if task.name in rack.operations.deleted else task.status.value
+
+
+def task_fields(rack: Rack, module: Module, item: ScheduledTask) -> Mapping[str, Any]:
+    """Return how a task of a module stands, as the fields of TaskInfo."""
+    task, last = item.task, item.task.errors.last
+    config = next(config for config in module.config.tasks if config.name == task.name)
+    return {
+        "task": task.name,
+        "module": module.config.name,
+        "slot": module.config.slot,
+        "status": status_of_task(rack, task),
+        "priority": task.priority,
+        "critical": config.critical,
+        "period_ms": _period_ms(task),
+        "scans": item.statistics.scans,
+        "skipped": item.statistics.skipped,
+        "errors": task.errors.count,
+        "last_error": "" if last is None else last.describe(),
+        "source_hash": task.compiled.program.source_hash,
+    }
+
+
+def statistics_of(module: Module, item: ScheduledTask, passed_ns: int) -> TaskStatistics:
+    """Return the statistics of a task; the window that has lasted ``passed_ns`` ends, and the next one begins."""
+    every, window = item.statistics, item.statistics.take_window()
+    return TaskStatistics(
+        task=item.name,
+        module=module.config.name,
+        slot=module.config.slot,
+        period_ms=_period_ms(item.task),
+        scans=window.scans,
+        skipped=window.skipped,
+        execution_last_us=every.last_ns / NS_PER_US,
+        execution_mean_us=window.mean_ns / NS_PER_US,
+        execution_min_us=window.least_ns / NS_PER_US,
+        execution_max_us=window.longest_ns / NS_PER_US,
+        lateness_mean_us=window.mean_late_ns / NS_PER_US,
+        lateness_max_us=window.latest_ns / NS_PER_US,
+        load_percent=100.0 * window.total_ns / passed_ns if passed_ns else 0.0,
+        scans_total=every.scans,
+        skipped_total=every.skipped,
+        execution_mean_total_us=every.mean_ns / NS_PER_US,
+        execution_min_total_us=every.least_ns / NS_PER_US,
+        execution_max_total_us=every.longest_ns / NS_PER_US,
+        lateness_mean_total_us=every.mean_late_ns / NS_PER_US,
+        lateness_max_total_us=every.latest_ns / NS_PER_US,
+    )
+
+
+def _period_ms(task: Task) -> float:
+    return 0.0 if task.compiled.program.event is not None else task.period_ns / NS_PER_MS
+
+
+def _text(value: Any) -> str:
+    return "" if value is None else source_text(value)

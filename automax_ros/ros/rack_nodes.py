@@ -1,0 +1,459 @@
+"""A rack as ROS 2 nodes in any program: in its context, in its executor.
+
+rclpy.init()
+executor = SingleThreadedExecutor()
+nodes = RackNodes("rack.yaml")
+nodes.add_to(executor)
+nodes.start()
+executor.spin()        # serves your nodes and the rack's; a thread of the rack's own keeps its pace
+nodes.close()
+
+One process that is a rack: its nodes in a context and an executor of their own, on the wall clock.
+
+Three threads. The calling one scans, on absolute deadlines (``Pacer``): no ROS timer is in the way (they skip ticks on
+a busy host). A second one takes messages and requests in (``Door``), between two scans. A third one spins the executor,
+which is left with the graph's events. Measured (bench/ros.py): the loop's lateness is the host's own in either form; a
+loop of ``time.sleep`` without ROS oversleeps by 1 to 4 ms as often (the host of a virtual machine takes its processor
+away, with a period of about 0.51 s among others). What a thread of their own gives the scans is that a long message, a
+long conversion or a queue of events does not stand before them.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.utilities import get_default_context
+
+from automax_ros.core.types import Value
+from automax_ros.messages.stream.stream import RackStream
+from automax_ros.rack.rack import Rack
+from automax_ros.rack.tasks.installation import RackError
+from automax_ros.rackfile.loader import load
+from automax_ros.ros.base.clock import RackClock
+from automax_ros.ros.base.lifecycle import ACTIVE, INACTIVE, Pending, TransitionRefused
+from automax_ros.ros.base.module_lifecycle import DEACTIVATED, ManagedModuleNode
+from automax_ros.ros.base.node import SIM_TIME, Site, follows_clock
+from automax_ros.ros.distributed.bus import RackBus, Seating
+from automax_ros.ros.distributed.presence import Herald
+from automax_ros.ros.intake.guard import MOST_TOLD
+from automax_ros.ros.intake.intake import Door
+from automax_ros.ros.intake.rack_lock import Turns
+from automax_ros.ros.nodes.operator import OperatorNode
+from automax_ros.ros.nodes.processor import ProcessorNode
+from automax_ros.ros.nodes.rack import Follower, HeldRack, RackNode
+from automax_ros.ros.nodes.registry import nodes_of, run_facts
+from automax_ros.ros.nodes.start_parameters import tune_at_start, without_use
+from automax_ros.ros.operator_sharing import share_operator
+from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments, split_arguments
+from automax_ros.ros.setup.environment import RosUnavailable
+from automax_ros.ros.setup.parameter_files import RosArgumentsError
+from automax_ros.ros.setup.process import RosProcess, take_out
+from automax_ros.runtime.health import Health
+from automax_ros.runtime.time.pacer import START_LEAD_NS
+from automax_ros.runtime.time.simulated_pacer import SimulatedTime
+
+LOOK_S = 0.02
+"""How often it is looked whether the other processes are there."""
+
+_Beginning = tuple[Sequence[tuple[str, Value]], "Callable[[], None] | None"]
+"""The arguments of ``Rack.start``."""
+_TOGETHER = "a distributed rack keeps the wall clock, by which its processes agree"
+
+
+class RackNodes:
+    """The nodes of one rack, and the rack in them.
+
+    ``add_to`` an executor and ``start``, then let it spin; ``start`` with ``paced=False`` and ``run`` scans on the
+    calling thread. Messages and requests come in on a thread of their own (``Door``), whatever the executor does.
+    ``close`` in any case (a ``with`` block does). Whoever touches ``rack`` meanwhile holds ``lock``: scans and messages
+    from outside do, so nothing ever falls into a scan.
+
+    Attributes:
+        rack: the rack.
+        stream: its messages, for a recorder.
+        health: what went wrong so far.
+        nodes: the node of each module.
+        manager: the node ``rack``; None where common memory is in another process.
+        notes: what the person should know of the command line.
+    """
+
+    def __init__(
+        self,
+        rack: Rack | Path | str,
+        *,
+        context: Context | None = None,
+        arguments: RosArguments | None = None,
+        manager: RackNode | None = None,
+        seating: Seating | None = None,
+        simulated: SimulatedTime | None = None,
+    ) -> None:
+        """Create the nodes; nothing runs yet.
+
+        Args:
+            rack: a rack that was not started, or the path of its YAML file.
+            context: the context of all nodes, initialised; rclpy's default one if None.
+            arguments: what the nodes are told by the command line; this process's own one if None, as rclpy does. The
+                namespace is that of a rack that is given by its file; a rack that is given has its own.
+            manager: the node ``rack`` where the caller has one, who then sees to its state; else one is made here.
+            seating: the processes of a distributed rack; ``rack`` is the part of this one.
+            simulated: the rack's own time in place of the wall clock, which it then tells on ``/clock``.
+
+        Raises:
+            RackError: the YAML file or a task has errors, which ``findings`` holds.
+            RosArgumentsError: the command line is not one, gives a tunable a value that its task refuses, or lets a
+                distributed rack follow ``/clock``.
+        """
+        if arguments is None:
+            arguments = split_arguments(sys.argv)[1]
+        if simulated is not None:  # whoever sends /clock does not follow it
+            arguments = arguments.without(SIM_TIME)
+        self.rack = rack if isinstance(rack, Rack) else _loaded(Path(rack), arguments)
+        run_id = int.from_bytes(os.urandom(8), "big") >> 1
+        self.stream = RackStream(self.rack, run_id)
+        self.health = Health() if manager is None else manager.health
+        self._executor: Any = None
+        self._context = get_default_context() if context is None else context
+        turns = Turns()
+        follows = follows_clock(arguments, self.rack.config.namespace)
+        if follows and seating is not None:
+            raise RosArgumentsError(_TOGETHER, "leave out use_sim_time, or run the rack in one process")
+        self._clock = RackClock(self.rack.scheduler, turns, follows=follows, simulated=simulated)
+        self._pacer = self._clock.pace
+        self._door = Door(self._report)
+        self._site = Site(
+            self.rack, self.stream, self._pacer, self._context, self.health, self._door, arguments, lock=turns
+        )
+        self._begun = self._closed = False
+        self._thread: threading.Thread | None = None
+        self.nodes = nodes_of(self._site)
+        self._own: tuple[RackNode, ...] = ()
+        if manager is None and self.rack.part.is_home:
+            manager = RackNode(
+                self.rack.config.namespace, self._context, self.health, HeldRack(self), self._enter, arguments
+            )
+            manager.served_by(self._door)
+            manager.follow(INACTIVE)
+            self._own = (manager,)
+        self.manager = manager
+        self._clock.join(self._site, self.nodes[0])
+        self._to_begin: _Beginning | None = None
+        if manager is not None:
+            self.rack.observers.add(Follower(manager))
+        self.bus = None if seating is None else RackBus(self._site, self.nodes[0], seating)
+        if seating is None:
+            Herald(self._site, self.nodes[0])
+        self._desk = None if self.bus is None else share_operator(self.nodes, self.bus)
+        self.notes = self._begin_with(arguments)
+
+    def _begin_with(self, arguments: RosArguments) -> list[str]:
+        """Give tunables what the command line says, and return what of it reaches nobody."""
+        try:
+            tuned = [node for node in self.nodes if isinstance(node, ProcessorNode)]
+            tune_at_start(arguments, self.rack.config.namespace, tuned)
+        except RosArgumentsError:
+            self.close()
+            raise
+        managing = () if self.manager is None else (self.manager,)
+        declared = {node.own_name: node.list_parameters([], 0).names for node in (*self.nodes, *managing)}
+        notes = without_use(arguments, self.rack.config, declared)
+        for text in notes:
+            self.nodes[0].get_logger().warning(text)
+        return notes
+
+    @property
+    def lock(self) -> AbstractContextManager[None]:
+        """What holds off scans and messages: ``with nodes.lock``. The rack's time is the present then."""
+        return self._site.present()
+
+    def add_to(self, executor: Any) -> None:
+        """Let an executor of rclpy serve the nodes: any kind, alone or with nodes of your own."""
+        self._executor = executor
+        for node in (*self.nodes, *self._own):
+            executor.add_node(node)
+        self._door.open()
+
+    def start(
+        self,
+        settings: Sequence[tuple[str, Value]] = (),
+        first: Callable[[], None] | None = None,
+        *,
+        paced: bool = True,
+    ) -> None:
+        """Send what stands at the start and put the rack into RUN; rack time 0 comes in a moment.
+
+        A rack that follows ``/clock`` begins with its first message: ``run``, or the thread, waits for it.
+
+        Args:
+            settings: those of ``Rack.start``, which raises what it says.
+            first: what it calls before tasks run; nobody does in a rack that others run already.
+            paced: whether a thread scans from then on; without one, ``run`` does.
+        """
+        self._door.open()
+        self._to_begin = (settings, first)
+        if self._clock.is_there:
+            self._begin()
+        if paced:
+            self._thread = threading.Thread(target=self._keep_pace, name=self.rack.config.namespace, daemon=True)
+            self._thread.start()
+
+    def _begin(self) -> None:
+        beginning, self._to_begin = self._to_begin, None
+        if beginning is None:
+            return
+        with self._site.lock:
+            if self.bus is None:
+                self.stream.begin(self._pacer.begin(START_LEAD_NS))
+                self._begun = True
+                self.rack.start(*beginning)
+            else:
+                self._start_together(self.bus, beginning)
+            if self.rack.part.is_home:
+                self.nodes[0].declare_facts(run_facts(self.stream.run_id))
+            for node in (*self._own, *self._managed()):
+                node.follow(ACTIVE)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether ``start`` was called."""
+        return self._begun
+
+    def activate(self) -> Pending | None:
+        """Put all tasks that rest into RUN, those in other processes too, whose answers are waited for.
+
+        Raises:
+            OperationRefused: the rack refuses it (``Operations.run_all``).
+        """
+        operator = next((node for node in self.nodes if isinstance(node, OperatorNode)), None)
+        if self.bus is not None and operator is not None:
+            desk = operator.desk
+            return Pending(lambda done: desk.run_everywhere(lambda why: done(TransitionRefused(why) if why else None)))
+        with self._site.present():
+            self.rack.operations.run_all()
+        return None
+
+    def deactivate(self) -> None:
+        """STOP ALL, in all processes; the modules' nodes are inactive then too.
+
+        Raises:
+            OperationRefused: the power is off.
+        """
+        with self._site.present():
+            self.rack.operations.stop_all(DEACTIVATED)
+
+    def await_others(self, should_stop: Callable[[], bool]) -> bool:
+        """Wait until the other processes of a distributed rack are there; FALSE where asked to stop.
+
+        Raises:
+            SeatTaken: another process of this run has the same modules.
+        """
+        bus = self.bus
+        while bus is not None and not bus.epoch_ns:
+            if bus.fault is not None:
+                raise bus.fault
+            if should_stop():
+                return False
+            time.sleep(LOOK_S)
+        return True
+
+    def _start_together(self, bus: RackBus, beginning: _Beginning) -> None:
+        """Start at the instant that all processes know, or join those that run already."""
+        self._pacer.begin(bus.epoch_ns - time.time_ns())
+        self.stream.in_run(bus.run_id)
+        self.stream.begin(bus.epoch_ns)
+        self._begun = True
+        bus.link.begin()
+        if bus.joining:
+            self.rack.join(max(0, self._pacer.now_ns), bus.catch_up)
+        else:
+            self.rack.start(*beginning)
+        bus.begin()
+
+    def run(
+        self,
+        until_ns: int | None = None,
+        on_idle: Callable[[int], None] | None = None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Scan on this thread until rack time ``until_ns``, or asked to stop (``Pace.run``)."""
+        if not self._clock.wait(should_stop, on_idle):
+            return
+        self._begin()
+        self._pacer.run(until_ns, on_idle, should_stop)
+
+    def close(self, *, spun: bool = True) -> None:
+        """Stop the tasks, send what is still to be sent, and leave the graph; a second time this does nothing.
+
+        Args:
+            spun: whether a thread may be spinning the executor meanwhile, which then lets go of the nodes first.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        if self._thread is not None:
+            self._thread.join()
+        self._door.stop()
+        with self._site.lock:
+            if self.bus is not None:
+                self.bus.leave()
+            self.rack.operations.stop_tasks()
+            if self._begun:
+                self._send_last()
+        if self._desk is not None:
+            self._desk.close()
+        nodes = (*self.nodes, *self._own)
+        if self._executor is not None:
+            take_out(self._executor, nodes, spun=spun)
+        for node in nodes:
+            node.destroy_node()
+        self._door.close()
+
+    def _send_last(self) -> None:
+        try:
+            self.stream.end()
+        except Exception:
+            if self._context.ok():  # else ROS was shut down, as rclpy's own handlers of signals do
+                raise
+
+    def __enter__(self) -> RackNodes:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close."""
+        self.close()
+
+    def _managed(self) -> list[ManagedModuleNode]:
+        return [node for node in self.nodes if isinstance(node, ManagedModuleNode)]
+
+    def _enter(self, action: Callable[[], None]) -> None:
+        with self._site.present():
+            action()
+
+    def _keep_pace(self) -> None:
+        try:
+            self._clock.wait(lambda: self._closed)
+            self._begin()
+            while not self._closed:
+                with self._site.lock.scanner:
+                    wait_s = self._pacer.step()
+                time.sleep(wait_s)
+        except Exception as error:
+            if self._context.ok():  # else ROS was shut down, and nobody is left to be told
+                self._report(f"rack {self.rack.config.name} has ended", error)
+
+    def _report(self, what: str, error: Exception) -> None:
+        self.nodes[0].guard.report(what, error)
+
+
+def _loaded(path: Path, arguments: RosArguments) -> Rack:
+    result = load(path)
+    if result.config is None:
+        raise RackError(f"{path} has errors", [(result.source, result.diagnostics)])
+    config = replace(result.config, namespace=arguments.placed(result.config.namespace))
+    return Rack(config, stopwatch=time.monotonic_ns)
+
+
+RCLError: type[Exception] = rclpy_implementation.RCLError
+
+
+class LiveRack:
+    """A rack with its nodes in this process.
+
+    Make it, ``start`` it, then ``run``; ``close`` in any case. ``on_idle`` or a callback sets ``stopping``.
+    """
+
+    def __init__(
+        self,
+        rack: Rack,
+        arguments: RosArguments = NO_ARGUMENTS,
+        seating: Seating | None = None,
+        *,
+        process: RosProcess | None = None,
+        manager: RackNode | None = None,
+        simulated: SimulatedTime | None = None,
+    ) -> None:
+        """Create all nodes.
+
+        Args:
+            rack: a rack that was not started.
+            arguments: what the nodes are told.
+            seating: the processes of a distributed rack, as ``RackNodes`` takes it.
+            process: the caller's part in the graph, who closes it; without one it is this rack's own.
+            manager: the caller's node ``rack``, as ``RackNodes`` takes it.
+            simulated: the rack's own time, as ``RackNodes`` takes it.
+
+        Raises:
+            RosUnavailable: ROS cannot be initialised, or refuses a node, a topic or a service.
+        """
+        self.rack = rack
+        self.stopping = False
+        self._process = RosProcess(arguments) if process is None else process
+        self._owns_process = process is None
+        self._executor, context = self._process.executor, self._process.context
+        try:
+            with self._process.resting():
+                self.nodes = RackNodes(
+                    rack, context=context, arguments=arguments, manager=manager, seating=seating, simulated=simulated
+                )
+                self.nodes.add_to(self._executor)
+        except RCLError as error:
+            self._leave()
+            text = str(error).split(", at /", 1)[0][:MOST_TOLD]
+            hint = "do not give two of its topics or services one name (-r FROM:=TO)" if arguments.given else None
+            raise RosUnavailable(f"the rack's nodes cannot be made: {text}", hint) from error
+        except Exception:
+            self._leave()
+            raise
+        self.notes = self.nodes.notes
+        if process is None:
+            self._process.spin(self.nodes.nodes[0].guard)
+        self.stream, self.health, self.bus = self.nodes.stream, self.nodes.health, self.nodes.bus
+
+    @property
+    def missing(self) -> list[str]:
+        """The other processes of a distributed rack that are not there."""
+        return self.bus.missing if self.bus is not None else []
+
+    @property
+    def is_joining(self) -> bool:
+        """Whether the rack ran already in other processes when this one began."""
+        return self.bus is not None and self.bus.joining
+
+    def await_others(self, should_stop: Callable[[], bool]) -> bool:
+        """Wait for the other processes of a distributed rack; FALSE where asked to stop meanwhile.
+
+        Raises:
+            SeatTaken: another process of this run has the same modules.
+        """
+        return self.nodes.await_others(should_stop)
+
+    def start(self, settings: list[tuple[str, Value]], first: Callable[[], None] | None = None) -> None:
+        """Begin the stream and put the rack into RUN (``Rack.start``); rack time starts in a moment."""
+        self.nodes.start(settings, first, paced=False)
+
+    def run(self, duration_ns: int | None, on_idle: Callable[[int], None]) -> None:
+        """Let the rack live until ``stopping`` is set or the duration has passed; ``on_idle`` gets the rack time."""
+        self.nodes.run(duration_ns, on_idle, lambda: self.stopping)
+
+    def close(self) -> None:
+        """Stop the tasks, send what is still to be sent, destroy the nodes, and end ROS unless the caller does."""
+        with self._process.resting():
+            self.nodes.close(spun=False)
+        self._leave()
+
+    def _leave(self) -> None:
+        if self._owns_process:
+            self._process.close()

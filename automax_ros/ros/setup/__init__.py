@@ -1,0 +1,1 @@
+"""ROS 2 in this process: environment, discovery, arguments, context and executor."""

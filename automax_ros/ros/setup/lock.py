@@ -1,0 +1,132 @@
+"""One rack of a name, or one process of each of its seats, in one ROS domain on one host: locks that die with it."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import quoted
+from automax_ros.ros.setup.environment import RosUnavailable
+
+MAX_DOMAIN = 232
+"""Beyond it the ports of DDS end."""
+
+
+class LockError(Fault):
+    """The lock cannot be taken."""
+
+
+class RackAlreadyRuns(LockError):
+    """Another process of this host runs the rack, or this seat of it, in the same ROS domain."""
+
+
+def domain_id() -> int:
+    """Return the ROS domain of this process.
+
+    Raises:
+        RosUnavailable: ROS_DOMAIN_ID is not one that ROS accepts.
+    """
+    text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not (text.isascii() and text.isdigit() and len(text) <= 3 and int(text) <= MAX_DOMAIN):
+        raise RosUnavailable(f"ROS_DOMAIN_ID={quoted(text)} is not a number from 0 to {MAX_DOMAIN}")
+    return int(text)
+
+
+class RackLock:
+    """Holds the lock while the ``with`` block lasts; the kernel frees it when the process ends, however it ends.
+
+    A process with the whole rack holds the rack alone. One with a ``seat`` of a rack that is distributed shares the
+    rack with those of other seats, and holds its seat alone.
+    """
+
+    def __init__(self, namespace: str, domain: int, seat: str | None = None) -> None:
+        """Name the lock; nothing is taken yet."""
+        self._rack, self._seat = f"rack /{namespace} in ROS domain {domain}", seat
+        name = f"automax_ros_{os.getuid()}_{domain}_{namespace.replace('/', '.')}"
+        self._path = Path(tempfile.gettempdir()) / f"{name}.lock"
+        self._files: list[tuple[int, Path]] = []
+
+    def __enter__(self) -> RackLock:
+        """Take the lock.
+
+        Raises:
+            RackAlreadyRuns: another process holds it.
+            LockError: its file cannot be opened.
+        """
+        try:
+            if self._seat is None:
+                self._take(self._path, self._rack, fcntl.LOCK_EX)
+            else:
+                self._take(self._path, self._rack, fcntl.LOCK_SH)
+                self._take(
+                    self._path.with_suffix(f".{self._seat}.lock"), f"{self._seat} of {self._rack}", fcntl.LOCK_EX
+                )
+        except LockError:
+            self._free()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Free the lock, and take its files away."""
+        self._free()
+
+    def _take(self, path: Path, what: str, how: int) -> None:
+        file = self._locked(path, what, how)
+        self._files.append((file, path))
+        os.ftruncate(file, 0)
+        if how == fcntl.LOCK_EX:
+            os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+
+    @staticmethod
+    def _locked(path: Path, what: str, how: int) -> int:
+        """Return the lock file, open and locked: the one that stands at the path, not one that was taken away."""
+        while True:
+            try:
+                file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+            except OSError as error:
+                raise LockError(f"{what}: cannot open the lock file {path}: {error.strerror}") from error
+            try:
+                fcntl.flock(file, how | fcntl.LOCK_NB)
+                if _stands_at(file, path):
+                    return file
+            except BlockingIOError:
+                raise _taken(file, what) from None
+            except BaseException:
+                os.close(file)
+                raise
+            os.close(file)
+
+    def _free(self) -> None:
+        """Take away the files that nobody else holds, while they are locked, and close all."""
+        for file, path in self._files:
+            with suppress(OSError):  # others share it, or it is not ours to take away
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if _stands_at(file, path):
+                    path.unlink()
+            os.close(file)
+        self._files.clear()
+
+
+def _stands_at(file: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path, follow_symlinks=False))
+    except FileNotFoundError:
+        return False
+
+
+def _taken(file: int, what: str) -> RackAlreadyRuns:
+    """Return the error of a lock file that another process holds; the file is closed."""
+    try:
+        holder = os.pread(file, 32, 0).decode("ascii", "replace").strip()
+    finally:
+        os.close(file)
+    # Those who share a file leave it empty.
+    by = f" (process {holder})" if holder.isdigit() else " (distributed over several processes)"
+    return RackAlreadyRuns(f"{what} runs already{by}: stop it first, or set another ROS_DOMAIN_ID")

@@ -1,0 +1,199 @@
+"""This program in the ROS graph: its context, and the executor that serves all its nodes on a thread of its own.
+
+A program's own part in the ROS graph.
+
+The executor that serves all nodes of one process.
+
+EventsExecutor receives a message in a tenth of the time that SingleThreadedExecutor takes, but in some installations it
+dispatches nothing. So it is tried once at the start, and replaced where it fails the trial.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from automax_ros.ros.intake.guard import Guard
+from automax_ros.ros.setup.arguments import NO_ARGUMENTS, RosArguments
+from automax_ros.ros.setup.environment import RosUnavailable
+
+_SECURITY = "ROS_SECURITY_ENABLE"
+_MOST_TOLD = 400
+
+
+def joined_context(arguments: RosArguments = NO_ARGUMENTS) -> Context:
+    """Return a context that has joined the graph; whoever asks shuts it down.
+
+    Raises:
+        RosUnavailable: ROS cannot be initialised.
+    """
+    context = Context()
+    try:
+        context.init(args=arguments.words)
+        if os.environ.get(_SECURITY, "").lower() == "true":
+            _try_security(context)
+    except RuntimeError as error:
+        context.try_shutdown()
+        raise RosUnavailable(f"ROS 2 does not start: {str(error).strip()[:_MOST_TOLD]}") from error
+    return context
+
+
+def _try_security(context: Context) -> None:
+    """Make a node, which is when DDS reads keys, and refuses to where it was built without security.
+
+    Raises:
+        RuntimeError: it refuses.
+    """
+    Node("security_check", context=context, enable_rosout=False, start_parameter_services=False).destroy_node()
+
+
+_TRIAL_PERIOD_S = 0.001
+_TRIAL_LIMIT_S = 0.2
+_ANSWER_S = 0.5
+"""An executor that has not begun a task after this time is not spun, or by the thread that asks."""
+_PASS_S = 10.0
+"""Longest wait for one that is spun: it may be at a long callback."""
+
+
+def make_executor(context: Context) -> Any:
+    """Return an executor that dispatches when ``spin_once(timeout_sec=...)`` is called.
+
+    Returns Any: the two executors have no common class in rclpy.
+    """
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:
+        return SingleThreadedExecutor(context=context)
+    executor = EventsExecutor(context=context)
+    if dispatches(executor, context):
+        return executor
+    executor.shutdown()
+    return SingleThreadedExecutor(context=context)
+
+
+def dispatches(executor: Any, context: Context) -> bool:
+    """Return whether an executor carries out the callback of a timer that is due."""
+    # A service of rclpy's own would outlive its node in the graph.
+    quiet = [Parameter("start_type_description_service", value=False)]
+    node = Node(
+        "executor_trial",
+        context=context,
+        enable_rosout=False,
+        start_parameter_services=False,
+        parameter_overrides=quiet,
+    )
+    hits: list[bool] = []
+    timer = node.create_timer(_TRIAL_PERIOD_S, lambda: hits.append(True))
+    try:
+        executor.add_node(node)
+        for _ in range(3):
+            executor.spin_once(timeout_sec=_TRIAL_LIMIT_S)
+            if hits:
+                return True
+        return False
+    except RuntimeError:
+        return False
+    finally:
+        timer.cancel()
+        executor.remove_node(node)
+        node.destroy_node()
+
+
+def take_out(executor: Any, nodes: Iterable[Node], *, spun: bool = True) -> None:
+    """Take nodes out of an executor, and wait until a thread that spins it has let go of them: they may be destroyed.
+
+    Nothing is waited for where nobody spins it, which takes half a second to see unless ``spun`` says so.
+
+    rclpy's executors go on with the nodes that they have found at the beginning of a pass, and what is destroyed
+    meanwhile ends their thread by ``InvalidHandle``. A task is begun in a pass that found the nodes before or after
+    they were taken out; a second one, made when the first is done, in a later pass.
+    """
+    for node in nodes:
+        executor.remove_node(node)
+    if not spun:
+        return
+    with suppress(AttributeError, InvalidHandle):  # of an executor that was shut down
+        for limit_s in (_ANSWER_S, _PASS_S):
+            begun = threading.Event()
+            executor.create_task(begun.set)
+            if not begun.wait(limit_s):
+                return
+
+
+_SPIN_S = 0.1
+"""Longest wait of the executor for an event."""
+
+
+class RosProcess:
+    """A context and an executor of this program's own; ``close`` in any case."""
+
+    def __init__(self, arguments: RosArguments = NO_ARGUMENTS) -> None:
+        """Initialise ROS for this process; nothing is served before ``spin``.
+
+        Raises:
+            RosUnavailable: ROS cannot be initialised.
+        """
+        self.context = joined_context(arguments)
+        self.executor = make_executor(self.context)
+        self._guard: Guard | None = None
+        self._thread: threading.Thread | None = None
+        self._rests = False
+
+    def spin(self, guard: Guard) -> None:
+        """Begin to serve the nodes; ``guard`` is told what fails."""
+        self._guard, self._rests = guard, False
+        self._thread = threading.Thread(target=self._spin, name="executor", daemon=True)
+        self._thread.start()
+
+    @contextmanager
+    def resting(self) -> Iterator[None]:
+        """Serve nothing while the block lasts: nodes come and go only then.
+
+        Where nodes have gone another executor serves those that stay: EventsExecutor crashes where it is spun with
+        events of publishers that have left it, for it lets go of the last one without the interpreter's lock
+        (https://github.com/ros2/rclpy/issues/1644). They come when other processes leave the graph just then.
+        """
+        spun = self._thread is not None
+        self._rest()
+        before = set(self.executor.get_nodes())
+        try:
+            yield
+        finally:
+            staying = set(self.executor.get_nodes())
+            if before - staying:
+                self._renew_executor(staying)
+            if spun and self._guard is not None:
+                self.spin(self._guard)
+
+    def close(self) -> None:
+        """Leave the graph, once all nodes have."""
+        self._rest()
+        self.executor.shutdown()
+        self.context.try_shutdown()
+
+    def _renew_executor(self, nodes: Iterable[Node]) -> None:
+        self.executor.shutdown()
+        self.executor = type(self.executor)(context=self.context)
+        for node in nodes:
+            self.executor.add_node(node)
+
+    def _rest(self) -> None:
+        self._rests = True
+        if self._thread is not None:
+            self._thread.join()
+        self._thread = None
+
+    def _spin(self) -> None:
+        assert self._guard is not None
+        with suppress(Exception):  # what an executor raises once the context is shut down
+            while not self._rests and self.context.ok():
+                self._guard.serve(self.executor, self.context, _SPIN_S)

@@ -1,0 +1,1 @@
+"""What executes tasks: common memory, time, scans."""

@@ -1,0 +1,1 @@
+"""Common memory: views, registers, images, the ordered write log."""

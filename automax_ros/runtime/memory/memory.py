@@ -1,0 +1,287 @@
+"""Common memory as it lives in a rack: the four memory operations, forcing, and the ordered write log.
+
+- ``latch``: copies of simple views at the start of a scan;
+- ``commit``: what a scan's blocks changed, at END;
+- ``read_now`` and ``write_now``: actual memory, for BASIC statements, arrays, REALs and strings.
+
+A force sits on the view: latch and read_now return it, writes are dropped. Every write that takes effect is an entry of
+the write log, if anybody has asked for the log.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Container, Iterable, Sequence
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.machine_code import mypyc_attr
+from automax_ros.core.types import Value
+from automax_ros.runtime.memory.image import Image
+from automax_ros.runtime.memory.views import CellCommit, MemoryValueError, ViewSpec, Write, WriteGroup, fitting
+
+FORCING = "FORCINGSTATUS@"
+"""The pre-defined common that is TRUE while anything is forced (2.4.6)."""
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class CommonMemory(Image):
+    """The common variables and module registers of one rack.
+
+    ``now_ns`` is the time that entries of the write log carry; whoever runs tasks or applies writes sets it.
+    """
+
+    def __init__(self, views: Sequence[ViewSpec]) -> None:
+        """Make the memory as it is at installation: everything 0, nothing forced."""
+        super().__init__(views)
+        self._sequence = 0
+        self._forced: set[tuple[int, int]] = set()
+        self._under: dict[tuple[int, int], Value] = {}
+        self._locals_forced = False
+        self._force_watchers: list[Callable[[], None]] = []
+        self._log: list[WriteGroup] | None = None
+        self._causes: list[Write] | None = None
+        self._plain = [not spec.is_array and view not in self._shared for view, spec in enumerate(self.specs)]
+        """Whether a write of a view writes its cell and nothing else."""
+        self._watched: dict[tuple[int, int], list[Callable[[], None]]] = {}
+        self._gate = array("q", (1, 0))
+        self.accesses: dict[int, Callable[[], None]] = {}
+        """Who is told of each access that a scan in modeled time makes to a view: see ``watch_accesses``."""
+
+    @property
+    def sequence(self) -> int:
+        """How many writes have taken effect: the number of the last one in the write log."""
+        return self._sequence + self._gate[1]
+
+    def committing(self) -> CellCommit | None:
+        """Return where native scans may store what blocks changed, as ``commit`` would; None: ``commit`` is overridden.
+
+        They may while nothing is forced and nobody has asked for the log, which needs to know of each value.
+        """
+        overridden = type(self).commit is not CommonMemory.commit
+        return None if overridden else CellCommit(self._cells, self._plain, self._gate)
+
+    def _set_gate(self) -> None:
+        """Let native scans store values themselves from now on, or not, and count those that they have stored."""
+        gate = self._gate
+        self._sequence += gate[1]
+        gate[0], gate[1] = not self._forced and self._log is None and self._causes is None, 0
+
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
+        """Write what a scan's blocks changed: pairs of view and value, already within the view's type.
+
+        Whoever asks for the log sees ``changes`` itself: it may not be changed any more.
+        """
+        if self._forced or self._causes is not None:
+            self._commit_each(changes, writer)
+            return
+        plain, cells = self._plain, self._cells
+        for view, value in changes:
+            if not plain[view]:
+                self._commit_each(changes, writer)  # those before it once more: nothing else depends on a plain cell
+                return
+            cells[view] = value
+        first = self._sequence + 1
+        self._sequence += len(changes)
+        if self._log is not None and changes:
+            self._log.append(WriteGroup(first, self.now_ns, writer, WriteKind.COMMIT, 0, changes))
+
+    def _commit_each(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
+        for view, value in changes:
+            self._store(view, 0, value, writer, WriteKind.COMMIT)
+
+    def write_now(
+        self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
+    ) -> None:
+        """Write actual memory; ``value`` is already within the view's type, ``element`` in range."""
+        self._store(view, element, value, writer, kind)
+
+    def write_from_outside(self, view: int, value: Value, writer: int, element: int = 0) -> None:
+        """Write a value that comes from ROS, a preset or an operator.
+
+        Raises:
+            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
+        """
+        self._store(view, element, self.accepted(view, value, element), writer, WriteKind.OUTSIDE)
+
+    def accepted(self, view: int, value: Value, element: int = 0) -> Value:
+        """Return a value from outside as an element of the variable would hold it; nothing is written.
+
+        Raises:
+            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
+        """
+        spec = self.specs[view]
+        if not 0 <= element < spec.elements:
+            raise MemoryValueError(f"{spec.name} has no element {element}: it has {spec.elements}")
+        return fitting(spec, value)
+
+    def force(self, view: int, value: Value, element: int = 0, writer: int = 0) -> None:
+        """Hold a value against every write until it is released.
+
+        Raises:
+            MemoryValueError: the value does not fit the variable's type.
+        """
+        fit = self.accepted(view, value, element)
+        self._under.setdefault((view, element), self.read_now(view, element))
+        self._forced.discard((view, element))
+        self._store(view, element, fit, writer, WriteKind.FORCE)
+        self._forced.add((view, element))
+        self._set_gate()
+        self._forces_changed(writer)
+
+    def release(self, view: int, element: int = 0, writer: int = 0) -> None:
+        """End a force; the value stays until the next write (semantics, Scan, memory, tasks)."""
+        if (view, element) in self._forced:
+            self._forced.remove((view, element))
+            self._set_gate()
+            self._under.pop((view, element), None)
+            self._store(view, element, self.read_now(view, element), writer, WriteKind.RELEASE)
+            self._forces_changed(writer)
+
+    def hold(self, forced: Iterable[tuple[int, int]], under: Iterable[tuple[int, int, Value]] = ()) -> None:
+        """Take over which values are forced, as ``load_image`` takes over the values: nothing is logged.
+
+        ``under`` is what ``under_forces`` gave.
+        """
+        self._forced = set(forced)
+        self._set_gate()
+        known = {(view, element): value for view, element, value in under}
+        self._under = {key: known.get(key, self.read_now(*key)) for key in self._forced}
+        for changed in self._force_watchers:
+            changed()
+
+    @property
+    def forced(self) -> frozenset[tuple[int, int]]:
+        """What is forced: pairs of view and element."""
+        return frozenset(self._forced)
+
+    def note_locals(self, writer: int = 0, *, forced: bool, told: bool = True) -> None:
+        """Take over whether variables of tasks are forced; unless ``told``, FORCINGSTATUS@ shows it already."""
+        self._locals_forced = forced
+        if told:
+            self._forces_changed(writer)
+
+    def is_forced(self, view: int) -> bool:
+        """Return whether a force holds a simple view."""
+        return (view, 0) in self._forced
+
+    def under_force(self, view: int) -> Value:
+        """Return what a simple view would hold if no force held it: the last write that reached memory, though dropped.
+
+        What a block would write is dropped in its scan already, so it does not count (decision).
+        """
+        return self._under.get((view, 0), self._cells[view])
+
+    @property
+    def under_forces(self) -> list[tuple[int, int, Value]]:
+        """What forced values would be without the forces: view, element, value."""
+        return [(*key, value) for key, value in sorted(self._under.items())]
+
+    def watch_forces(self, changed: Callable[[], None]) -> None:
+        """Call ``changed`` whenever a force begins or ends."""
+        self._force_watchers.append(changed)
+
+    def watch(self, bank: int, register: int, written: Callable[[], None]) -> None:
+        """Call ``written`` whenever a register of a module is written, by itself or through a point.
+
+        It may do no more than post an event, since the write may be one of several.
+        """
+        self._watched.setdefault((bank, register), []).append(written)
+
+    def watch_accesses(self, bank: int, accessed: Callable[[], None]) -> None:
+        """Call ``accessed`` for each read and write of a module's registers by a scan that takes modeled time."""
+        self.accesses[bank] = accessed
+        for view, spec in enumerate(self.specs):
+            if spec.place is not None and spec.place.bank == bank:
+                self.accesses[view] = accessed
+
+    def keep_log(self) -> None:
+        """Begin to keep the write log; whoever asks must ``take_writes`` or ``drain`` it."""
+        if self._log is None:
+            self._log = []
+            self._set_gate()
+
+    def take_writes(self) -> list[WriteGroup]:
+        """Return what was logged since it was last taken, oldest first."""
+        groups = self._log
+        if not groups:
+            return []
+        self._log = []
+        return groups
+
+    def drain(self) -> list[Write]:
+        """Return the same as single entries."""
+        return [entry for group in self.take_writes() for entry in group.entries()]
+
+    def keep_causes(self) -> None:
+        """Begin to keep what was written by name, without what follows from it on views of the same registers.
+
+        Whoever asks must ``take_causes``.
+        """
+        if self._causes is None:
+            self._causes = []
+            self._set_gate()
+
+    def take_causes(self) -> list[Write]:
+        """Return these writes since they were last taken, oldest first."""
+        causes, self._causes = self._causes or [], None if self._causes is None else []
+        return causes
+
+    def clear(self, writer: int = 0, *, keep_non_volatile: bool = True, kept: Container[tuple[int, int]] = ()) -> None:
+        """Set volatile variables to 0, except what is forced: STOP ALL and system restart (2.4.5).
+
+        ``kept`` are views and elements that their module keeps, such as inputs. FORCINGSTATUS@ still tells the truth.
+        """
+        for view, spec in enumerate(self.specs):
+            if spec.name == FORCING or (spec.non_volatile and keep_non_volatile):
+                continue
+            for element in range(spec.elements):
+                if self.read_now(view, element) != spec.type.zero and (view, element) not in kept:
+                    self._store(view, element, spec.type.zero, writer, WriteKind.OUTSIDE)
+
+    def _forces_changed(self, writer: int) -> None:
+        """Keep the pre-defined FORCINGSTATUS@ TRUE while anything is forced (2.4.6), and tell who watches."""
+        view, forced = self._index.get(FORCING), bool(self._forced) or self._locals_forced
+        if view is not None and self._cells[view] is not forced:
+            self._store(view, 0, forced, writer, WriteKind.OUTSIDE)
+        for changed in self._force_watchers:
+            changed()
+
+    def _store(self, view: int, element: int, value: Value, writer: int, kind: WriteKind) -> None:
+        if self._forced:
+            if (view, element) in self._forced:
+                self._under[view, element] = value
+                return
+            if view in self._shared:
+                value = self.registers.keeping(view, element, value, self._forced, self.read_now)
+        entries = self._spread(view, element, value) if view in self._shared else None
+        # Written out rather than by ``_put``: every write of every scan comes through here.
+        array = self._arrays[view]
+        if array is None:
+            self._cells[view] = value
+        else:
+            array[element] = value
+        self._sequence += 1
+        if self._log is not None:
+            self._log.append(WriteGroup(self._sequence, self.now_ns, writer, kind, element, ((view, value),)))
+        if self._causes is not None:
+            self._causes.append(Write(self._sequence, self.now_ns, writer, kind, view, element, value))
+        if entries:
+            # What shares registers with a forced view is not forced itself.
+            told = WriteKind.OUTSIDE if kind in (WriteKind.FORCE, WriteKind.RELEASE) else kind
+            for other, place, shown in entries:
+                self._put(other, place, shown)
+                self._sequence += 1
+                if self._log is not None:
+                    self._log.append(WriteGroup(self._sequence, self.now_ns, writer, told, place, ((other, shown),)))
+        if entries is not None and self._watched:
+            self._tell_watchers([(view, element), *(entry[:2] for entry in entries)])
+
+    def _tell_watchers(self, written: Iterable[tuple[int, int]]) -> None:
+        for key in written:
+            for told in self._watched.get(key, ()):
+                told()
+
+    def _spread(self, view: int, element: int, value: Value) -> list[tuple[int, int, Value]]:
+        """Return what else a write of a register changes; what is forced stays."""
+        changes = self.registers.consequences(view, element, value, self.read_now)
+        return [change for change in changes if change[:2] not in self._forced]

@@ -1,0 +1,115 @@
+"""Inputs as the process sets them: a write from outside reaches its register at once, or when that is free again.
+
+The 57C409, 57C411, 57C419 and 57C421 freeze their inputs at an interrupt until the task that waits for it has scanned
+(4.0). What the process does in between is kept, the last of each variable, and shows after that scan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.types import Value
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.time.scheduler import Scheduler
+
+Key = tuple[int, int]
+"""View and element."""
+Kept = tuple[int, int, Value, int]
+"""A write that waits: view, element, value, writer."""
+Shape = Callable[[Value], Value]
+"""What a register makes of a value from outside."""
+
+
+class Freezer:
+    """Inputs that freeze together: ``keys`` is all that shows them, ``owed`` the tasks that have not scanned yet."""
+
+    def __init__(self, keys: Iterable[Key]) -> None:
+        """Begin with inputs that follow the process."""
+        self.keys = frozenset(keys)
+        self.owed: set[str] = set()
+        self.kept: dict[Key, tuple[Value, int]] = {}
+
+    def state(self) -> dict[str, Any]:
+        """Return who owes a scan, and what waits in its order."""
+        kept = [[*key, value, writer] for key, (value, writer) in self.kept.items()]
+        return {"owed": sorted(self.owed), "kept": kept}
+
+
+class ProcessInputs:
+    """Writes of one rack's inputs and other variables from outside its tasks, between scans.
+
+    ``memory`` is what they write. ``frozen`` has what is frozen now: to be asked before ``scanned``, since that comes
+    after every scan.
+    """
+
+    def __init__(self, memory: CommonMemory, scheduler: Scheduler) -> None:
+        """Begin with inputs that follow the process."""
+        self.memory, self._scheduler = memory, scheduler
+        self.frozen: dict[Key, Freezer] = {}
+        self._shapes: dict[Key, Shape] = {}
+
+    def shape(self, keys: Iterable[Key], shape: Shape) -> None:
+        """Let values from outside pass through a function before they reach a variable."""
+        self._shapes.update(dict.fromkeys(keys, shape))
+
+    def write(self, view: int, element: int, value: Value, writer: int, kind: WriteKind = WriteKind.OUTSIDE) -> None:
+        """Write a value that fits its variable, now or when it is free again."""
+        key = view, element
+        if key in self._shapes:
+            value = self._shapes[key](value)
+        freezer = self.frozen.get(key)
+        if freezer is None:
+            self.memory.write_now(view, value, writer, element, kind)
+        else:
+            # Last in order, so that a word written after one of its bits wins over it.
+            freezer.kept.pop(key, None)
+            freezer.kept[key] = value, writer
+
+    def write_from_outside(self, view: int, value: Value, writer: int, element: int = 0) -> None:
+        """Write a value as ROS, a preset or an operator gives it.
+
+        Raises:
+            MemoryValueError: the value does not fit the variable's type, or the element does not exist.
+        """
+        self.write(view, element, self.memory.accepted(view, value, element), writer)
+
+    def freeze(self, freezer: Freezer, tasks: Iterable[str]) -> None:
+        """Take in what the process has done until now, and hold it until all of ``tasks`` have scanned."""
+        self.free(freezer)
+        freezer.owed = set(tasks)
+        if freezer.owed:
+            self.frozen.update(dict.fromkeys(freezer.keys, freezer))
+
+    def scanned(self, task: str) -> bool:
+        """Follow a scan; return whether inputs were freed and have changed."""
+        changed = False
+        for freezer in dict.fromkeys(self.frozen.values()):
+            freezer.owed.discard(task)
+            if not freezer.owed:
+                changed = self.free(freezer) or changed
+        return changed
+
+    def free(self, freezer: Freezer) -> bool:
+        """Let inputs follow the process again, whoever owes a scan; return whether writes have waited."""
+        freezer.owed = set()
+        for key in freezer.keys:
+            self.frozen.pop(key, None)
+        kept, freezer.kept = freezer.kept, {}
+        self.memory.now_ns = self._scheduler.now_ns
+        for (view, element), (value, writer) in kept.items():
+            self.memory.write_now(view, value, writer, element, WriteKind.OUTSIDE)
+        return bool(kept)
+
+    def load(self, freezer: Freezer, owed: Iterable[str], kept: Iterable[Sequence[object]]) -> None:
+        """Take over a freezer's state.
+
+        Raises:
+            ValueError: a write that waits is none of its inputs'.
+        """
+        self.freeze(freezer, owed)
+        for view, element, value, writer in kept:
+            if (view, element) not in freezer.keys or not isinstance(value, int) or not isinstance(writer, int):
+                raise ValueError(f"{view!r}, {element!r} is not an input that waits")
+            freezer.kept[view, element] = value, writer  # type: ignore[index]

@@ -1,0 +1,99 @@
+"""What a record keeps of a drive: what its 57C406 has measured at an interrupt, and what the loop has commanded.
+
+Both stand among the reads of the scan's record, under views that no rack has, one whole number an element; a number
+that is the usual one is left out (decision: a drive at rest then takes some five numbers per scan).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from automax_ros.core.ticks import NS_PER_S
+from automax_ros.drive.current_loop.signals import Command, Measured, Pulse
+
+MEASURED_VIEW = 0xFFF0
+"""The view of what was measured; the element is the place in ``Measured``. After it comes the rack time: s, then ns."""
+COMMAND_VIEW = 0xFFEF
+"""The view of what was commanded: first the fields of ``Command`` but the pulses, then three numbers per pulse."""
+MEASURED_NAMES = (*Measured._fields, "time s", "time ns")
+COMMAND_NAMES = tuple(name for name in Command._fields if name != "pulses")
+MOST_PULSES = 16
+"""Most gate windows of one command that are told (decision: six SCRs, each as first and as second, are twelve)."""
+MEASURED_NUMBERS = len(MEASURED_NAMES)
+COMMAND_NUMBERS = len(COMMAND_NAMES) + MOST_PULSES * len(Pulse._fields)
+
+Noted = tuple[int, int, int]
+"""View, element, number."""
+
+_PULSE = len(Pulse._fields)
+_SECONDS, _REST = len(Measured._fields), len(Measured._fields) + 1
+_USUAL = tuple(int(Measured._field_defaults.get(name, 0)) for name in Measured._fields)
+_USUAL_COMMAND = tuple(int(Command._field_defaults.get(name, 0)) for name in COMMAND_NAMES)
+_FIRST_PULSE = len(COMMAND_NAMES)
+
+
+def noted_measured(measured: Measured) -> list[Noted]:
+    """Return what is noted of a measurement: its first number always, so that there is something."""
+    noted: list[Noted] = [(MEASURED_VIEW, 0, measured[0])]
+    for place, value in enumerate(measured):
+        if place and value != _USUAL[place]:
+            noted.append((MEASURED_VIEW, place, value))
+    return noted
+
+
+def noted_time(now_ns: int) -> list[Noted]:
+    """Return what is noted of rack time: the stamp of a scan may be one of the wall clock."""
+    seconds, rest = divmod(now_ns, NS_PER_S)
+    return [(MEASURED_VIEW, _SECONDS, seconds), (MEASURED_VIEW, _REST, rest)]
+
+
+def noted_command(command: Command) -> list[Noted]:
+    """Return what is noted of a command: its first number always."""
+    noted: list[Noted] = []
+    for place, value in enumerate(command_numbers(command)):
+        if not place or value != (_USUAL_COMMAND[place] if place < _FIRST_PULSE else 0):
+            noted.append((COMMAND_VIEW, place, value))
+    return noted
+
+
+def command_numbers(command: Command) -> list[int]:
+    """Return a command as whole numbers."""
+    numbers = [command.next_ns, command.relays, command.level, int(command.block), int(command.ok)]
+    for pulse in command.pulses[:MOST_PULSES]:
+        numbers += pulse
+    return numbers
+
+
+def measured_of(noted: Iterable[Noted]) -> Measured | None:
+    """Return the measurement that was noted, None where there is none among what is given."""
+    numbers = dict(_of_view(MEASURED_VIEW, noted))
+    if 0 not in numbers:
+        return None
+    return Measured(*(numbers.get(place, usual) for place, usual in enumerate(_USUAL)))
+
+
+def time_of(noted: Iterable[Noted]) -> int | None:
+    """Return the rack time that was noted in ns, None where there is none among what is given."""
+    numbers = dict(_of_view(MEASURED_VIEW, noted))
+    return numbers[_SECONDS] * NS_PER_S + numbers.get(_REST, 0) if _SECONDS in numbers else None
+
+
+def command_of(noted: Iterable[Noted]) -> Command | None:
+    """Return the command that was noted, None where there is none among what is given."""
+    numbers = dict(_of_view(COMMAND_VIEW, noted))
+    if not numbers:
+        return None
+    fields = {
+        name: type(Command._field_defaults.get(name, 0))(numbers.get(place, _USUAL_COMMAND[place]))
+        for place, name in enumerate(COMMAND_NAMES)
+    }
+    first = _FIRST_PULSE
+    count = (max(numbers) - first) // _PULSE + 1 if max(numbers) >= first else 0
+    pulses = (first + _PULSE * number for number in range(count))
+    return Command(
+        **fields, pulses=tuple(Pulse(*(numbers.get(place + item, 0) for item in range(_PULSE))) for place in pulses)
+    )
+
+
+def _of_view(view: int, noted: Iterable[Noted]) -> Iterator[tuple[int, int]]:
+    return ((element, value) for entry_view, element, value in noted if entry_view == view)

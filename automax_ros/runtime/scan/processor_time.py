@@ -1,0 +1,163 @@
+"""The time of one Processor: its jobs take the manual's execution times, and higher priorities pre-empt lower ones."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+
+from automax_ros.runtime.scan.execution import Job, Place, Steps
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
+
+
+@dataclass(eq=False)
+class _Frame:
+    """A job under way: ``remaining_ns`` of execution before its next step; ``steps`` None before its first."""
+
+    job: Job
+    skipped: int
+    steps: Steps | None = None
+    remaining_ns: int = 0
+    dropped: bool = False
+
+
+class ProcessorTime:
+    """Executes jobs one at a time: the highest priority first, equals in alphabetical order.
+
+    A job of higher priority suspends a lower one, which goes on after it (PC3000 manual p. 15-2). Equals do not suspend
+    each other (decision: no source tells of time-slicing).
+    """
+
+    def __init__(self, scheduler: Scheduler, name: str) -> None:
+        """Take the scheduler; ``name`` orders Processors at one instant."""
+        self._scheduler = scheduler
+        self._key = EventKey(EventClass.EXECUTE, 0, name)
+        self._frames: list[_Frame] = []
+        self._event: ScheduledEvent | None = None
+        self._spare: ScheduledEvent | None = None
+        self._since_ns = 0
+        self._going = False
+
+    def begin(self, job: Job, now_ns: int, skipped: int) -> None:
+        """Let a job be executed as soon as nothing goes before it."""
+        frame = _Frame(job, skipped)
+        place = self._place_of(frame) if self._frames else 0
+        if place:
+            self._frames.insert(place, frame)
+            return
+        self._book(now_ns)
+        self._frames.insert(0, frame)
+        if not self._going:
+            self._go(now_ns)
+
+    def busy(self, job: Job) -> bool:
+        """Return whether a job that was begun is not done yet."""
+        return bool(self._frames) and self._frame(job) is not None
+
+    def drop(self, job: Job) -> None:
+        """Give a job up; what it has written so far stays written. Nothing is executed by this."""
+        frame = self._frame(job)
+        if frame is None:
+            return
+        now_ns = self._scheduler.now_ns
+        self._book(now_ns)
+        self._frames.remove(frame)
+        self._wait(now_ns)
+        frame.dropped = True
+        if frame.steps is not None:
+            # ValueError: the job gives itself up, in the middle of a step.
+            with contextlib.suppress(ValueError):
+                frame.steps.close()
+
+    def place(self, job: Job) -> Place | None:
+        """Return how far a job is, None where it is not under way."""
+        frame = self._frame(job)
+        if frame is None:
+            return None
+        used_ns = self._scheduler.now_ns - self._since_ns if self._event is not None and frame is self._frames[0] else 0
+        return {"left_ns": frame.remaining_ns - used_ns, "skipped": frame.skipped}
+
+    def resume(self, job: Job, place: Place, steps: Steps | None) -> None:
+        """Go on with a job from the place where it was; ``steps`` have come as far, None if it had not begun."""
+        now_ns = self._scheduler.now_ns
+        self._book(now_ns)
+        frame = _Frame(job, place["skipped"], steps, place["left_ns"])
+        self._frames.insert(self._place_of(frame), frame)
+        self._wait(now_ns)
+
+    def _frame(self, job: Job) -> _Frame | None:
+        for frame in self._frames:
+            if frame.job is job:
+                return frame
+        return None
+
+    def _place_of(self, frame: _Frame) -> int:
+        """Return where a new job stands among those that are under way or wait."""
+        place = 0
+        for other in self._frames:
+            if _goes_before(frame, other):
+                break
+            place += 1
+        return place
+
+    def _book(self, now_ns: int) -> None:
+        """Suspend the job that is executed: it has used the time up to now."""
+        if self._event is not None:
+            self._event.cancel()
+            self._event = None
+            self._frames[0].remaining_ns -= now_ns - self._since_ns
+
+    def _go(self, now_ns: int) -> None:
+        """Execute what is first, until it takes time that something else comes into."""
+        frames, advance_to, key = self._frames, self._scheduler.advance_to, self._key
+        self._going = True
+        try:
+            while frames:
+                frame = frames[0]
+                left_ns = frame.remaining_ns
+                if left_ns:
+                    if not advance_to(now_ns + left_ns, key):
+                        break
+                    now_ns += left_ns
+                steps = frame.steps
+                try:
+                    if steps is None:
+                        steps = frame.steps = frame.job.steps(now_ns, frame.skipped)
+                        frame.remaining_ns = next(steps)
+                    else:
+                        frame.remaining_ns = steps.send(now_ns)
+                except StopIteration as end:
+                    if not frame.dropped:
+                        frames.remove(frame)
+                        frame.job.done(end.value)
+                else:
+                    if frame.dropped:
+                        steps.close()
+        finally:
+            self._going = False
+            if frames:
+                self._wait(now_ns)
+
+    def _wait(self, now_ns: int) -> None:
+        """Go on with what is first when it has had its time, unless it goes on by itself."""
+        if self._frames and not self._going:
+            self._since_ns = now_ns
+            event = self._spare
+            self._spare = None
+            if event is None:
+                event = ScheduledEvent(self._key, self._goes_on)
+            self._event = self._scheduler.post(now_ns + self._frames[0].remaining_ns, event)
+
+    def _goes_on(self, now_ns: int, _: int) -> None:
+        self._spare = self._event
+        self._event = None
+        self._frames[0].remaining_ns = 0
+        self._go(now_ns)
+
+
+def _goes_before(new: _Frame, other: _Frame) -> bool:
+    """Return whether a new job is executed before one that is under way or waits."""
+    if new.job.priority != other.job.priority:
+        return new.job.priority < other.job.priority
+    if new.steps is not None or other.steps is not None:
+        return new.steps is not None
+    return new.job.name < other.job.name

@@ -1,0 +1,168 @@
+"""A scan in steps of modeled time that is not whole yet: what it works on, and what it takes to tell it again.
+
+A scan under way works on a copy of its task's state: until it ends the state of the task is that of its last whole
+scan. Snapshots have that, and a scan that is given up leaves nothing in it (decision: only what it has written to
+memory stays written). It notes what it reads, so that another rack can execute its first part again and go on there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from automax_ros.compile.base.scan_io import StateValues
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.types import Latched, Value
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.views import LatchPlan
+from automax_ros.runtime.scan.error_log import ErrorLog, LogEntry
+from automax_ros.runtime.scan.scan_record import ScanRecord
+from automax_ros.runtime.scan.task_io import Call, ScanMemory
+
+Progress = Mapping[str, Any]
+"""How far a scan is, in numbers, texts, lists and mappings."""
+
+
+class HeardMemory:
+    """Memory as a scan under way uses it: ``heard`` is all that it was given since it began.
+
+    After ``tell`` it gives what an earlier scan was given and writes nothing, until ``live``. ``latched`` are the views
+    that a latch takes.
+    """
+
+    def __init__(self, memory: ScanMemory) -> None:
+        """Take the memory that the task works on."""
+        self._memory = memory
+        self._accesses: Mapping[int, Call] = memory.accesses if isinstance(memory, CommonMemory) else {}
+        self.latched: Sequence[int] = ()
+        self._told: Iterator[Any] | None = None
+        self.heard: list[Any] = []
+        self.latched_ns = 0
+
+    @property
+    def now_ns(self) -> int:
+        """The time of what happens next."""
+        return self._memory.now_ns if self._told is None else self.latched_ns
+
+    def begin(self) -> None:
+        """Begin a scan, which has heard nothing and has not latched: the scan before leaves nothing in its progress."""
+        self.heard = []
+        self.latched_ns = 0
+
+    def tell(self, heard: Sequence[Any], latched_ns: int) -> None:
+        """Give what a scan was given that latched at an instant, in place of what memory holds."""
+        self._told, self.latched_ns = iter(heard), latched_ns
+
+    def live(self) -> None:
+        """Use memory from now on."""
+        self._told = None
+
+    def latch(self, plan: LatchPlan) -> Latched:
+        """Return copies of the planned views."""
+        if self._told is None:
+            self.latched_ns = self._memory.now_ns
+            values = self._memory.latch(plan)
+            self._tell(self.latched)
+        else:
+            values = tuple(next(self._told))
+        self.heard.append(values)
+        return values
+
+    def read_now(self, view: int, element: int = 0) -> Value:
+        """Return an actual value."""
+        if self._told is None:
+            value: Value = self._memory.read_now(view, element)
+            self._tell((view,))
+        else:
+            value = next(self._told)
+        self.heard.append(value)
+        return value
+
+    def is_forced(self, view: int) -> bool:
+        """Return whether a force holds a simple view."""
+        forced: bool = self._memory.is_forced(view) if self._told is None else next(self._told)
+        self.heard.append(forced)
+        return forced
+
+    def hear(self, call: Call) -> Any:
+        """Return what a call outside the task returns, or what it returned when the scan was executed first."""
+        outcome = call() if self._told is None else next(self._told)
+        self.heard.append(outcome)
+        return outcome
+
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None:
+        """Write what the scan's blocks changed."""
+        if self._told is None:
+            self._memory.commit(changes, writer)
+            self._tell([view for view, _ in changes] if self._accesses else ())
+
+    def write_now(
+        self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
+    ) -> None:
+        """Write an actual value."""
+        if self._told is None:
+            self._memory.write_now(view, value, writer, element, kind)
+            self._tell((view,))
+
+    def _tell(self, views: Sequence[int]) -> None:
+        """Tell those who watch it of an access to each of some views."""
+        if self._accesses:
+            for view in views:
+                told = self._accesses.get(view)
+                if told is not None:
+                    told()
+
+
+@dataclass(eq=False)
+class ScanUnderWay:
+    """A scan that has begun: ``steps`` counts those it has announced.
+
+    ``log`` is the error log before it, ``own_errors`` what it has logged itself; None where there is nothing.
+    """
+
+    began_ns: int
+    skipped: int
+    state: StateValues
+    log: ErrorLog | None
+    memory: HeardMemory
+    steps: int = 0
+    own_errors: ErrorLog | None = None
+
+    @property
+    def progress(self) -> Progress:
+        """What ``Task.resume_scan`` must be given to go on from here."""
+        return {
+            "began_ns": self.began_ns,
+            "latched_ns": self.memory.latched_ns,
+            "skipped": self.skipped,
+            "steps": self.steps,
+            "heard": list(self.memory.heard),
+        }
+
+
+Begun = tuple[ScanUnderWay, ScanRecord | None, Generator[int, None, bool]]
+"""A scan that has begun: what it works on, its record if one is kept, and the compiled form that executes it."""
+
+
+def add_error(entry: LogEntry, log: ErrorLog, scan: ScanUnderWay | None) -> None:
+    """Log an error, as that of a scan under way if there is one."""
+    log.add(entry)
+    if scan is not None:
+        if scan.own_errors is None:
+            scan.own_errors = ErrorLog()
+        scan.own_errors.add(entry)
+
+
+def cleared_errors(log: ErrorLog, scan: ScanUnderWay | None, *, inside: bool) -> ErrorLog:
+    """Return what is left of a log that is cleared, from ``inside`` the scan under way or by the operator.
+
+    After the operator's clearing there is still what a scan under way logs itself (decision).
+    """
+    if scan is None or inside:
+        log.clear()
+        if scan is not None:
+            scan.own_errors = None
+        return log
+    scan.log = None
+    return scan.own_errors.copy() if scan.own_errors else ErrorLog()

@@ -1,0 +1,210 @@
+"""What a task's compiled functions touch: common memory, registers, the error log, printed lines."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Protocol, cast
+
+from automax_ros.core.kinds import WriteKind
+from automax_ros.core.machine_code import mypyc_attr
+from automax_ros.core.types import Latched, Value
+from automax_ros.runtime.memory.image import Image
+from automax_ros.runtime.memory.memory import CommonMemory
+from automax_ros.runtime.memory.registers import BUS_ERROR, Backplane
+from automax_ros.runtime.memory.views import CellCommit, LatchPlan
+from automax_ros.runtime.scan.error_log import ErrorLog
+from automax_ros.runtime.scan.events import Events
+from automax_ros.runtime.scan.printing import format_print
+from automax_ros.runtime.scan.scan_record import ScanRecord
+
+Call = Callable[[], Any]
+Hear = Callable[[Call], Any]
+"""Returns what a call outside the task returns, or what it returned when the scan was executed first."""
+
+
+def at_once(call: Call) -> Any:
+    """Return what a call returns."""
+    return call()
+
+
+class Host(Protocol):
+    """The task that a ``TaskIo`` works for.
+
+    ``plan`` are the views that a scan latches, ``written`` those that its blocks write; ``present_scan`` is the number
+    of the scan that logs errors.
+    """
+
+    writer: int
+    backplane: Backplane
+    events: Events
+    plan: LatchPlan
+    written: tuple[int, ...]
+    errors: ErrorLog
+    printed: deque[str]
+
+    @property
+    def present_scan(self) -> int: ...  # noqa: D102
+
+    def log_error(self, line: int, code: int) -> None: ...  # noqa: D102
+
+    def clear_errors(self, *, inside: bool = False) -> None: ...  # noqa: D102
+
+
+class ScanMemory(Protocol):
+    """What a scan does with memory: the four operations of ``Memory``."""
+
+    @property
+    def now_ns(self) -> int: ...  # noqa: D102
+
+    def latch(self, plan: LatchPlan) -> Latched: ...  # noqa: D102
+
+    def commit(self, changes: Sequence[tuple[int, Value]], writer: int) -> None: ...  # noqa: D102
+
+    def read_now(self, view: int, element: int = 0) -> Value: ...  # noqa: D102
+
+    def write_now(  # noqa: D102
+        self, view: int, value: Value, writer: int, element: int = 0, kind: WriteKind = WriteKind.BASIC
+    ) -> None: ...
+
+    def is_forced(self, view: int) -> bool: ...  # noqa: D102
+
+
+def register_read(
+    backplane: Backplane, read_now: Callable[[int, int], Value], slot: int, register: int
+) -> tuple[int, int]:
+    """Return a register's word as ``read_now`` has it and 0, or 0 and the bus error of one that does not answer."""
+    place = backplane.readable(slot, register)
+    if place is None:
+        return 0, BUS_ERROR
+    view, element = place
+    return cast(int, read_now(view, element)), 0
+
+
+def register_written(
+    backplane: Backplane, write_now: Callable[[int, Value, int], None], slot: int, register: int, value: int
+) -> int:
+    """Write a register's 16 bits by ``write_now``; return 0, or the bus error of one that does not take it."""
+    place = backplane.writable(slot, register)
+    if place is None:
+        return BUS_ERROR
+    view, element = place
+    write_now(view, (value + 0x8000 & 0xFFFF) - 0x8000, element)
+    return 0
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class TaskIo:
+    """What a compiled scan touches: common memory through one task, its error log and its printed lines.
+
+    The members are bound once, so that a scan pays for no more than the memory itself.
+    """
+
+    def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task and the memory that its scans work on."""
+        self.latch: Callable[[], Latched] = (
+            memory.latching(task.plan) if isinstance(memory, Image) else partial(memory.latch, task.plan)
+        )
+        self.read_now = memory.read_now
+        self._common = memory if isinstance(memory, CommonMemory) else None
+        self.cell_commit: CellCommit | None = None if self._common is None else self._common.committing()
+        self._memory, self._writer, self._task = memory, task.writer, task
+        self._backplane, self._hear = task.backplane, hear
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Write back what blocks changed."""
+        if not changes:
+            return
+        common = self._common
+        if common is not None:  # the same, known by its class: a call of machine code
+            common.commit(changes, self._writer)
+        else:
+            self._memory.commit(changes, self._writer)
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Write actual memory for a BASIC statement."""
+        self._memory.write_now(view, value, self._writer, element, WriteKind.BASIC)
+
+    def forces(self) -> tuple[bool, ...]:
+        """Return which of the commons that blocks write a force holds."""
+        return tuple(map(self._memory.is_forced, self._task.written))
+
+    def log(self, line: int, code: int) -> None:
+        """Log a run-time error of this scan."""
+        self._task.log_error(line, code)
+
+    def print_line(self, values: tuple[Value, ...], separators: str) -> None:
+        """Print to the task's log."""
+        self._task.printed.append(format_print(values, separators))
+
+    def set_event(self, name: str) -> None:
+        """Set a software event (SET)."""
+        self._hear(lambda: self._task.events.event(name).set(self._memory.now_ns))
+
+    def errors_logged(self) -> bool:
+        """Return whether the error log holds an entry (TST_ERRLOG@)."""
+        logged: bool = self._hear(lambda: self._task.errors.count > 0)
+        return logged
+
+    def clear_errors(self) -> None:
+        """Clear the error log (CLR_ERRLOG)."""
+        self._task.clear_errors(inside=True)
+
+    def io_read(self, slot: int, register: int) -> tuple[int, int]:
+        """Return a register's word and 0, or 0 and the bus error of a register that does not answer."""
+        return register_read(self._backplane, self.read_now, slot, register)
+
+    def io_write(self, slot: int, register: int, value: int) -> int:
+        """Write a register's word; return 0, or the bus error of a register that does not answer or take it."""
+        return register_written(self._backplane, self.write_now, slot, register, value)
+
+    def minor_loop(self, inputs: tuple[Value | None, ...], records: list[Value] | None) -> Sequence[Value] | None:  # noqa: ARG002
+        """Execute the current minor loop of a drive: a task that has none writes no outputs."""
+        return None
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class RecordingIo(TaskIo):
+    """The same, noting everything in ``record``."""
+
+    def __init__(self, task: Host, memory: ScanMemory, hear: Hear = at_once) -> None:
+        """Bind a task and its memory and begin with an empty record."""
+        super().__init__(task, memory, hear)
+        self.record = ScanRecord(0, 0)
+        self.latch = self._latch
+        self.read_now = self._read_now
+        self.cell_commit = None  # what is committed is noted
+        self._plan = task.plan
+        self._image: Image | None = memory if isinstance(memory, Image) else None
+        self._latched = memory.latching(task.plan) if isinstance(memory, Image) else None
+
+    def _latch(self) -> Latched:
+        record, image, latch = self.record, self._image, self._latched
+        if image is None or latch is None:
+            record.time_ns = self._memory.now_ns
+            record.latched = latched = self._memory.latch(self._plan)
+        else:  # the same, known by its class: an attribute of machine code
+            record.time_ns = image.now_ns
+            record.latched = latched = latch()
+        return latched
+
+    def _read_now(self, view: int, element: int = 0) -> Value:
+        value = self._memory.read_now(view, element)
+        self.record.reads.append((view, element, value))
+        return value
+
+    def write_now(self, view: int, value: Value, element: int = 0) -> None:
+        """Write actual memory and note it."""
+        self.record.writes.append((view, element, value))
+        super().write_now(view, value, element)
+
+    def commit(self, changes: list[tuple[int, Value]]) -> None:
+        """Write back what blocks changed and note it."""
+        self.record.commits = changes
+        super().commit(changes)
+
+    def log(self, line: int, code: int) -> None:
+        """Log a run-time error and note it."""
+        self.record.errors.append((line, code))
+        super().log(line, code)

@@ -1,0 +1,399 @@
+"""A running task: latch, scan, commit, error log."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator, Mapping, Sequence
+from typing import Any, Final
+
+from automax_ros.compile.base.layout import Layout
+from automax_ros.compile.base.scan_io import ScanTooLong, StateValues
+from automax_ros.compile.compiler import CompiledTask, ScanSteps
+from automax_ros.core.machine_code import mypyc_attr
+from automax_ros.core.types import Value
+from automax_ros.language.tree.tree import Scope
+from automax_ros.runtime.memory.image import Image
+from automax_ros.runtime.memory.registers import NO_MODULES, Backplane
+from automax_ros.runtime.memory.views import Memory
+from automax_ros.runtime.scan.error_log import LOG_NUMBERS, ErrorLog, LogEntry, snapshot_layout
+from automax_ros.runtime.scan.events import Events
+from automax_ros.runtime.scan.modeled_scan import scan_in_steps
+from automax_ros.runtime.scan.scan_record import ScanRecord, Status, Steps
+from automax_ros.runtime.scan.scan_under_way import (
+    Begun,
+    HeardMemory,
+    Progress,
+    ScanUnderWay,
+    add_error,
+    cleared_errors,
+)
+from automax_ros.runtime.scan.task_io import Hear, RecordingIo, ScanMemory, TaskIo, at_once
+from automax_ros.runtime.scan.tunable_value import tunable_value
+
+__all__ = ["EVENT_TIMEOUT", "OVERLAP", "SCAN_TOO_LONG", "ScanRecord", "Status", "Task"]
+
+SCAN_TOO_LONG = 7040
+OVERLAP = 7070
+EVENT_TIMEOUT = 7071
+PRINTED_LINES = 1000
+"""Lines of PRINT that a task keeps."""
+_RUNNING: Final = Status.RUNNING
+"""A name of its own, since each scan asks for it and an enumeration's member is slow to get."""
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class Task:
+    """One task in one rack: its compiled functions, its state, and its place in the rack.
+
+    ``writer`` is the id under which the write log knows it. Nothing happens before ``run``.
+    """
+
+    def __init__(
+        self,
+        compiled: CompiledTask,
+        memory: Memory,
+        *,
+        writer: int = 0,
+        slot: int = 0,
+        priority: int = 11,
+        backplane: Backplane = NO_MODULES,
+        events: Events | None = None,
+    ) -> None:
+        """Install the task: its state is as at installation (2.4.5)."""
+        self.memory = memory
+        self._image: Image | None = memory if isinstance(memory, Image) else None
+        self.writer, self.slot, self.priority = writer, slot, priority
+        self.backplane, self.events = backplane, Events() if events is None else events
+        self.printed: deque[str] = deque(maxlen=PRINTED_LINES)
+        self._recording = False
+        self._scans: Generator[bool, None, None] | None = None
+        self._heard = HeardMemory(memory)
+        self._under_way: ScanUnderWay | None = None
+        self.install(compiled)
+        memory.watch_forces(self._look_at_forces)
+
+    def install(self, compiled: CompiledTask) -> None:
+        """Begin again, with this or another program: state and error log are as at installation (2.4.5)."""
+        self._put_down()
+        self.compiled = compiled.holding(frozenset())
+        self.forces: dict[str, Value] = {}
+        self._forces_wait = False
+        latched = [self.memory.view(name) for name in compiled.latched]
+        self.plan, self._heard.latched = self.memory.plan(latched), latched
+        self.written = tuple(self.memory.view(name) for name in compiled.written)
+        self._state: StateValues = compiled.layout.fresh()
+        self._arrays = [position for position, field in enumerate(compiled.layout.fields) if field.is_array]
+        self.errors = ErrorLog()
+        self.status, self.scan_number = Status.STOPPED, 0
+        self._forced = any(map(self.memory.is_forced, self.written))
+        self._under_way = None
+        self._bind()
+
+    @property
+    def name(self) -> str:
+        """The task's name."""
+        return self.compiled.program.name
+
+    @property
+    def period_ns(self) -> int:
+        """Scan period."""
+        return self.compiled.program.period_ns
+
+    @property
+    def layout(self) -> Layout:
+        """The layout of a snapshot."""
+        return snapshot_layout(self.compiled)
+
+    @property
+    def state(self) -> StateValues:
+        """The state, field by field as ``compiled.layout`` has it.
+
+        Between scans the compiled scan holds it, so ask again after each scan: a list got earlier is out of date. While
+        a modeled scan is under way it is that of the scan before.
+        """
+        self._put_down()
+        return self._state
+
+    def record_scans(self, *, on: bool = True) -> None:
+        """Begin or end to keep a record of each scan."""
+        self._put_down()
+        self._recording = on
+        self._bind()
+
+    def run(self, now_ns: int = 0) -> ScanRecord | None:
+        """Put the task into RUN: blocks start again, the statements before SCAN_LOOP execute once.
+
+        Returns the record of that part, as scan 0, if scans are recorded.
+        """
+        self.heed_forces()
+        self.compiled.layout.restart(self.state)
+        self.status, self.scan_number = Status.RUNNING, 0
+        record = self._begin_record(now_ns, 0, self._io)
+        self.memory.now_ns = now_ns
+        try:
+            if self.compiled.startup(self.state, self._io):
+                self.status = Status.ENDED
+        except ScanTooLong as error:
+            self.too_long(error)
+        return record
+
+    def scan(self, now_ns: int, skipped: int = 0) -> ScanRecord | None:
+        """Execute one scan at an instant; ``skipped`` deadlines were missed before it. Returns its record, if kept."""
+        if self.status is not _RUNNING:
+            return None
+        self.scan_number += 1
+        record, noting = None, self._noting
+        if noting is not None:
+            noting.record = record = ScanRecord(now_ns, self.scan_number, skipped)
+        if self._image is not None:  # the same, known by its class: an attribute of machine code
+            self._image.now_ns = now_ns
+        else:
+            self.memory.now_ns = now_ns
+        if self._scans is None:
+            self.heed_forces()
+            scans = self.compiled.scans_forced if self._forced else self.compiled.scans
+            self._scans = scans(self._state, self._io)
+        try:
+            for stopped in self._scans:  # a scan; next() would be looked up each time
+                if stopped:
+                    self.status = Status.ENDED
+                break
+        except BaseException as error:
+            # The scans have stored the state and ended: the next one begins from it.
+            self._scans = None
+            if not isinstance(error, ScanTooLong):
+                raise
+            self.too_long(error)
+        return record
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has come to the end of its program, as only a BASIC task can: not by STOP."""
+        return False
+
+    @property
+    def present_scan(self) -> int:
+        """The number of the scan under way, or of the last one."""
+        return self.scan_number + (self._under_way is not None)
+
+    @property
+    def progress(self) -> Progress | None:
+        """How far the scan is that is under way in modeled time, None where none is."""
+        return None if self._under_way is None else self._under_way.progress
+
+    def scan_modeled(self, now_ns: int, skipped: int = 0, form: ScanSteps | None = None) -> Steps:
+        """Execute one scan in steps; ``skipped`` deadlines were missed before it. Returns its record, if kept.
+
+        Yields the ns that pass before the next memory access and is sent the time then, None for the time it is; with
+        another ``form`` of the scan, what that yields. State and number of the scan are the task's when the generator
+        has ended; closed before that, it leaves them as they were (decision: what it has written stays written).
+        """
+        return scan_in_steps(self, now_ns, skipped, form)
+
+    def begin_steps(self, now_ns: int, skipped: int, form: ScanSteps | None) -> Begun:
+        """Begin a scan in steps, of a task in RUN: see ``scan_modeled``."""
+        self.heed_forces()
+        self._put_down()
+        self._heard.begin()
+        self._under_way = scan = ScanUnderWay(now_ns, skipped, self._state[:], None, self._heard)
+        if self._arrays:
+            self._copy_arrays(scan.state)
+        if self.errors.count:
+            scan.log = self.errors.copy()
+        record = self._begin_record(now_ns, skipped, self._heard_io) if self._recording else None
+        self._begins(now_ns)
+        return scan, record, (form or self._form_in_steps())(scan.state, self._heard_io)
+
+    def end_steps(self, outcome: Any) -> None:
+        """End the scan under way with what its compiled form returned: TRUE if the task executed STOP."""
+        scan = self._under_way
+        assert scan is not None
+        self.scan_number += 1
+        self._state, self._under_way = scan.state, None
+        if self._forces_wait:
+            self.heed_forces()
+        if outcome:
+            self._over(outcome, scan.began_ns)
+
+    def give_up_steps(self) -> None:
+        """Leave the task as the scan under way found it.
+
+        Forces that wait go on doing so: a scan may be given up by the garbage collector, amid anything.
+        """
+        scan, self._under_way = self._under_way, None
+        self.errors = ErrorLog() if scan is None or scan.log is None else scan.log
+
+    def resume_scan(self, progress: Progress) -> Steps:
+        """Return a scan in steps that is as far as another was: it has announced its last step (see ``progress``)."""
+        steps = self.scan_modeled(progress["began_ns"], progress["skipped"])
+        now_ns = self.memory.now_ns
+        for number in range(progress["steps"]):
+            next(steps)
+            if not number:
+                self._heard.tell(progress["heard"], progress["latched_ns"])
+        self._heard.live()
+        self.memory.now_ns = now_ns
+        return steps
+
+    def stop(self) -> None:
+        """Stop the task; its locals keep their values."""
+        if self.status is Status.RUNNING:
+            self.status = Status.STOPPED
+
+    def fault(self, code: int, now_ns: int) -> ScanRecord | None:
+        """Fault the task for a scan that cannot be: logged at SCAN_LOOP. Returns a record of that alone, if kept."""
+        self.scan_number += 1
+        record = self._begin_record(now_ns, 0, self._io)
+        self._io.log(self.compiled.program.scan_loop_line, code)
+        self.status = Status.FAULTED
+        return record
+
+    def log_error(self, line: int, code: int) -> None:
+        """Log a run-time error of the scan that is executed."""
+        add_error(LogEntry(line, code, self.present_scan), self.errors, self._under_way)
+
+    def clear_errors(self, *, inside: bool = False) -> None:
+        """Empty the error log, from ``inside`` a scan or as the operator does."""
+        self.errors = cleared_errors(self.errors, self._under_way, inside=inside)
+
+    def snapshot(self) -> list[Value]:
+        """Return the task's state as flat values, in the order of ``layout``."""
+        errors = self.errors if self._under_way is None else self._under_way.log or ErrorLog()
+        return [*self.compiled.layout.flatten(self.state), *errors.flatten()]
+
+    def restore(self, values: list[Value]) -> None:
+        """Take a snapshot over.
+
+        Raises:
+            ValueError: it does not fit the layout.
+        """
+        restored = self.compiled.layout.restore(values[:-LOG_NUMBERS])
+        self.errors.restore([int(number) for number in values[-LOG_NUMBERS:]])
+        self.state[:] = restored
+
+    def value(self, name: str) -> Value | list[Value]:
+        """Return a local, a tunable or a block's state by its name in the layout.
+
+        Raises:
+            KeyError: the layout has no such field.
+        """
+        return self.state[self.compiled.layout.index(name)]
+
+    def tune(self, name: str, value: object) -> None:
+        """Set a tunable, as the operator does (2.4.5).
+
+        Raises:
+            KeyError: the task has no tunable of that name.
+            ValueError: the value lies outside its limits or is not of its type.
+        """
+        position, fitting = self.compiled.layout.index(name), self.tuning(name, value)
+        self.state[position] = fitting
+        if self._under_way is not None:
+            self._under_way.state[position] = fitting
+
+    def tuning(self, name: str, value: object) -> int | float:
+        """Return what a tunable would hold if it were set to a value; nothing is set.
+
+        Raises:
+            KeyError: the task has no tunable of that name.
+            ValueError: the value lies outside its limits or is not of its type.
+        """
+        return tunable_value(self.compiled.program.symbols[name], name, value)
+
+    def hold(self, forces: Mapping[str, Value]) -> None:
+        """Hold these simple locals, and no others, at values of their types against every write of the task.
+
+        A scan that is under way in modeled time ends first, and as it began (decision). ``forces`` has what was asked
+        for, ``held`` what is heeded.
+        """
+        self.forces = dict(forces)
+        self._forces_wait = True
+        self.heed_forces()
+
+    def why_not_forced(self, name: str, scope: Scope) -> str | None:  # noqa: ARG002
+        """Return why a variable that the task declares in a scope cannot be forced, None where it can."""
+        return None
+
+    @property
+    def held(self) -> dict[str, Value]:
+        """The locals that the next scan finds held, with their values, by name."""
+        layout, state = self.compiled.layout, self._state
+        found: dict[str, Value] = {}
+        for name in sorted(self.compiled.held):
+            value = state[layout.index(name)]
+            assert not isinstance(value, list)
+            found[name] = value
+        return found
+
+    def lose_locals(self) -> None:
+        """Set the locals to their values at installation; what is forced keeps its value, tunables too."""
+        self.compiled.layout.lose_locals(self.state, self.forces)
+
+    def heed_forces(self) -> None:
+        """Scan from now on in the form that keeps the forced locals, which have their values; not amid a scan."""
+        if not self._forces_wait or self._under_way is not None:
+            return
+        self._forces_wait = False
+        self._put_down()
+        self.compiled = self.compiled.holding(frozenset(self.forces))
+        for name, value in self.forces.items():
+            self._state[self.compiled.layout.index(name)] = value
+
+    def _look_at_forces(self) -> None:
+        """Scan from now on in the form that heeds forces, or in the quick one."""
+        self._put_down()
+        self._forced = any(map(self.memory.is_forced, self.written))
+
+    def waiting(self) -> list[int]:
+        """Return, as numbers, what a suspended task waits for; a control-block task is never suspended."""
+        return []
+
+    def wait_again(self, numbers: Sequence[int]) -> None:
+        """Take over what ``waiting`` gave; ValueError where a task cannot wait for that."""
+        if numbers:
+            raise ValueError(f"task {self.name} cannot wait: only a BASIC task can")
+
+    def _put_down(self) -> None:
+        """Let the compiled scan store the state that it holds."""
+        if self._scans is not None:
+            self._scans.close()
+            self._scans = None
+
+    def _copy_arrays(self, state: StateValues) -> None:
+        """Give a copy of the state arrays of its own."""
+        for position in self._arrays:
+            array = state[position]
+            assert isinstance(array, list)
+            state[position] = array[:]
+
+    def _begins(self, now_ns: int) -> None:
+        """Begin a scan at an instant."""
+        self.memory.now_ns = now_ns
+
+    def _form_in_steps(self) -> ScanSteps:
+        """Return the compiled form of a scan in steps."""
+        return self.compiled.scan_steps_forced if self._forced else self.compiled.scan_steps
+
+    def _over(self, outcome: Any, began_ns: int) -> None:  # noqa: ARG002
+        """End a scan with what its compiled form returned, if that is not FALSE: TRUE if the task executed STOP."""
+        self.status = Status.ENDED
+
+    def _bind(self) -> None:
+        """Bind what scans touch: memory itself, or for modeled scans what is noted meanwhile."""
+        self._io, self._heard_io = self._make_io(self.memory, at_once), self._make_io(self._heard, self._heard.hear)
+        self._noting = self._io if isinstance(self._io, RecordingIo) else None
+
+    def _make_io(self, memory: ScanMemory, hear: Hear) -> TaskIo:
+        return RecordingIo(self, memory, hear) if self._recording else TaskIo(self, memory, hear)
+
+    def _begin_record(self, now_ns: int, skipped: int, io: TaskIo) -> ScanRecord | None:
+        """Return the new record of a scan, or None if none is kept."""
+        if not isinstance(io, RecordingIo):
+            return None
+        io.record = ScanRecord(now_ns, self.present_scan, skipped=skipped)
+        return io.record
+
+    def too_long(self, error: ScanTooLong) -> None:
+        """Fault the task for the scan that is executed."""
+        (self._io if self._under_way is None else self._heard_io).log(error.line, SCAN_TOO_LONG)
+        self.status = Status.FAULTED

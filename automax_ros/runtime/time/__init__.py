@@ -1,0 +1,1 @@
+"""The scheduler in integer nanoseconds, and what lets its time pass."""

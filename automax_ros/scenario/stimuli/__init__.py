@@ -1,0 +1,1 @@
+"""Stimuli files: entries by rack time, their verbs, waves."""

@@ -1,0 +1,272 @@
+"""How the verbs that operate a rack are read: force, tune, run, stop, reload, power and the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from automax_ros.core.diagnostics import SourceText
+from automax_ros.core.names import PREDEFINED, NameFault, element
+from automax_ros.core.text import did_you_mean, near_or_listed, quoted
+from automax_ros.core.types import DataType
+from automax_ros.core.values import value_of, wanted
+from automax_ros.core.yaml_text import Mapping as Keys
+from automax_ros.core.yaml_text import Node, Scalar, Sequence
+from automax_ros.rack.base.local_names import local_named
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.model.config import CommonElement
+from automax_ros.rackfile.model.value_names import common_named
+from automax_ros.rackfile.reading.files import FileFault, read_task_source, stays_next_to
+from automax_ros.rackfile.reading.values import (
+    Findings,
+    Section,
+    boolean_value,
+    entries_of,
+    is_plain_word,
+    kind_of,
+    text_value,
+    wrong_kind,
+)
+from automax_ros.runtime.tasks.task import Task
+from automax_ros.scenario.stimuli.actions import OnRack, OnTask, OnValue, Reload
+from automax_ros.scenario.stimuli.plant_verbs import control_verbs
+from automax_ros.scenario.stimuli.reading import Read, Verb, cut_short, named, time_of, value_for
+from automax_ros.scenario.stimuli.signals import RackSignals, Signal, local_signal
+from automax_ros.scenario.stimuli.stage import Action
+from automax_ros.scenario.stimuli.values import value_verbs
+
+ALL = "all"
+_PATH_LIMIT = 200
+
+
+def rack_verbs(rack: Rack, stimuli_file: Path, *, allow_outside: bool) -> Mapping[str, Verb]:
+    """Return all verbs of a rack. Sources to reload lie in the folder of the stimuli file or of the rack file."""
+    tasks = _Tasks(rack)
+    sources = _Sources(rack, stimuli_file, allow_outside)
+    operations = rack.operations
+    return {
+        **value_verbs(RackSignals(rack)),
+        "force": Verb(partial(_force, rack), everywhere=True),
+        "unforce": Verb(partial(_unforce, rack), everywhere=True),
+        "tune": Verb(tasks.tune),
+        "run": Verb(tasks.each(operations.run)),
+        "stop": Verb(tasks.each(operations.stop)),
+        "delete": Verb(tasks.each(operations.delete)),
+        "reload": Verb(sources.reload),
+        "run_all": Verb(_switch(operations.run_all)),
+        "stop_all": Verb(_switch(partial(operations.stop_all, "STOP ALL of the stimuli"))),
+        "clear_errors": Verb(tasks.each(operations.clear_errors, every=operations.clear_errors)),
+        "power": Verb(partial(_power, rack)),
+        **control_verbs(rack),
+    }
+
+
+def _switch(operation: Callable[[], None]) -> Read:
+    """Return the reader of a verb that takes ``true`` and nothing else."""
+
+    def read(node: Node, what: str, findings: Findings) -> list[Action]:
+        if boolean_value(node, what, findings) is False:
+            findings.add("AMX6736", f"{what} must be true: leave the entry out if it must not happen", node.span)
+        return [OnRack(operation)]
+
+    return read
+
+
+def names_of(node: Node, what: str, findings: Findings) -> list[Scalar]:
+    """Return the names of a list; one name needs no list."""
+    items = node.items if isinstance(node, Sequence) else (node,)
+    found = [item for item in items if isinstance(item, Scalar) and not item.is_null]
+    for item in items:
+        if not isinstance(item, Scalar) or item.is_null:
+            wrong_kind(item, what, "a name or a list of names", findings)
+    if not items:
+        findings.add("AMX6008", f"{what} names nothing", node.span)
+    return found
+
+
+@dataclass(frozen=True)
+class _Tasks:
+    rack: Rack
+
+    def task(self, key: Scalar, findings: Findings) -> Task | None:
+        """Return a task, None for one in another process of a distributed rack, which sees to it (decision)."""
+        name = findings.upper_case(key.text, key.span)
+        known = {task.name: task for task in self.rack.tasks}
+        if name not in known and not self.rack.part.is_elsewhere(name):
+            message = f"the rack has no task {quoted(key.text)}"
+            findings.add("AMX6739", message, key.span, near_or_listed(name, known))
+        return known.get(name)
+
+    def each(self, operation: Callable[[str], None], every: Callable[[], None] | None = None) -> Read:
+        """Return the reader of a verb on tasks; with ``every`` the word all means the whole rack."""
+
+        def read(node: Node, what: str, findings: Findings) -> list[Action]:
+            if every is not None and isinstance(node, Scalar) and node.text == ALL:
+                return [OnRack(every)]
+            tasks = [self.task(name, findings) for name in names_of(node, what, findings)]
+            return [OnTask(task.name, operation) for task in tasks if task is not None]
+
+        return read
+
+    def tune(self, node: Node, what: str, findings: Findings) -> list[Action]:
+        """Read names TASK.NAME with values."""
+        found = (self._tuned(key, value, findings) for key, value in named(node, what, findings))
+        return [item for item in found if item is not None]
+
+    def _tuned(self, key: Scalar, node: Node, findings: Findings) -> OnValue | None:
+        owner, dot, name = key.text.partition(".")
+        if not dot:
+            hint = "write TASK.NAME, such as SPEED.KP"
+            findings.add("AMX6741", f"{quoted(key.text)} is not a task and its tunable", key.span, hint)
+            return None
+        task = self.task(Scalar(owner.strip(), key.plain, key.span), findings)
+        return self._of_task(task, name, key, node, findings) if task is not None else None
+
+    def _of_task(self, task: Task, name: str, key: Scalar, node: Node, findings: Findings) -> OnValue | None:
+        tunables = {item.name: item for item in task.compiled.program.symbols.values() if item.tuning is not None}
+        try:
+            symbol = element(name, tunables, f"task {task.name} has no tunable").variable
+        except NameFault as fault:
+            findings.add("AMX6741", fault.message, key.span, fault.hint)
+            return None
+        value = value_of(node.text, symbol.type) if is_plain_word(node) else None
+        if value is None:
+            message = f"{task.name}.{symbol.name} cannot be {kind_of(node)}: it takes {wanted(symbol.type)}"
+            findings.add("AMX6736", message, node.span)
+            return None
+        try:
+            task.tuning(symbol.name, value)
+        except ValueError as error:
+            findings.add("AMX6741", f"task {task.name}: {error}", node.span)
+            return None
+        return OnValue(f"{task.name}.{symbol.name}", value, self.rack.adjust.tune)
+
+
+def _forceable(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
+    """Return a variable that may be forced: a simple one that is not a STRING."""
+    if "." in key.text:
+        return _local(rack, key, findings)
+    meant = _common(rack, key, findings)
+    return None if meant is None else RackSignals(rack).signal(meant)
+
+
+def _local(rack: Rack, key: Scalar, findings: Findings) -> Signal | None:
+    if rack.part.is_elsewhere(key.text.partition(".")[0].strip().upper()):
+        return None
+    try:
+        meant = local_named(rack.tasks, key.text)
+    except NameFault as fault:
+        findings.add("AMX6735", fault.message, key.span, cut_short(key.text) or fault.hint)
+        return None
+    if meant.why_not_forced is not None:
+        findings.add("AMX6737", f"{meant.label} cannot be forced: {meant.why_not_forced}", key.span)
+        return None
+    return local_signal(rack, meant)
+
+
+def _common(rack: Rack, key: Scalar, findings: Findings) -> CommonElement | None:
+    try:
+        meant = common_named(rack.config, key.text)
+    except NameFault as fault:
+        findings.add("AMX6735", fault.message, key.span, cut_short(key.text) or fault.hint)
+        return None
+    if meant.name in PREDEFINED:
+        findings.add("AMX6737", f"{meant.name} cannot be forced: the rack itself writes it", key.span)
+        return None
+    if meant.variable.is_array or meant.variable.type is DataType.STRING:
+        kind = "an element of an array" if meant.variable.is_array else "a STRING"
+        findings.add("AMX6737", f"{meant.label} is {kind}, which cannot be forced", key.span)
+        return None
+    return meant
+
+
+def _force(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+    found: list[Action] = []
+    for key, item in named(node, what, findings):
+        meant = _forceable(rack, key, findings)
+        value = value_for(item, meant, findings) if meant is not None else None
+        if meant is not None and value is not None:
+            found.append(OnValue(meant.label, value, rack.adjust.force))
+    return found
+
+
+def _unforce(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+    if isinstance(node, Scalar) and node.text == ALL:
+        return [OnRack(rack.adjust.unforce)]
+    variables = [_forceable(rack, name, findings) for name in names_of(node, what, findings)]
+    return [OnTask(item.label, partial(_release, rack)) for item in variables if item is not None]
+
+
+def _release(rack: Rack, name: str) -> None:
+    rack.adjust.unforce([name])
+
+
+@dataclass(frozen=True)
+class _Sources:
+    rack: Rack
+    stimuli_file: Path
+    allow_outside: bool
+
+    def reload(self, node: Node, what: str, findings: Findings) -> list[Action]:
+        """Read tasks with a file, or with ``file`` and ``keep_state``."""
+        tasks = _Tasks(self.rack)
+        found: list[Action] = []
+        for key, item in named(node, what, findings):
+            task = tasks.task(key, findings)
+            file, keep_state = self._file_and_state(item, f"{quoted(key.text)} of {what}", key, findings)
+            source = self._source(file, task, findings) if file is not None and task is not None else None
+            if task is not None and source is not None:
+                found.append(Reload(task.name, source, keep_state, self.rack))
+        return found
+
+    def _file_and_state(self, node: Node, what: str, key: Scalar, findings: Findings) -> tuple[Scalar | None, bool]:
+        if not isinstance(node, Keys):
+            return _file(node, what, findings), False
+        section = Section(node.entries, what, ("file", "keep_state"), findings)
+        section.require(("file",), what, key.span, findings)
+        file, keep = section.get("file"), section.get("keep_state")
+        keeps = boolean_value(keep, f"keep_state of {what}", findings) if keep is not None else False
+        return _file(file, f"file of {what}", findings) if file is not None else None, bool(keeps)
+
+    def _source(self, node: Scalar, task: Task, findings: Findings) -> SourceText | None:
+        """Return a source, read now: what is in the file later makes no difference (decision)."""
+        text, suffix = node.text, Path(self.rack.sources[task.name].name).suffix.upper()
+        if Path(text).suffix.upper() != suffix:
+            message = f"{quoted(text)} cannot replace task {task.name}, whose source is a {suffix} file"
+            findings.add("AMX6740", message, node.span)
+            return None
+        folders = (self.stimuli_file, self.rack.config.path)
+        inside = [file.parent / text for file in folders if self.allow_outside or stays_next_to(text, file)]
+        if not inside:
+            message = f"{quoted(text)} lies outside the folders of the stimuli file and of the rack file"
+            hint = "put it next to one of them, or allow it with --allow-outside"
+            findings.add("AMX6740", message, node.span, hint)
+            return None
+        path = next((path for path in inside if path.exists()), inside[0])
+        try:
+            return read_task_source(path)
+        except FileFault as fault:
+            near = did_you_mean(path.name, (item.name for item in sorted(path.parent.glob(f"*{path.suffix}"))))
+            findings.add("AMX6740", f"{quoted(text)} {fault}", node.span, near)
+            return None
+
+
+def _file(node: Node, what: str, findings: Findings) -> Scalar | None:
+    is_text = text_value(node, what, findings, limit=_PATH_LIMIT) is not None
+    return node if is_text and isinstance(node, Scalar) else None
+
+
+def _power(rack: Rack, node: Node, what: str, findings: Findings) -> list[Action]:
+    entries = entries_of(node, what, findings)
+    if entries is None:
+        return []
+    section = Section(entries, what, ("off_for", "battery"), findings)
+    section.require(("off_for",), what, node.span, findings)
+    off_for, battery = section.get("off_for"), section.get("battery")
+    off_ns = time_of(off_for, f"off_for of {what}", findings) if off_for is not None else None
+    good = boolean_value(battery, f"battery of {what}", findings) if battery is not None else True
+    if off_ns is None or good is None:
+        return []
+    return [OnRack(partial(rack.operations.power, off_ns, battery=good))]

@@ -1,0 +1,106 @@
+"""What readers of stimuli verbs share: names with values, times, values of signals, each checked where it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from automax_ros.core.faults import Fault
+from automax_ros.core.text import quoted
+from automax_ros.core.ticks import exact_ns
+from automax_ros.core.types import DataType, Value
+from automax_ros.core.values import value_of, value_text, wanted
+from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.rackfile.reading.values import (
+    Entry,
+    Findings,
+    entries_of,
+    is_plain_word,
+    kind_of,
+    number_hint,
+    report_twice,
+    text_value,
+    wrong_kind,
+)
+from automax_ros.scenario.stimuli.signals import Signal, Signals
+from automax_ros.scenario.stimuli.stage import Action
+
+Read = Callable[[Node, str, Findings], Sequence[Action]]
+"""Takes what stands after a verb, how to call it in messages, and whom to tell what is wrong with it."""
+
+
+@dataclass(frozen=True)
+class Verb:
+    """How a verb is read; ``is_value`` where it only writes values, ``everywhere`` as ``Stimulus`` has it."""
+
+    read: Read
+    is_value: bool = False
+    everywhere: bool = False
+
+
+def named(node: Node, what: str, findings: Findings) -> Iterator[Entry]:
+    """Yield names with what stands after each; a name that stands twice is reported, as is a verb without any.
+
+    What YAML has cut off a name at a comma is passed over: the beginning of the name is reported.
+    """
+    entries = entries_of(node, what, findings)
+    if entries == ():
+        findings.add("AMX6008", f"{what} names nothing", node.span)
+    first: dict[str, Scalar] = {}
+    for key, value in entries or ():
+        name = "".join(key.text.split()).upper()
+        if ")" in name and "(" not in name:
+            continue
+        if name in first:
+            report_twice(key, f"{quoted(key.text)} of {what}", first[name].span, findings)
+        else:
+            first[name] = key
+            yield key, value
+
+
+def signal_of(key: Scalar, signals: Signals, findings: Findings) -> Signal | None:
+    """Return the signal that a key names."""
+    try:
+        return signals.find(key.text)
+    except Fault as fault:
+        findings.add("AMX6735", fault.message, key.span, cut_short(key.text) or fault.hint)
+        return None
+
+
+def cut_short(name: str) -> str | None:
+    """Return what to do about a name that YAML has cut at a comma between its subscripts."""
+    if ("(" in name) == (")" in name):
+        return None
+    return 'a name with several subscripts needs quotes here: "DIAG%(1,0)"'
+
+
+def value_for(node: Node, signal: Signal, findings: Findings) -> Value | None:
+    """Return the value that a node gives a signal, as it would hold it; None where there was something to report."""
+    if signal.type is DataType.STRING:
+        text = text_value(node, signal.label, findings, limit=1000)
+        if text is None:
+            return None
+        value = value_of(text, signal.type, signal.length)
+    else:
+        value = value_of(node.text, signal.type) if is_plain_word(node) else None
+    if value is None:
+        message = f"{signal.label} cannot be {kind_of(node)}: it takes {wanted(signal.type, signal.length)}"
+        findings.add("AMX6736", message, node.span, number_hint(node))
+        return None
+    if not isinstance(value, str) and not signal.low <= value <= signal.high:
+        limits = f"{value_text(signal.low)} to {value_text(signal.high)}"
+        findings.add("AMX6736", f"{signal.label} cannot be {value_text(value)}: its limits are {limits}", node.span)
+        return None
+    return value
+
+
+def time_of(node: Node, what: str, findings: Findings) -> int | None:
+    """Return a time in seconds as ns, exactly as it is written."""
+    if not is_plain_word(node):
+        wrong_kind(node, what, "a time in seconds", findings, number_hint(node))
+        return None
+    try:
+        return exact_ns(node.text)
+    except ValueError as error:
+        findings.add("AMX6734", f"{what}: {error}", node.span)
+        return None

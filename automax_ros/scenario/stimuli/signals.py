@@ -1,0 +1,115 @@
+"""What stimuli can write: single values by name, of a rack or of a lone task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+from automax_ros.core.names import PREDEFINED, NameFault
+from automax_ros.core.types import DataType, Value
+from automax_ros.rack.base.local_names import LocalElement
+from automax_ros.rack.rack import Rack
+from automax_ros.rackfile.model.config import CommonElement
+from automax_ros.rackfile.model.value_names import common_named
+from automax_ros.rackfile.model.writers import OPERATOR_WRITER
+from automax_ros.runtime.tasks.standalone_task import LoneTask
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A simple variable or an element of an array, with how to read and how to write it.
+
+    ``label`` is its full name; ``length`` is the most characters of a STRING; ``low`` and ``high`` are the limits of a
+    number. ``set`` and ``write`` take a value of its type within them. ``set`` is what a person does: it raises
+    OperationRefused where it cannot be done now. ``write`` is what an instrument does: a force makes it do nothing.
+    """
+
+    label: str
+    type: DataType
+    length: int
+    low: float
+    high: float
+    read: Callable[[], Value]
+    set: Callable[[Value], None]
+    write: Callable[[Value], None]
+
+
+class Signals(Protocol):
+    """Finds signals by name. ``word`` says whose they are: ``rack`` or ``task``."""
+
+    @property
+    def word(self) -> str: ...  # noqa: D102
+
+    def find(self, name: str) -> Signal:
+        """Return what a name such as ``REF%`` or ``TABLE%(3)`` means.
+
+        Raises:
+            NameFault: there is no such simple variable or element, or stimuli may not write it.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class RackSignals:
+    """The commons of a rack: plain ones, points of modules, elements of arrays."""
+
+    rack: Rack
+    word = "rack"
+
+    def find(self, name: str) -> Signal:
+        """Return a common, or an element of one; what the rack itself writes is refused (2.4.6)."""
+        meant = common_named(self.rack.config, name)
+        if meant.name in PREDEFINED:
+            raise NameFault(f"{meant.name} cannot be written: the rack itself writes it", "leave it out")
+        return self.signal(meant)
+
+    def signal(self, meant: CommonElement) -> Signal:
+        """Return a common, or an element of one."""
+        variable = meant.variable
+        view = self.rack.memory.view(variable.name)
+        return Signal(
+            meant.label,
+            variable.type,
+            variable.length,
+            *variable.type.range,
+            partial(self.rack.memory.read_now, view, meant.index),
+            partial(self.rack.adjust.write, meant.label),
+            partial(self._write, meant, view),
+        )
+
+    def _write(self, meant: CommonElement, view: int, value: Value) -> None:
+        """Write a sample; without power the rack takes none but for inputs, which are the process's (decision)."""
+        if not self.rack.operations.powered and not self.rack.config.is_input(meant.variable):
+            return
+        self.rack.write_view(view, [(meant.index, value)], OPERATOR_WRITER)
+
+
+def local_signal(rack: Rack, meant: LocalElement) -> Signal:
+    """Return a simple local of a task, which can be set in no way but by a force."""
+    kind = meant.symbol.type
+    force = partial(rack.adjust.force, meant.label)
+    return Signal(meant.label, kind, 0, *kind.range, partial(_present, meant), force, force)
+
+
+def _present(meant: LocalElement) -> Value:
+    value = meant.task.value(meant.symbol.name)
+    return value[meant.element.index] if isinstance(value, list) else value
+
+
+@dataclass(frozen=True)
+class LoneSignals:
+    """The variables of a task without a rack: commons, locals, and tunables within their limits."""
+
+    lone: LoneTask
+    word = "task"
+
+    def find(self, name: str) -> Signal:
+        """Return a variable of the task, or an element of one."""
+        found = self.lone.variable(name)
+        symbol = found.symbol
+        low, high = symbol.type.range
+        if symbol.tuning is not None:
+            low, high = float(symbol.tuning.low), float(symbol.tuning.high)
+        return Signal(found.label, symbol.type, symbol.length, low, high, found.read, found.write, found.write)

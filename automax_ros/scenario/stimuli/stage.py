@@ -1,0 +1,137 @@
+"""What stimuli are made of and what they act on: entries of a file, their actions, the waves that drive signals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from automax_ros.core.types import Value
+from automax_ros.runtime.time.scheduler import EventClass, EventKey, ScheduledEvent, Scheduler
+from automax_ros.scenario.stimuli.signals import Signal
+from automax_ros.scenario.stimuli.waves import SAMPLE_NS, Wave
+
+
+class Action(Protocol):
+    """One thing that an entry does. ``of`` is what it concerns: a variable, a task, a slot; "" for the whole rack."""
+
+    @property
+    def of(self) -> str: ...  # noqa: D102
+
+    def do(self, stage: Stage, /) -> None:
+        """Do it, at the scheduler's present.
+
+        Raises:
+            OperationRefused: it cannot be done now; the text says why.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """An entry of a stimuli file: at a rack time, a verb with its actions. ``line`` is where it stands.
+
+    ``is_value`` is TRUE for verbs that only write values, as the process does; the others operate the rack.
+    ``everywhere`` is TRUE where it writes the same in every process of a distributed rack.
+    """
+
+    at_ns: int
+    verb: str
+    line: int
+    actions: tuple[Action, ...]
+    is_value: bool
+    everywhere: bool = False
+
+
+class Stage:
+    """Time, and the waves that drive signals: at most one each, the latest.
+
+    ``is_sampling`` is TRUE while a wave writes a value.
+    """
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        """Take whose time it is."""
+        self.scheduler = scheduler
+        self.is_sampling = False
+        self._driven: dict[str, list[ScheduledEvent]] = {}
+        self._count = 0
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether a wave still runs."""
+        return bool(self._driven)
+
+    def set(self, signal: Signal, value: Value) -> None:
+        """Write a value; a wave that drove the signal ends.
+
+        Raises:
+            OperationRefused: it cannot be written now.
+        """
+        self.rest(signal)
+        signal.set(value)
+
+    def drive(self, signal: Signal, wave: Wave) -> None:
+        """Let a wave drive a signal from now on, in place of one that does.
+
+        A sample is written where it differs from what is there, so a task that writes the signal does not keep it.
+        """
+        self.rest(signal)
+        scheduler = self.scheduler
+        began, start = scheduler.now_ns, signal.read()
+        self._sample(signal, wave.value(0, start))
+        if wave.for_ns == 0:
+            return
+        key = self._key()
+
+        def end(_: int) -> None:
+            self.rest(signal)
+            last = wave.last()
+            if last is not None:
+                self._sample(signal, last)
+
+        def sample(now_ns: int, _: int) -> None:
+            self._sample(signal, wave.value(now_ns - began, start))
+
+        events = [] if wave.for_ns is None else [scheduler.at(began + wave.for_ns, key, end)]
+        events.append(scheduler.every(SAMPLE_NS, began + SAMPLE_NS, key, sample))
+        self._driven[signal.label] = events
+
+    def rest(self, signal: Signal) -> None:
+        """End the wave that drives a signal, if one does; its value stays."""
+        for event in self._driven.pop(signal.label, ()):
+            event.cancel()
+
+    def _sample(self, signal: Signal, value: Value) -> None:
+        if signal.read() != value:
+            self.is_sampling = True
+            try:
+                signal.write(value)
+            finally:
+                self.is_sampling = False
+
+    def _key(self) -> EventKey:
+        """Return the place of an event's samples: what began first comes first."""
+        self._count += 1
+        return EventKey(EventClass.OUTSIDE, _BEGUN, f"{self._count:09d}")
+
+
+_BEGUN = 0
+"""Priority, among what comes from outside at one instant, of what earlier entries began: samples of waves."""
+ENTRIES = 1
+"""Priority of entries: after what earlier entries began (decision), before all else."""
+
+
+@dataclass(frozen=True)
+class Happened:
+    """What came of an action: ``what`` is the verb, ``why`` says why it was refused where ``ok`` is FALSE."""
+
+    at_ns: int
+    what: str
+    of: str
+    ok: bool = True
+    why: str = ""
+
+
+def in_time(stimuli: Sequence[Stimulus]) -> list[Stimulus]:
+    """Return entries in the order of time; those of one instant keep the order of the file."""
+    return sorted(stimuli, key=lambda item: item.at_ns)

@@ -1,0 +1,193 @@
+"""The verbs that write values, as the process does: set, ramp, sine, square. A rack has them, and a task alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from automax_ros.core.diagnostics import Span
+from automax_ros.core.text import quoted
+from automax_ros.core.types import DataType, Value
+from automax_ros.core.values import value_text
+from automax_ros.core.yaml_text import Node, Scalar
+from automax_ros.rackfile.reading.values import Findings, Section, entries_of, number_value
+from automax_ros.scenario.stimuli.reading import Verb, named, signal_of, time_of, value_for
+from automax_ros.scenario.stimuli.signals import Signal, Signals
+from automax_ros.scenario.stimuli.stage import Action, Stage, Stimulus
+from automax_ros.scenario.stimuli.waves import MOST_HZ, Ramp, Sine, Square, Wave
+
+LEAST_HZ = 0.0001
+"""Lowest frequency (decision: slower is a ramp)."""
+
+
+@dataclass(frozen=True)
+class SetValue:
+    """Writes a value once."""
+
+    signal: Signal
+    value: Value
+
+    @property
+    def of(self) -> str:
+        """The signal's name."""
+        return self.signal.label
+
+    def do(self, stage: Stage) -> None:
+        """Write it."""
+        stage.set(self.signal, self.value)
+
+
+@dataclass(frozen=True)
+class DriveSignal:
+    """Lets a wave drive a signal."""
+
+    signal: Signal
+    wave: Wave
+
+    @property
+    def of(self) -> str:
+        """The signal's name."""
+        return self.signal.label
+
+    def do(self, stage: Stage) -> None:
+        """Begin."""
+        stage.drive(self.signal, self.wave)
+
+
+def goes_on_for_ever(stimuli: Iterable[Stimulus]) -> bool:
+    """Return whether one of the entries begins a wave without an end."""
+    actions = (action for entry in stimuli for action in entry.actions)
+    return any(isinstance(action, DriveSignal) and action.wave.for_ns is None for action in actions)
+
+
+def value_verbs(signals: Signals) -> Mapping[str, Verb]:
+    """Return the verbs for the signals of a rack or of a task."""
+
+    def read_set(node: Node, what: str, findings: Findings) -> list[Action]:
+        found: list[Action] = []
+        for key, item in named(node, what, findings):
+            signal = signal_of(key, signals, findings)
+            value = value_for(item, signal, findings) if signal is not None else None
+            if signal is not None and value is not None:
+                found.append(SetValue(signal, value))
+        return found
+
+    return {
+        "set": Verb(read_set, is_value=True),
+        "ramp": Verb(_wave_reader(signals, ("to", "over"), _ramp), is_value=True),
+        "sine": Verb(_wave_reader(signals, ("mean", "amplitude", "hz", "for"), _sine), is_value=True),
+        "square": Verb(_wave_reader(signals, ("low", "high", "hz", "for"), _square), is_value=True),
+    }
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What stands after a signal's name: keys of a wave, at a place, called ``what`` in messages."""
+
+    signal: Signal
+    section: Section
+    what: str
+    span: Span
+    findings: Findings
+
+    def requires(self, *keys: str) -> bool:
+        return self.section.require(keys, self.what, self.span, self.findings)
+
+    def time(self, key: str) -> int | None:
+        node = self.section.get(key)
+        return time_of(node, f"{key} of {self.what}", self.findings) if node is not None else None
+
+    def level(self, key: str) -> Value | None:
+        node = self.section.get(key)
+        return value_for(node, self.signal, self.findings) if node is not None else None
+
+    def refuse(self, code: str, message: str, key: str) -> None:
+        self.findings.add(code, f"{self.what}: {message}", self.section.key_span(key))
+
+    @property
+    def hz(self) -> Fraction | None:
+        node = self.section.get("hz")
+        if node is None:
+            return None
+        what = f"hz of {self.what}"
+        found = number_value(node, what, self.findings, low=LEAST_HZ, high=MOST_HZ, code="AMX6738")
+        return Fraction(node.text) if found is not None and isinstance(node, Scalar) else None
+
+
+def _wave_reader(
+    signals: Signals, keys: tuple[str, ...], read: Callable[[_Shape], Wave | None]
+) -> Callable[[Node, str, Findings], list[Action]]:
+    def read_waves(node: Node, what: str, findings: Findings) -> list[Action]:
+        waves = ((shape.signal, read(shape)) for shape in _shapes(node, what, signals, keys, findings))
+        return [DriveSignal(signal, wave) for signal, wave in waves if wave is not None]
+
+    return read_waves
+
+
+def _shapes(node: Node, what: str, signals: Signals, keys: tuple[str, ...], findings: Findings) -> Iterator[_Shape]:
+    for key, item in named(node, what, findings):
+        signal = signal_of(key, signals, findings)
+        entries = entries_of(item, f"{quoted(key.text)} of {what}", findings)
+        if signal is not None and entries is not None:
+            name = f"{what} of {signal.label}"
+            yield _Shape(signal, Section(entries, name, keys, findings), name, key.span, findings)
+
+
+def _is_number(shape: _Shape) -> bool:
+    kind = shape.signal.type
+    if not kind.is_numeric:
+        message = f"{shape.what} needs a number; {shape.signal.label} is a {kind.word}"
+        shape.findings.add("AMX6737", message, shape.span)
+    return kind.is_numeric
+
+
+def _ramp(shape: _Shape) -> Ramp | None:
+    if not _is_number(shape) or not shape.requires("to", "over"):
+        return None
+    to, over = shape.level("to"), shape.time("over")
+    if to is None or over is None or isinstance(to, str):
+        return None
+    return Ramp(shape.signal.type, to, over)
+
+
+def _sine(shape: _Shape) -> Sine | None:
+    """Read a sine; without ``mean`` it is around 0, without ``for`` it has no end (decision)."""
+    if not _is_number(shape) or not shape.requires("amplitude", "hz"):
+        return None
+    mean = _real(shape, "mean") if "mean" in shape.section else 0.0
+    amplitude, hz, for_ns = _real(shape, "amplitude"), shape.hz, shape.time("for")
+    if mean is None or amplitude is None or hz is None or (for_ns is None and "for" in shape.section):
+        return None
+    signal = shape.signal
+    low, high = mean - abs(amplitude), mean + abs(amplitude)
+    if not signal.low <= low <= high <= signal.high:
+        limits = f"{value_text(signal.low)} to {value_text(signal.high)}"
+        shape.refuse("AMX6738", f"it goes from {low:g} to {high:g}; {signal.label} takes {limits}", "amplitude")
+        return None
+    return Sine(signal.type, mean, amplitude, hz, for_ns)
+
+
+def _square(shape: _Shape) -> Square | None:
+    """Read a square; a BOOLEAN goes between FALSE and TRUE where the file gives no levels."""
+    kind = shape.signal.type
+    if kind is DataType.STRING:
+        shape.findings.add("AMX6737", f"{shape.what} needs two levels; a STRING has none", shape.span)
+        return None
+    levels = () if kind is DataType.BOOLEAN else ("low", "high")
+    if not shape.requires(*levels, "hz"):
+        return None
+    low = shape.level("low") if "low" in shape.section else False
+    high = shape.level("high") if "high" in shape.section else True
+    hz, for_ns = shape.hz, shape.time("for")
+    if low is None or high is None or hz is None or (for_ns is None and "for" in shape.section):
+        return None
+    return Square(low, high, hz, for_ns)
+
+
+def _real(shape: _Shape, key: str) -> float | None:
+    node = shape.section.get(key)
+    limit = float(DataType.REAL.range[1])
+    if node is None:
+        return None
+    return number_value(node, f"{key} of {shape.what}", shape.findings, low=-limit, high=limit, code="AMX6738")
