@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 COLCON = ROOT / "colcon"
 LINKS = {"LICENSE", "automax_ros", "config", "examples", "launch"}
 """What colcon/ shows of the repository's own folder."""

@@ -21,7 +21,7 @@ import automax_ros
 from automax_ros.ros.setup import environment
 from automax_ros.ros.setup.environment import RosUnavailable, wheels_installed
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "automax_ros"
 MESSAGES = sorted(path.stem for path in (ROOT / "msg_defs" / "msg").glob("*.msg"))
 

@@ -9,7 +9,7 @@ import shutil
 import signal
 
 import pytest
-from pieces.clusters import cluster
+from parallel.clusters import cluster
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
@@ -22,10 +22,9 @@ from automax_ros.replay.columns.forms import ColumnForms
 from automax_ros.replay.engine import Replay, ReplayOptions
 from automax_ros.replay.part import Part
 from automax_ros.replay.side_by_side import parts_of, replay_side_by_side
-
-from .replays import SPEED, WORK, YAML, edited, record, recorded, rewritten
-from .test_operated_rack import LISTEN, make, operate
-from .test_operated_rack import WORK as OPERATED_WORK
+from replay.replays import SPEED, WORK, YAML, edited, record, recorded, rewritten
+from replay.test_operated_rack import LISTEN, make, operate
+from replay.test_operated_rack import WORK as OPERATED_WORK
 
 QUARTERS = RecordingOptions(split_ns=NS_PER_S // 4)
 """Eight files of two seconds."""

@@ -10,8 +10,7 @@ from automax_ros.core.faults import Fault
 from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.sweep.measures import FUNCTIONS, MOST_MEASURES, Measure, Subject, read_measures
-
-from .helpers import rack_in
+from sweep.helpers import rack_in
 
 
 @pytest.fixture(scope="module")

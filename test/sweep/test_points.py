@@ -12,10 +12,9 @@ from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.sweep import points
 from automax_ros.sweep.points import grid, read_varied, sample
+from sweep.helpers import rack_in
 
-from .helpers import rack_in
-
-DRIVE = Path(__file__).parent.parent.parent / "config" / "dc_drive" / "rack.yaml"
+DRIVE = Path(__file__).parents[2] / "config" / "dc_drive" / "rack.yaml"
 
 
 @pytest.fixture(scope="module")

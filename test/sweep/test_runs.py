@@ -13,10 +13,9 @@ from automax_ros.rackfile.loader import load
 from automax_ros.sweep.points import grid, read_varied
 from automax_ros.sweep.run import Outcome, Stimuli, run_point, run_points
 from automax_ros.sweep.sweeping import best_rows, run_sweep
+from sweep.helpers import plan_of, rack_in
 
-from .helpers import plan_of, rack_in
-
-DRIVE = Path(__file__).parent.parent.parent / "config" / "dc_drive" / "rack.yaml"
+DRIVE = Path(__file__).parents[2] / "config" / "dc_drive" / "rack.yaml"
 MEASURES = (
     "rms(ERR%) mean(FDBK%, from=0.02) max(ERR%, from=0.0105 to=0.05) settle(FDBK%, 2 %) rise(FDBK%) overshoot(FDBK%)"
     " itae(ERR%) count(NEAR@) time(NEAR@, from=0.0305) final(TABLE%(1)) errors(LOOP) stopped"

@@ -5,14 +5,13 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("distributed", reason="the extra automax_ros[cluster] is not installed")
-from pieces.clusters import cluster
+from parallel.clusters import cluster
 
 from automax_ros.parallel.job import Where
 from automax_ros.sweep.points import grid, read_varied
 from automax_ros.sweep.run import Stimuli
 from automax_ros.sweep.sweeping import run_sweep
-
-from .helpers import plan_of, rack_in
+from sweep.helpers import plan_of, rack_in
 
 
 def test_rows_are_those_of_one_process(tmp_path: Path):

@@ -11,8 +11,7 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.sweep.blueprint import Blueprint
 from automax_ros.sweep.measures import read_measures
 from automax_ros.sweep.watching import Watch
-
-from .helpers import rack_in
+from sweep.helpers import rack_in
 
 LENGTH_MS = 40
 
