@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from automax_ros.core import compiled
 
 if TYPE_CHECKING:
-    from automax_ros.parallel.job import Where as Where
+    from automax_ros.parallel.job import Workers as Workers
     from automax_ros.rack.base.observers import RackObserver as RackObserver
     from automax_ros.rack.base.stop_cause import OperationRefused as OperationRefused
     from automax_ros.rack.rack import Rack as Rack
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from automax_ros.ros.setup.environment import prepare as prepare
     from automax_ros.scenario.report import report_of as report_of
     from automax_ros.scenario.stepping.stepper import Stepper as Stepper
-    from automax_ros.scenario.stimuli.player import Stimulation as Stimulation
+    from automax_ros.scenario.stimuli.player import StimuliPlayer as StimuliPlayer
     from automax_ros.scenario.stimuli.reader import read_for_rack as read_for_rack
 
 __version__ = "0.1.0"
@@ -35,8 +35,8 @@ _HOMES = {
     "RackNodes": "ros.rack_nodes",
     "RackObserver": "rack.base.observers",
     "Stepper": "scenario.stepping.stepper",
-    "Stimulation": "scenario.stimuli.player",
-    "Where": "parallel.job",
+    "StimuliPlayer": "scenario.stimuli.player",
+    "Workers": "parallel.job",
     "load": "rackfile.loader",
     "prepare": "ros.setup.environment",
     "read_for_rack": "scenario.stimuli.reader",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.parallel.job import MOST_TRIES, Piece, Where, usable_cores
+from automax_ros.parallel.job import MOST_TRIES, Job, Workers, usable_cores
 from automax_ros.parallel.run import run_pieces
 from parallel import works
 
@@ -18,7 +18,7 @@ PATIENCE_S = 240
 
 
 def squares(count):
-    return [Piece(f"square {number}", works.squared, (number,)) for number in range(count)]
+    return [Job(f"square {number}", works.squared, (number,)) for number in range(count)]
 
 
 def is_gone(pid):
@@ -38,7 +38,7 @@ def wait_until(holds):
 @pytest.mark.parametrize("jobs", [1, 2, 5])
 def test_results_come_in_the_order_of_the_pieces_and_each_is_told_once(jobs):
     told = []
-    done = run_pieces(squares(20), Where(jobs), told.append)
+    done = run_pieces(squares(20), Workers(jobs), told.append)
     assert [item.result for item in done] == [number**2 for number in range(20)]
     assert [item.piece.name for item in done] == [f"square {number}" for number in range(20)]
     assert sorted(item.piece.name for item in told) == sorted(item.piece.name for item in done)
@@ -46,13 +46,13 @@ def test_results_come_in_the_order_of_the_pieces_and_each_is_told_once(jobs):
 
 
 def test_nothing_is_begun_where_there_is_nothing_to_do():
-    assert run_pieces([], Where(4)) == []
-    assert run_pieces([], Where(scheduler="tcp://nobody:1")) == []
+    assert run_pieces([], Workers(4)) == []
+    assert run_pieces([], Workers(scheduler="tcp://nobody:1")) == []
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_an_error_is_the_fault_of_its_piece_alone(jobs):
-    done = run_pieces([Piece(f"1/{n}", works.divided, (n,)) for n in (2, 0, 4)], Where(jobs))
+    done = run_pieces([Job(f"1/{n}", works.divided, (n,)) for n in (2, 0, 4)], Workers(jobs))
     assert [item.result for item in done] == [0.5, None, 0.25]
     fault = done[1].fault
     assert fault is not None
@@ -62,36 +62,36 @@ def test_an_error_is_the_fault_of_its_piece_alone(jobs):
 
 
 def test_two_jobs_are_two_other_processes():
-    found = {item.result for item in run_pieces([Piece(str(n), works.own_process, (n,)) for n in range(40)], Where(2))}
+    found = {item.result for item in run_pieces([Job(str(n), works.own_process, (n,)) for n in range(40)], Workers(2))}
     assert len(found) == 2
     assert os.getpid() not in found
     wait_until(lambda: all(map(is_gone, found)))
 
 
 def test_one_job_is_this_process():
-    (done,) = run_pieces([Piece("here", works.own_process, (0,))], Where(1))
+    (done,) = run_pieces([Job("here", works.own_process, (0,))], Workers(1))
     assert done.result == os.getpid()
 
 
 def test_a_result_that_cannot_be_sent_is_a_fault_of_the_piece():
-    done = run_pieces([Piece("odd", works.unlike_any, (0,)), *squares(2)], Where(2))
+    done = run_pieces([Job("odd", works.unlike_any, (0,)), *squares(2)], Workers(2))
     assert done[0].fault is not None
     assert "pickle" in done[0].fault.message
     assert [item.result for item in done[1:]] == [0, 1]
 
 
 def test_a_worker_that_dies_costs_its_piece_a_second_try_and_no_other_piece_anything(tmp_path):
-    pieces = [Piece(f"piece {n}", works.killed, (str(tmp_path), n, 1 if n == 3 else 0)) for n in range(8)]
+    pieces = [Job(f"piece {n}", works.killed, (str(tmp_path), n, 1 if n == 3 else 0)) for n in range(8)]
     told = []
-    done = run_pieces(pieces, Where(2), told.append)
+    done = run_pieces(pieces, Workers(2), told.append)
     assert [item.result for item in done] == list(range(8))
     assert len(told) == 8
     assert [len((tmp_path / str(n)).read_text().split()) for n in range(8)] == [1, 1, 1, 2, 1, 1, 1, 1]
 
 
 def test_a_piece_that_kills_its_workers_is_named_and_not_tried_again(tmp_path):
-    pieces = [Piece(f"piece {n}", works.killed, (str(tmp_path), n, 99 if n in {0, 3} else 0)) for n in range(5)]
-    done = run_pieces(pieces, Where(2))
+    pieces = [Job(f"piece {n}", works.killed, (str(tmp_path), n, 99 if n in {0, 3} else 0)) for n in range(5)]
+    done = run_pieces(pieces, Workers(2))
     assert [item.result for item in done] == [None, 1, 2, None, 4]
     for number in (0, 3):
         fault = done[number].fault
@@ -103,15 +103,15 @@ def test_a_piece_that_kills_its_workers_is_named_and_not_tried_again(tmp_path):
 
 
 def test_what_is_under_way_is_given_up_when_it_shall_stop(tmp_path):
-    pieces = [*squares(1), *(Piece(f"long {n}", works.long, (str(tmp_path), n)) for n in range(3))]
-    done = run_pieces(pieces, Where(2), should_stop=lambda: len(list(tmp_path.iterdir())) == 2)
+    pieces = [*squares(1), *(Job(f"long {n}", works.long, (str(tmp_path), n)) for n in range(3))]
+    done = run_pieces(pieces, Workers(2), should_stop=lambda: len(list(tmp_path.iterdir())) == 2)
     assert [item.result for item in done] == [0]
     assert all(is_gone(int(file.read_text())) for file in tmp_path.iterdir())
 
 
 def test_one_job_stops_between_two_pieces():
     told = []
-    assert len(run_pieces(squares(9), Where(1), told.append, lambda: len(told) == 4)) == 4
+    assert len(run_pieces(squares(9), Workers(1), told.append, lambda: len(told) == 4)) == 4
 
 
 def test_an_error_of_the_one_who_is_told_ends_all(tmp_path):
@@ -122,9 +122,9 @@ def test_an_error_of_the_one_who_is_told_ends_all(tmp_path):
         wait_until(lambda: (tmp_path / "7").exists() and (tmp_path / "7").read_text())
         raise Enough
 
-    pieces = [Piece("long", works.long, (str(tmp_path), 7)), *squares(3)]
+    pieces = [Job("long", works.long, (str(tmp_path), 7)), *squares(3)]
     with pytest.raises(Enough):
-        run_pieces(pieces, Where(2), told)
+        run_pieces(pieces, Workers(2), told)
     assert is_gone(int((tmp_path / "7").read_text()))
 
 
@@ -199,11 +199,11 @@ def test_no_module_is_taken_from_the_folder_in_which_a_worker_begins(tmp_path, m
     (tmp_path / "pickle.py").write_text("raise SystemExit(1)")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [item for item in sys.path if item] + [str(ROOT)])
-    assert [item.result for item in run_pieces(squares(3), Where(2))] == [0, 1, 4]
+    assert [item.result for item in run_pieces(squares(3), Workers(2))] == [0, 1, 4]
 
 
 def test_jobs_are_at_least_one_and_by_default_as_many_as_cores():
     with pytest.raises(ValueError, match="0 jobs: at least 1"):
-        Where(0)
-    assert Where(None).processes == usable_cores() >= 1
-    assert Where().processes == 1
+        Workers(0)
+    assert Workers(None).processes == usable_cores() >= 1
+    assert Workers().processes == 1

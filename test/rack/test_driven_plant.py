@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from rack.helpers import good
@@ -92,7 +92,7 @@ def test_what_breaks_stops_the_drive(tmp_path, verb, value, output):
     rack.run(0.6)
     assert rack.value("STATE@")
     assert not rack.value(output)
-    Controls(rack).plant("UNWIND", verb, value)
+    SwitchOperations(rack).plant("UNWIND", verb, value)
     rack.run(1.0)
     assert not rack.value("STATE@")
     assert rack.value(output)
@@ -121,7 +121,7 @@ def test_a_rack_that_is_cut_goes_on_bit_for_bit(tmp_path, cut_us):
                     rack.write("RUN@", value=True)
                 else:
                     value = {"open_gate": "4", "line_sag": "80 0.05"}[moves[until_us]]
-                    Controls(rack).plant("UNWIND", moves[until_us], value)
+                    SwitchOperations(rack).plant("UNWIND", moves[until_us], value)
     assert whole.state() == later.state()
     assert whole.value("STATE@")
 

@@ -11,7 +11,7 @@ from automax_ros.core.types import Value
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.memory.views import WriteGroup
 from automax_ros.runtime.tasks.task import ScanRecord, Status, Task
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 
 MS = 1_000_000
 
@@ -46,7 +46,7 @@ class Log:
         return [(time, value) for time, label, value in self.writes if label == name]
 
 
-def played(folder: Path, text: str, seconds: float) -> tuple[Rack, Log, Stimulation]:
+def played(folder: Path, text: str, seconds: float) -> tuple[Rack, Log, StimuliPlayer]:
     rack = rack_in(folder)
     log = Log(rack)
     stimulation = playing(rack, folder, text)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.core.diagnostics import SourceText
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.rackfile.loader import load, load_stored
 from automax_ros.rackfile.model.config import RackConfig
 from automax_ros.rackfile.model.plants import PlantConfig
@@ -78,12 +78,12 @@ def test_limits_are_those_of_the_rack_file(config: RackConfig):
     ],
 )
 def test_what_is_no_number_of_a_plant_is_refused(config: RackConfig, path: str, message: str, hint: str | None):
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(UserError) as caught:
         plant_number(config, path)
     assert caught.value.message == message
     assert hint is None or caught.value.hint == hint
 
 
 def test_the_plate_of_a_motor_that_has_a_name_does_not_vary(config: RackConfig):
-    with pytest.raises(Fault, match="cannot vary"):
+    with pytest.raises(UserError, match="cannot vary"):
         with_numbers(config.text, {plant_number(config, "MOTOR.motor.hp"): "150"})

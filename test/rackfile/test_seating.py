@@ -13,7 +13,7 @@ from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.rackfile.processes import HOME, NoSuchSeat, _groups, seat_named, seats_of
+from automax_ros.rackfile.processes import HOME, NoSuchSeat, _groups, processes_of, seat_named
 
 ROOT = Path(__file__).parents[2]
 IDLE = "10 CALL SCAN_LOOP(TICKS=2)\n20 END\n"
@@ -37,7 +37,7 @@ def config_of(folder: Path, slots: str, more: str = "", **sources: str) -> RackC
 
 
 def slots_of(config: RackConfig) -> list[tuple[int, ...]]:
-    return [seat.slots for seat in seats_of(config)]
+    return [seat.slots for seat in processes_of(config)]
 
 
 def processors(**tasks: str) -> str:
@@ -53,17 +53,17 @@ def test_modules_that_meet_at_registers_alone_are_a_process_each(tmp_path):
     slots = processors(ONE="ONE.BLK", TWO="TWO.BLK") + "  5: {module: 57C419}\n  10: {module: 57552}\n"
     common = "common:\n  START@: {slot: 5, register: 0, bit: 0, ros: in}\n  SUM%: {}\n"
     config = config_of(tmp_path, slots, common, ONE="5 COMMON SUM%, START@\n" + IDLE, TWO="5 COMMON SUM%\n" + IDLE)
-    seats = seats_of(config)
+    seats = processes_of(config)
     assert [seat.name for seat in seats] == [HOME, "processor_1", "processor_2", "digital_io_5", "udc_10"]
-    assert [seat.is_home for seat in seats] == [True, False, False, False, False]
+    assert [seat.holds_common_memory for seat in seats] == [True, False, False, False, False]
     assert all(seat.reasons == () and len(seat.slots) == 1 for seat in seats)
 
 
 def test_lone_processor_is_the_home(tmp_path):
     config = load(folder_of(tmp_path)).config
     assert config is not None
-    (home,) = seats_of(config)
-    assert (home.name, home.slots, home.is_home) == (HOME, (0, 7, 8), True)
+    (home,) = processes_of(config)
+    assert (home.name, home.slots, home.holds_common_memory) == (HOME, (0, 7, 8), True)
     assert home.modules == ("processor_0", "drive_7", "digital_io_8")
 
 
@@ -78,7 +78,7 @@ def test_a_loop_keeps_its_drive_its_contactor_and_its_voltage(tmp_path):
     )
     config = config_of(tmp_path, slots, more, ONE=IDLE, CML=CML)
     assert slots_of(config) == [(0,), (1,), (2, 7, 8, 9), (11,)]
-    seat = seats_of(config)[2]
+    seat = processes_of(config)[2]
     assert seat.words == "processor_2 (processor_2 drive_7 digital_io_8 drive_analog_9)"
     assert seat.reasons == (
         "task CML fires the gates of drive_7",
@@ -91,7 +91,7 @@ def test_an_interrupt_keeps_its_module_with_the_processor_that_waits_for_it(tmp_
     slots = processors(ONE="ONE.BLK", TWO="TWO.BLK") + "  5: {module: 57C419}\n  6: {module: 57C419}\n"
     config = config_of(tmp_path, slots, "common:\n  ISCR%: {slot: 6, register: 2}\n", ONE=IDLE, TWO=HEARS)
     assert slots_of(config) == [(0,), (1,), (2, 6), (5,)]
-    assert seats_of(config)[2].reasons == ("task TWO waits for the interrupt IO_INT of digital_io_6",)
+    assert processes_of(config)[2].reasons == ("task TWO waits for the interrupt IO_INT of digital_io_6",)
 
 
 def test_the_web_line_keeps_its_winder_with_the_udc_that_interrupts():
@@ -109,7 +109,7 @@ def test_tasks_that_meet_at_an_event_or_a_channel_share_a_process(tmp_path, firs
     slots = processors(ONE=f"ONE.{kinds[0]}", TWO="TWO.BLK", THREE=f"THREE.{kinds[1]}")
     config = config_of(tmp_path, slots, ONE=first, TWO=IDLE, THREE=second)
     assert slots_of(config) == [(0,), (1, 3), (2,)]
-    assert seats_of(config)[1].reasons == (f"tasks ONE and THREE share {shared}",)
+    assert processes_of(config)[1].reasons == (f"tasks ONE and THREE share {shared}",)
 
 
 def test_coupled_shafts_share_a_process(tmp_path):
@@ -121,7 +121,7 @@ def test_coupled_shafts_share_a_process(tmp_path):
     plants = f"plants:\n  REEL: {{{motor}, couple: {{to: DRUM}}}}\n  DRUM: {{{motor}}}\n  ALONE: {{{motor}}}\n"
     config = config_of(tmp_path, slots, plants, ONE=IDLE)
     assert slots_of(config) == [(0,), (1,), (7, 10), (9,)]
-    assert seats_of(config)[2].reasons == ("the shafts of REEL and DRUM are coupled",)
+    assert processes_of(config)[2].reasons == ("the shafts of REEL and DRUM are coupled",)
 
 
 def test_a_task_with_errors_joins_nothing(tmp_path):
@@ -148,7 +148,7 @@ def test_a_reload_that_would_join_processes_is_refused(tmp_path):
 def test_a_seat_is_named_by_slot_or_module(text):
     config = load(ROOT / "config" / "web_line" / "rack.yaml").config
     assert config is not None
-    assert seat_named(seats_of(config), text).name == "processor_3"
+    assert seat_named(processes_of(config), text).name == "processor_3"
 
 
 @pytest.mark.parametrize(("text", "hint"), [("4", None), ("procesor_3", "did you mean processor_3?")])
@@ -156,7 +156,7 @@ def test_a_module_that_is_not_there_is_refused(text, hint):
     config = load(ROOT / "config" / "web_line" / "rack.yaml").config
     assert config is not None
     with pytest.raises(NoSuchSeat) as told:
-        seat_named(seats_of(config), text)
+        seat_named(processes_of(config), text)
     assert f"no module '{text}'" in told.value.message
     assert hint is None or told.value.hint == hint
 

@@ -25,7 +25,7 @@ import sysconfig
 import tempfile
 from pathlib import Path
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.messages.types.definitions import message_types
 from automax_ros.ros.setup.discovery import announce_soon, choose_range
 
@@ -37,7 +37,7 @@ COLCON_COMMAND = "colcon build"
 _RESTARTED = "AUTOMAX_ROS_RESTARTED"
 
 
-class RosUnavailable(Fault):
+class RosUnavailable(UserError):
     """ROS 2, its middleware or automax_msgs cannot be used here; the text names the command that helps."""
 
 

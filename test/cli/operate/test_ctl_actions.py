@@ -10,7 +10,7 @@ from system.support import RACKS
 from automax_ros.cli.operate.actions import ACTIONS
 from automax_ros.cli.options.rack_name import space_of
 from automax_ros.cli.usage import UsageError
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 
 
 def asked(action: str, *words: str) -> list[dict[str, object]]:
@@ -39,9 +39,9 @@ def test_what_is_found_in_a_sent_source_is_named_by_the_file_that_was_given(tmp_
     ACTIONS["reload"].add_arguments(parser)
     (ask,) = ACTIONS["reload"].asks(parser.parse_args(["speed", str(file)]))
     found = "SPEED.BLK:1:1: error[AMX2001]: END\n  1 | 10 END\nSPEED.BLK:2:3: note: here"
-    assert ask.worded(found) == f"{file}:1:1: error[AMX2001]: END\n  1 | 10 END\n{file}:2:3: note: here"
-    assert ask.worded("SPEED.BLK has errors: task SPEED") == f"{file} has errors: task SPEED"
-    assert ask.worded("sd/LINE.BLK:1:1: error") == "sd/LINE.BLK:1:1: error"
+    assert ask.reword(found) == f"{file}:1:1: error[AMX2001]: END\n  1 | 10 END\n{file}:2:3: note: here"
+    assert ask.reword("SPEED.BLK has errors: task SPEED") == f"{file} has errors: task SPEED"
+    assert ask.reword("sd/LINE.BLK:1:1: error") == "sd/LINE.BLK:1:1: error"
 
 
 def test_a_rack_is_named_by_its_folder_as_well_as_by_its_file(tmp_path, monkeypatch):
@@ -104,5 +104,5 @@ def test_an_answer_with_more_names_than_values_is_an_error_and_no_traceback():
     """Our racks answer one for each; a stranger may serve the same service."""
     answer = SimpleNamespace(found=["REF%", "OUT%"], values=["1"])
     for action in ("get", "watch", "forces"):
-        with pytest.raises(Fault, match="the rack answers with 2 names and 1 value"):
+        with pytest.raises(UserError, match="the rack answers with 2 names and 1 value"):
             ACTIONS[action].read(answer)

@@ -7,7 +7,7 @@ import pytest
 
 from automax_ros.cli.options.work import add_where_arguments, where_of
 from automax_ros.cli.usage import UsageError
-from automax_ros.parallel.job import Where
+from automax_ros.parallel.job import Workers
 
 RACK = Path(__file__).parents[3] / "config" / "section_drive"
 
@@ -21,11 +21,11 @@ def where(*arguments):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        ((), Where(None)),
-        (("--jobs", "auto"), Where(None)),
-        (("--jobs", "1"), Where(1)),
-        (("--jobs", "8"), Where(8)),
-        (("--scheduler", " tcp://10.0.0.1:8786 "), Where(scheduler="tcp://10.0.0.1:8786")),
+        ((), Workers(None)),
+        (("--jobs", "auto"), Workers(None)),
+        (("--jobs", "1"), Workers(1)),
+        (("--jobs", "8"), Workers(8)),
+        (("--scheduler", " tcp://10.0.0.1:8786 "), Workers(scheduler="tcp://10.0.0.1:8786")),
     ],
 )
 def test_work_is_done_where_it_is_wanted(arguments, expected):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.run.saving import SAVE_PERIOD_NS, StateKeeping
+from automax_ros.cli.run.saving import SAVE_PERIOD_NS, SavedState
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 
@@ -33,11 +33,11 @@ def folder(tmp_path) -> Path:
     return tmp_path
 
 
-def made(folder: Path) -> tuple[Rack, StateKeeping]:
+def made(folder: Path) -> tuple[Rack, SavedState]:
     config = load(folder / "rack.yaml").config
     assert config is not None
     rack = Rack(config)
-    keeping = StateKeeping(rack, folder / "state")
+    keeping = SavedState(rack, folder / "state")
     rack.start(keeping.settings)
     return rack, keeping
 
@@ -103,7 +103,7 @@ def test_a_folder_that_cannot_be_written_is_told_once_and_not_tried_again(folder
 def test_without_a_folder_nothing_is_kept(folder):
     config = load(folder / "rack.yaml").config
     assert config is not None
-    keeping = StateKeeping(Rack(config), None)
+    keeping = SavedState(Rack(config), None)
     keeping.update(SAVE_PERIOD_NS)
     keeping.freeze()
     keeping.end()

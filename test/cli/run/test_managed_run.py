@@ -35,11 +35,11 @@ def stop():
 
 @pytest.fixture
 def run(ros_domain_id, plan, stop):
-    from automax_ros.cli.run.lifecycle import Managed, ManagedRun
+    from automax_ros.cli.run.lifecycle import LifecycleRun, LifecycleRunner
     from automax_ros.ros.setup.process import RosProcess
 
     process = RosProcess()
-    made = ManagedRun(Managed("operated", lambda: plan, plan), process, stop, ros_domain_id)
+    made = LifecycleRunner(LifecycleRun("operated", lambda: plan, plan), process, stop, ros_domain_id)
     yield made
     made.close()
     process.close()

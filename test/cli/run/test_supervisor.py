@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.cli.run.process_messages import Reported, Said, ToldScreen, heard, tell_report
+from automax_ros.cli.run.process_messages import ProcessOutput, Reported, TextLine, heard, tell_report
 from automax_ros.cli.run.status import Progress, Summary, merged_progress, merged_summary
-from automax_ros.cli.run.supervisor import BACKOFFS_NS, WINDOW_NS, Post, Restarts, Supervisor
+from automax_ros.cli.run.supervisor import BACKOFFS_NS, WINDOW_NS, ProcessSpec, Restarts, Supervisor
 
 PATIENCE_S = 240.0
 REPORT = 'print(json.dumps({"report": {"ok": True}}), flush=True)'
@@ -48,7 +48,7 @@ class Heard:
         self.deaths: list[tuple[str, str, float | None]] = []
 
     def heard(self, name, told):
-        if isinstance(told, Said):
+        if isinstance(told, TextLine):
             self.said.append((name, told.text))
         elif isinstance(told, Reported):
             self.reports.append(name)
@@ -69,7 +69,7 @@ class Heard:
 class Supervised:
     """A supervisor that runs on a thread, to be asked to stop."""
 
-    def __init__(self, *posts: Post, restart: bool = True) -> None:
+    def __init__(self, *posts: ProcessSpec, restart: bool = True) -> None:
         self.heard, self._stop = Heard(), threading.Event()
         self.supervisor = Supervisor(posts, self.heard, restart=restart)
         self._thread = threading.Thread(target=self.supervisor.run, args=(self._stop.is_set,))
@@ -91,7 +91,10 @@ class Supervised:
 
 
 def test_processes_that_report_have_ended_in_order():
-    posts = [Post("home", program(REPORT), stage=1, ends_run=True), Post("one", program("print('hi')\n" + REPORT))]
+    posts = [
+        ProcessSpec("home", program(REPORT), stage=1, ends_run=True),
+        ProcessSpec("one", program("print('hi')\n" + REPORT)),
+    ]
     with Supervised(*posts) as run:
         run.ended()
     assert run.supervisor.codes == {"home": 0, "one": 0}
@@ -101,8 +104,10 @@ def test_processes_that_report_have_ended_in_order():
 
 
 def test_all_end_in_order_the_lowest_stage_first():
-    posts = [Post(name, program(WAITS + REPORT), stage=stage) for name, stage in (("home", 1), ("one", 0), ("two", 0))]
-    with Supervised(*posts, Post("recorder", program(WAITS), stage=2, reports=False)) as run:
+    posts = [
+        ProcessSpec(name, program(WAITS + REPORT), stage=stage) for name, stage in (("home", 1), ("one", 0), ("two", 0))
+    ]
+    with Supervised(*posts, ProcessSpec("recorder", program(WAITS), stage=2, reports=False)) as run:
         run.heard.until(lambda heard: sum(text == "up" for _, text in heard.said) == 4)
         run.stop()
     down = [name for name, text in run.heard.said if text == "down"]
@@ -112,7 +117,7 @@ def test_all_end_in_order_the_lowest_stage_first():
 
 
 def test_a_process_that_was_killed_is_started_again_and_the_others_are_left_alone():
-    posts = [Post(name, program(WAITS + REPORT)) for name in ("one", "two")]
+    posts = [ProcessSpec(name, program(WAITS + REPORT)) for name in ("one", "two")]
     with Supervised(*posts) as run:
         run.heard.until(lambda heard: len(heard.said) == 2)
         before = run.supervisor.pids
@@ -130,7 +135,9 @@ def test_a_process_that_was_killed_is_started_again_and_the_others_are_left_alon
 
 
 def test_a_process_that_dies_three_times_is_given_up():
-    with Supervised(Post("one", program(BEGINS + "sys.exit(7)")), Post("two", program(WAITS + REPORT))) as run:
+    with Supervised(
+        ProcessSpec("one", program(BEGINS + "sys.exit(7)")), ProcessSpec("two", program(WAITS + REPORT))
+    ) as run:
         run.heard.until(lambda heard: len(heard.deaths) == 3)
         run.stop()
     assert [again_s is None for _, _, again_s in run.heard.deaths] == [False, False, True]
@@ -140,8 +147,8 @@ def test_a_process_that_dies_three_times_is_given_up():
 
 def test_without_restarts_a_death_is_told_and_the_home_ends_the_run():
     with Supervised(
-        Post("home", program(BEGINS + "sys.exit(1)"), ends_run=True),
-        Post("one", program(WAITS + REPORT)),
+        ProcessSpec("home", program(BEGINS + "sys.exit(1)"), ends_run=True),
+        ProcessSpec("one", program(WAITS + REPORT)),
         restart=False,
     ) as run:
         run.ended()
@@ -152,7 +159,7 @@ def test_without_restarts_a_death_is_told_and_the_home_ends_the_run():
 @pytest.mark.parametrize("code", [1, 2])
 def test_what_cannot_begin_ends_the_run_at_once(code):
     refuses = f"print('no', file=sys.stderr)\nsys.exit({code})"
-    with Supervised(Post("one", program(refuses)), Post("two", program(WAITS + REPORT))) as run:
+    with Supervised(ProcessSpec("one", program(refuses)), ProcessSpec("two", program(WAITS + REPORT))) as run:
         run.ended()
     assert run.heard.errors == [("one", "no")]
     assert run.heard.deaths == []
@@ -160,7 +167,7 @@ def test_what_cannot_begin_ends_the_run_at_once(code):
 
 
 def test_a_process_asked_to_end_before_it_heeds_signals_has_ended_well():
-    with Supervised(Post("one", program("print('up', flush=True)\ntime.sleep(60)"))) as run:
+    with Supervised(ProcessSpec("one", program("print('up', flush=True)\ntime.sleep(60)"))) as run:
         run.heard.until(lambda heard: bool(heard.said))
         run.stop()
     assert run.supervisor.codes == {"one": 0}
@@ -205,7 +212,7 @@ def test_deaths_count_together_for_ten_seconds():
 
 
 def test_what_a_process_tells_is_heard_alike(capsys):
-    screen = ToldScreen()
+    screen = ProcessOutput()
     progress = Progress(5, ("STOP",), 2.5, ("P1 3 % late 0",), None, {"fault": 2}, ("A%=1",))
     summary = Summary(1.5, True, ("row",), ("note",), ("A%=1",))
     screen.progress(progress)
@@ -213,14 +220,14 @@ def test_what_a_process_tells_is_heard_alike(capsys):
     screen.message("a line")
     tell_report({"rack": "PM1"})
     lines = capsys.readouterr().out.splitlines()
-    assert [heard(line) for line in lines] == [progress, summary, Said("a line"), Reported({"rack": "PM1"})]
+    assert [heard(line) for line in lines] == [progress, summary, TextLine("a line"), Reported({"rack": "PM1"})]
 
 
 @pytest.mark.parametrize(
     "line", ["", "text", "[1]", '{"a": 1}', '{"progress": 1}', '{"progress": {"x": 1}}', "[" * 9999]
 )
 def test_other_lines_are_said_as_they_are(line):
-    assert heard(line) == Said(line)
+    assert heard(line) == TextLine(line)
 
 
 def test_parts_of_a_rack_are_told_as_one():
@@ -242,7 +249,7 @@ def test_json_of_a_report_is_one_line(capsys):
 
 
 def test_a_run_that_cannot_begin_without_a_process_ends_with_it():
-    posts = [Post("home", program(WAITS + REPORT), ends_run=True)]
-    with Supervised(*posts, Post("recorder", program("sys.exit(2)"), reports=False, begins_run=True)) as run:
+    posts = [ProcessSpec("home", program(WAITS + REPORT), ends_run=True)]
+    with Supervised(*posts, ProcessSpec("recorder", program("sys.exit(2)"), reports=False, begins_run=True)) as run:
         run.ended()
     assert run.supervisor.codes["recorder"] == 2

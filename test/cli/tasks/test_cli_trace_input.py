@@ -16,7 +16,7 @@ from automax_ros.cli.options.task import Target, check_task_file
 from automax_ros.cli.output.csv_input import MAX_LINE, CsvFault
 from automax_ros.cli.tasks.trace_rows import InputTable
 from automax_ros.core.problems import PROBLEMS
-from automax_ros.runtime.tasks.standalone_task import LoneTask
+from automax_ros.runtime.tasks.standalone_task import StandaloneTask
 from cli.support import TASK, table_of
 
 FAULTS = [code for code in PROBLEMS if "AMX6910" <= code < "AMX6950"]
@@ -143,7 +143,7 @@ def lone(tmp_path_factory):
     (folder / "TASK.BLK").write_text(TASK)
     _, result = check_task_file(folder / "TASK.BLK", Target(Platform.AUTOMAX, 5_500_000))
     assert result.program is not None
-    task = LoneTask(result.program)
+    task = StandaloneTask(result.program)
     task.task.run()
     return task, folder / "IN.csv"
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from automax_ros.drive.circuit.waves import Moments, Piece, bound, first_zero
+from automax_ros.drive.circuit.waves import Moments, WavePiece, bound, first_zero
 from drive.support import repeatable
 
 OMEGA = 2 * pi * 60
@@ -97,7 +97,7 @@ def test_integrals_of_squares_and_of_power(one, volts, theta, rates, duration):
 @settings(repeatable, max_examples=60)
 @given(factor, factor, factor, factor, st.floats(0, 6), st.floats(0.01, 500), st.floats(1e-5, 17e-3))
 def test_extremes(c, d, k, a, theta, decay, duration):
-    piece = Piece(duration, theta, OMEGA, c, d, k, a, decay)
+    piece = WavePiece(duration, theta, OMEGA, c, d, k, a, decay)
     values = value((c, d, k, a, 0.0), theta, decay, 0.0, np.linspace(0, duration, 5001))
     least, most = piece.extremes()
     swing = 1e-4 * (values.max() - values.min()) + 1e-6
@@ -106,7 +106,7 @@ def test_extremes(c, d, k, a, theta, decay, duration):
 
 
 def test_piece_knows_its_values():
-    piece = Piece(2e-3, 0.5, OMEGA, 3.0, 4.0, 5.0, 6.0, 70.0)
+    piece = WavePiece(2e-3, 0.5, OMEGA, 3.0, 4.0, 5.0, 6.0, 70.0)
     t = 1.3e-3
     assert piece.value(t) == pytest.approx(
         3 * cos(0.5 + OMEGA * t) + 4 * sin(0.5 + OMEGA * t) + 5 + 6 * exp(-70 * t), rel=1e-12
@@ -119,8 +119,8 @@ def test_piece_knows_its_values():
     st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.01, 2000.0),
 )  # fmt: skip
 def test_bound_is_never_below_the_extremes(duration, theta, omega, c, d, k, a, decay):
-    piece = Piece(duration, theta, omega, c, d, k, a, decay)
-    assert Piece(*piece.numbers()).numbers() == piece.numbers() == [duration, theta, omega, c, d, k, a, decay]
+    piece = WavePiece(duration, theta, omega, c, d, k, a, decay)
+    assert WavePiece(*piece.numbers()).numbers() == piece.numbers() == [duration, theta, omega, c, d, k, a, decay]
     times = [duration * index / 200 for index in range(201)]
     largest = max(abs(piece.value(t)) for t in times)
     assert bound(piece) >= largest * (1 - 1e-12)

@@ -6,18 +6,22 @@ import pytest
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.messages.bus.bus import batch_of, image_message, picture_of, standing_of, with_standing, write_message
-from automax_ros.messages.bus.peers import HUNG_NS, MISSING_NS, SILENCE_NS, Heard, Peers
+from automax_ros.messages.bus.peers import HUNG_NS, MISSING_NS, SILENCE_NS, Peers, PresenceVerdict
 from automax_ros.messages.cdr.cdr import CdrError, decode, encode
 from automax_ros.messages.types.messages import NAMES, BusImage, BusWrite, Presence, Stage, Values
 from automax_ros.rack.base.stop_cause import StopCause
-from automax_ros.rack.distributed.link import Batch, HeldForce, Picture, Standing
-from automax_ros.rack.distributed.versions import Held
+from automax_ros.rack.distributed.link import Batch, HeldForce, ImageCopy, StopState
+from automax_ros.rack.distributed.versions import VersionedValue
 
 TEXTS = frozenset({4})
 BATCH = Batch(2, 9, 11_000_000, 5, WriteKind.COMMIT, ((0, 0, 7.0), (4, 1, "ABC"), (3, 2, 1.5), (4, 0, "")))
-PICTURE = Picture(
+PICTURE = ImageCopy(
     9,
-    (Held(0, 0, 7.0, 0xFFFF, (5, 1, 3)), Held(4, 1, "ABC", 0xFFFF, (6, 1, 4)), Held(8, 3, 0x88, 0x8008, (-1, 0, 0))),
+    (
+        VersionedValue(0, 0, 7.0, 0xFFFF, (5, 1, 3)),
+        VersionedValue(4, 1, "ABC", 0xFFFF, (6, 1, 4)),
+        VersionedValue(8, 3, 0x88, 0x8008, (-1, 0, 0)),
+    ),
     (HeldForce(0, 0, 7.0, True, (5, 1, 3)), HeldForce(1, 0, 0.0, False, (8, 2, 1))),
 )
 BEAT = 20_000_000
@@ -41,7 +45,7 @@ def test_an_image_comes_back_from_its_bytes():
 
 @pytest.mark.parametrize("cause", [None, StopCause(12, "bus error", "31", "SPEED"), StopCause(12, "by hand")])
 def test_the_standing_comes_back_from_a_presence(cause):
-    standing = Standing(12, 3, cause)
+    standing = StopState(12, 3, cause)
     presence = there_and_back(with_standing(said(), standing))
     assert standing_of(presence) == standing
 
@@ -56,7 +60,7 @@ def test_what_does_not_fit_together_is_not_a_message():
     for field in ("mask", "since_ns", "seat", "order", "force_held", "force_order"):
         with pytest.raises(CdrError, match="length"):
             picture_of(image._replace(**{field: getattr(image, field)[1:]}), TEXTS)
-    assert picture_of(BusImage(1, 2, 3, 4, 5), TEXTS) == Picture(4, (), ())
+    assert picture_of(BusImage(1, 2, 3, 4, 5), TEXTS) == ImageCopy(4, (), ())
 
 
 def said(process=5, seat=2, *, run_id=42, state=Stage.RUNNING, fingerprint=1, sequence=0) -> Presence:
@@ -69,13 +73,13 @@ def known(**lives) -> Peers:
 
 def test_what_a_process_says_tells_whether_it_belongs_to_the_run():
     peers = known()
-    assert peers.heard(said(1), 0) is Heard.OWN
-    assert peers.heard(said(), 0) is Heard.NEW
-    assert peers.heard(said(), 1) is Heard.KNOWN
-    assert peers.heard(said(6), 2) is Heard.NEW
-    assert peers.heard(said(9, 3, run_id=43), 2) is Heard.OTHER_RUN
-    assert peers.heard(said(9, 3, fingerprint=2), 2) is Heard.OTHER_FILE
-    assert peers.heard(said(9, 5), 2) is Heard.SEAT_TAKEN
+    assert peers.heard(said(1), 0) is PresenceVerdict.OWN
+    assert peers.heard(said(), 0) is PresenceVerdict.NEW
+    assert peers.heard(said(), 1) is PresenceVerdict.KNOWN
+    assert peers.heard(said(6), 2) is PresenceVerdict.NEW
+    assert peers.heard(said(9, 3, run_id=43), 2) is PresenceVerdict.OTHER_RUN
+    assert peers.heard(said(9, 3, fingerprint=2), 2) is PresenceVerdict.OTHER_FILE
+    assert peers.heard(said(9, 5), 2) is PresenceVerdict.SEAT_TAKEN
     assert [peer.process for peer in peers.running()] == [6]
     assert peers.of(6) is not None
     assert peers.of(9) is None
@@ -102,7 +106,7 @@ def test_a_silent_process_is_lost(lives, silence):
     assert lost_at is not None
     assert silence < lost_at <= silence + BEAT
     assert peers.lost == {2}
-    assert peers.heard(said(), lost_at + 1) is Heard.NEW
+    assert peers.heard(said(), lost_at + 1) is PresenceVerdict.NEW
     assert peers.lost == set()
 
 

@@ -229,7 +229,7 @@ def test_values_of_commons(tmp_path: Any) -> None:
 
 def test_patterns_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(patterns, "MOST_PATTERNS", 10)
-    made = patterns.Patterns()
+    made = patterns.TemplateCache()
     alike = prepared(Int16(5), ("data",))
     for key in range(100):
         for _ in range(patterns.ENOUGH_TIMES):

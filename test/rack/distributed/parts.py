@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from automax_ros.rack.distributed.link import Batch, BusLink
+from automax_ros.rack.distributed.link import Batch, ImageSync
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
@@ -65,7 +65,7 @@ class Process:
     def __init__(self, config: RackConfig, slots: tuple[int, ...], *, common=lambda: False, **more) -> None:
         self.rack = Rack(config, local=slots)
         self.sent: list[Batch] = []
-        self.link = BusLink(self.rack, min(slots), self.sent.append, common, **more)
+        self.link = ImageSync(self.rack, min(slots), self.sent.append, common, **more)
         self.taken: dict[int, int] = {}
         self.link.begin()
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.ticks import NS_PER_MS
 from automax_ros.rack.base.stop_cause import StopCause
-from automax_ros.rack.distributed.link import MOST_AHEAD_NS, Batch, Picture, Standing
-from automax_ros.rack.distributed.versions import Held
+from automax_ros.rack.distributed.link import MOST_AHEAD_NS, Batch, ImageCopy, StopState
+from automax_ros.rack.distributed.versions import VersionedValue
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.time.scheduler import EventClass, EventKey
 from rack.distributed.parts import ONE, SEATS, Process, config_in, cut, image, settle
@@ -162,7 +162,7 @@ def test_a_scan_that_is_late_does_not_see_what_was_written_after_its_deadline(co
         if way == "write":
             two.link.receive(Batch(1, 1, at_ns, 3, kind, ((view, 0, 40),)))
         elif kind is WriteKind.OUTSIDE:
-            two.link.merge(Picture(1, (Held(view, 0, 40, 0xFFFF, (at_ns, 1, 1)),), ()))
+            two.link.merge(ImageCopy(1, (VersionedValue(view, 0, 40, 0xFFFF, (at_ns, 1, 1)),), ()))
         else:
             continue
         seen = []
@@ -194,7 +194,7 @@ def test_what_waits_for_its_time_is_taken_before_the_rack_stops_or_an_image_is_s
     assert home.rack.value("OUT7@") is False
     if end == "stop":
         cause = StopCause(8 * NS_PER_MS, "a fault", "31", "")
-        home.link.adopt(Standing(8 * NS_PER_MS, 1, cause))
+        home.link.adopt(StopState(8 * NS_PER_MS, 1, cause))
     elif end == "last":
         home.link.take_waiting()
     else:
@@ -217,7 +217,7 @@ def test_a_damaged_image_that_waits_for_its_time_ends_nothing(config):
     two.start()
     two.rack.run(0.0055)
     word = next(iter(two.rack.memory.registers.views))
-    two.link.merge(Picture(1, (Held(word, 0, float("inf"), 0xFFFF, (6 * NS_PER_MS, 1, 1)),), ()))
+    two.link.merge(ImageCopy(1, (VersionedValue(word, 0, float("inf"), 0xFFFF, (6 * NS_PER_MS, 1, 1)),), ()))
     assert not reported
     two.rack.scheduler.run_due(12 * NS_PER_MS)
     assert len(reported) == 1
@@ -274,7 +274,7 @@ def test_a_stop_all_of_one_stops_all_and_outputs_are_off_everywhere(config):
     assert two.link.standing.cause is None
     one.link.adopt(two.link.standing)
     assert one.rack.operations.stopped is None
-    one.link.adopt(Standing(500, 0, StopCause(500, "older news")))
+    one.link.adopt(StopState(500, 0, StopCause(500, "older news")))
     assert one.rack.operations.stopped is None
 
 
@@ -386,7 +386,7 @@ def test_all_hold_what_an_input_makes_of_a_value(config):
 def test_the_part_of_a_rack_compiles_and_runs_its_own_tasks_alone(config):
     part, whole = Rack(config, local=(1,)), Rack(config)
     assert [task.name for task in part.tasks] == ["ONE"]
-    assert (part.part.is_home, part.part.is_whole, whole.part.is_whole) == (False, False, True)
+    assert (part.part.holds_common_memory, part.part.is_whole, whole.part.is_whole) == (False, False, True)
     assert part.installed == whole.installed
     assert part.writers == whole.writers
     with pytest.raises(ValueError, match="slot 9"):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.operator.faults import Display, DriveTrips, displays_of
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
@@ -118,7 +118,7 @@ def tripped(rack: Rack, *outputs: str) -> bool:
 
 def test_a_shorted_scr_trips_and_is_named_at_the_next_start(tmp_path):
     rack = turning(tmp_path)
-    controls = Controls(rack)
+    controls = SwitchOperations(rack)
     controls.plant("UNWIND", "short_scr", "16")
     rack.run(0.05)
     assert tripped(rack, "IOC@")
@@ -137,7 +137,7 @@ def test_a_lost_tachometer_stops_a_drive_that_would_run_away(tmp_path):
     trips = DriveTrips(rack)
     assert trips.lines() == []
     at_s = rack.now_ns / 1e9
-    Controls(rack).plant("UNWIND", "lose_tach", "true")
+    SwitchOperations(rack).plant("UNWIND", "lose_tach", "true")
     rack.run(0.3)
     assert tripped(rack, "TACH@")
     assert rack.plants["UNWIND"].motor.speed_rad_s < 200.0
@@ -153,12 +153,12 @@ def test_a_lost_tachometer_stops_a_drive_that_would_run_away(tmp_path):
 @pytest.mark.parametrize("verb", [("line_hz", "55"), ("lose_phase", "1")])
 def test_a_line_that_goes_astray_is_a_sync_loss_until_it_is_back(tmp_path, verb):
     rack = turning(tmp_path)
-    Controls(rack).plant("UNWIND", *verb)
+    SwitchOperations(rack).plant("UNWIND", *verb)
     rack.run(0.5)
     assert "SYNC@" in active(rack)
     assert not rack.value("FMCR@")
     assert not reset(rack) or verb[0] == "line_hz"
-    Controls(rack).plant("UNWIND", "repair", "all")
+    SwitchOperations(rack).plant("UNWIND", "repair", "all")
     rack.run(1.5)
     reset(rack)
     assert active(rack) == set()
@@ -167,11 +167,11 @@ def test_a_line_that_goes_astray_is_a_sync_loss_until_it_is_back(tmp_path, verb)
 
 def test_a_load_that_drives_the_motor_too_fast_trips_osv(tmp_path):
     rack = turning(tmp_path)
-    Controls(rack).plant("UNWIND", "load_torque_nm", "-3000")
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", "-3000")
     rack.run(0.1)
     assert tripped(rack, "OSV@")
     assert not reset(rack)
-    Controls(rack).plant("UNWIND", "load_torque_nm", "3000")
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", "3000")
     while rack.value("SPD%") > 3600:
         rack.run(0.01)
     assert reset(rack)

@@ -13,7 +13,7 @@ from automax_ros.rack.modules.drive import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 from rack.modules.cml_racks import ALONE, CML, COMMONS, NEAR, built, started
 
@@ -196,7 +196,7 @@ def test_stimuli_move_the_switches_that_the_block_shows(tmp_path):
     (tmp_path / "switches.yaml").write_text(STIMULI)
     file = read_for_rack(tmp_path / "switches.yaml", rack)
     assert file.stimuli is not None, file.diagnostics
-    player = Stimulation(file.stimuli, rack.scheduler)
+    player = StimuliPlayer(file.stimuli, rack.scheduler)
     player.begin()
     rack.start()
     seen = []

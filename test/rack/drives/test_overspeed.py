@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from replay.replays import record, replayed
 
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from rack.drives.test_drive_faults import CML, FAULTS, SPEED, YAML, active, logged, reset, start
@@ -57,10 +57,10 @@ def beyond(rack: Rack) -> float:
 
 def slow_down(rack: Rack) -> None:
     """Let the load brake the shaft to 500 rpm."""
-    Controls(rack).plant("UNWIND", "load_torque_nm", "2000")
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", "2000")
     while rpm(rack) > 500.0:
         rack.run(0.01)
-    Controls(rack).plant("UNWIND", "load_torque_nm", "0")
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", "0")
 
 
 @pytest.mark.parametrize("execution", ["ideal", "modeled"])
@@ -75,7 +75,7 @@ def test_a_drive_whose_loop_does_not_see_the_speed_trips(tmp_path, execution):
     rack.run(0.05)
     assert not rack.plants["UNWIND"].is_closed
     # A trip whose cause is still there cannot be reset.
-    Controls(rack).plant("UNWIND", "load_torque_nm", "-200")
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", "-200")
     assert not reset(rack)
     slow_down(rack)
     assert not start(rack)
@@ -96,7 +96,7 @@ def test_without_a_digital_tachometer_or_a_threshold_nothing_trips(tmp_path, tex
 def test_a_sound_osv_fdbk_trips_first_and_is_logged_once(tmp_path):
     rack = turning(rack_of(tmp_path, cml=CML))
     beyond(rack)
-    Controls(rack).plant("UNWIND", "load_torque_nm", "-200")
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", "-200")
     rack.run(0.2)
     assert (active(rack), logged(rack)) == ({"OSV@"}, [7113])
     assert not reset(rack)
@@ -113,7 +113,7 @@ def test_it_stays_on_guard_while_the_task_is_stopped(tmp_path):
     """The motor runs away with the drive off; the trip is told as the task runs again, and holds the drive off."""
     rack = turning(rack_of(tmp_path))
     rack.operations.stop("CML")
-    Controls(rack).plant("UNWIND", "load_torque_nm", OVERHAULING_NM)
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", OVERHAULING_NM)
     rack.run(1.0)
     assert rpm(rack) > LIMIT_RPM
     slow_down(rack)
@@ -143,7 +143,7 @@ def test_the_trip_needs_no_scan(tmp_path):
     port = rack.drives.port(7)
     port._interrupts._due = lambda *_: None
     port._controller.overspeed.counts = 2600
-    Controls(rack).plant("UNWIND", "load_torque_nm", OVERHAULING_NM)
+    SwitchOperations(rack).plant("UNWIND", "load_torque_nm", OVERHAULING_NM)
     rack.run(0.5)
     assert port._controller.overspeed.tripped
     assert not rack.value("FMCR@")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.config import RackConfig
-from automax_ros.runtime.scan.processor_time import ProcessorTime
+from automax_ros.runtime.scan.processor_time import ModeledExecution
 
 HEAD = """\
 10 COMMON A%, B%, C%, D!, X@, R, T%(5)
@@ -128,7 +128,7 @@ class Costless(Rack):
     """A rack with a Processor's time on which nothing takes any."""
 
     def _execution(self, module: str):
-        return ProcessorTime(self.scheduler, module)
+        return ModeledExecution(self.scheduler, module)
 
 
 @given(task_sets)

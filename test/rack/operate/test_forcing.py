@@ -10,7 +10,7 @@ from recordings.live_racks import build
 
 from automax_ros.core.diagnostics import SourceText
 from automax_ros.rack.base.observers import Operation
-from automax_ros.rack.operator.requests import Orders
+from automax_ros.rack.operator.requests import OperatorRequests
 from automax_ros.rack.operator.retention import Retention
 from automax_ros.rack.rack import Rack
 from automax_ros.runtime.memory.views import MemoryValueError
@@ -216,7 +216,7 @@ def test_a_forced_local_outlives_a_run(tmp_path):
 
 
 def test_orders_in_words_force_locals(rack):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     orders.force("line.on@", "on")
     orders.force("LINE.SUM!", "-70000")
     assert orders.forces() == [("LINE.ON@", "TRUE"), ("LINE.SUM!", "-70000")]

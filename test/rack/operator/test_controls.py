@@ -11,7 +11,7 @@ from recordings.live_racks import build
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
 from automax_ros.rack.modules.module import QuietModule
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
 
 YAML = """\
@@ -65,7 +65,7 @@ def told(rack: Rack) -> Told:
 
 
 def test_switch_is_moved_to_a_position_in_any_case(rack: Rack, told: Told) -> None:
-    Controls(rack).module("5", "test_switch", "CENTRE")
+    SwitchOperations(rack).module("5", "test_switch", "CENTRE")
     assert rack.modules[1].moved == (("test_switch", "centre"),)  # type: ignore[attr-defined]
     assert told.operations == [Operation(20_000_000, "module", "", ok=True, reason="", detail="5 test_switch centre")]
 
@@ -84,7 +84,7 @@ def test_switch_is_moved_to_a_position_in_any_case(rack: Rack, told: Told) -> No
 )
 def test_what_cannot_be_moved_is_refused_and_told(rack: Rack, told: Told, slot, control, value, reason) -> None:
     with pytest.raises(OperationRefused) as refused:
-        Controls(rack).module(slot, control, value)
+        SwitchOperations(rack).module(slot, control, value)
     assert str(refused.value) == reason
     detail = f"{slot} {control} {value}".replace("\x1b", "\ufffd")
     assert told.operations == [Operation(20_000_000, "module", "", ok=False, reason=reason, detail=detail)]

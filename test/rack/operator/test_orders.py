@@ -10,7 +10,7 @@ from recordings.live_racks import build
 
 from automax_ros.rack.base.observers import Operation
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.requests import MAX_NAME, MAX_NAMES, MAX_VALUE, Orders, ReloadRefused
+from automax_ros.rack.operator.requests import MAX_NAME, MAX_NAMES, MAX_VALUE, OperatorRequests, ReloadRefused
 from automax_ros.rack.rack import Rack
 
 YAML = """\
@@ -65,7 +65,7 @@ def told(rack: Rack) -> Told:
 
 
 def test_values_are_read_from_texts_as_everywhere(rack, told):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     for name, text, value in [
         ("ref%", " 255 ", 255),
         ("GAIN", "0.1", 0.10000000149011612),
@@ -123,14 +123,14 @@ def test_values_are_read_from_texts_as_everywhere(rack, told):
 def test_what_means_nothing_is_refused_and_told(rack, told, what, arguments, reason):
     before = rack.state().image
     with pytest.raises(OperationRefused) as refused:
-        getattr(Orders(rack), what)(*arguments)
+        getattr(OperatorRequests(rack), what)(*arguments)
     assert reason in str(refused.value)
     assert [(item.what, item.ok, item.reason) for item in told.operations] == [(what, False, str(refused.value))]
     assert rack.state().image == before
 
 
 def test_questions_are_no_operations(rack, told):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     for names in (["NONE%"], ["SPEED.NIL%"], ["NIL.X%"], ["X" * 101]):
         with pytest.raises(OperationRefused):
             orders.get(names)
@@ -141,7 +141,7 @@ def test_questions_are_no_operations(rack, told):
 
 
 def test_a_source_with_errors_is_refused_with_what_is_wrong_and_a_good_one_runs(rack, told):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     with pytest.raises(ReloadRefused) as refused:
         orders.reload("SPEED", SPEED.replace("OUTPUT=OUT%", "OUTPUT=NIL%"))
     assert any("NIL%" in item and "110" in item for item in refused.value.findings)
@@ -158,7 +158,7 @@ def test_a_source_with_errors_is_refused_with_what_is_wrong_and_a_good_one_runs(
 
 
 def test_stop_all_and_run_all(rack, told):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     orders.stop_all()
     assert rack.stop_reason == "STOP ALL by the operator"
     orders.run_all()
@@ -170,7 +170,7 @@ def test_stop_all_and_run_all(rack, told):
 
 
 def test_a_source_that_was_prepared_before_another_reload_is_known_to_be_old(rack, told):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     named = orders.admit_reload("SPEED", SPEED.replace("TRIM%, OUTPUT", "7, OUTPUT"))
     first = orders.prepare(*named)
     assert orders.is_current(first)
@@ -186,7 +186,7 @@ def test_a_source_that_was_prepared_before_another_reload_is_known_to_be_old(rac
 
 
 def test_power_is_switched_in_words(rack, told):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     orders.power("off")
     assert not rack.operations.powered
     orders.power(" ON ", without_battery=True)
@@ -218,14 +218,14 @@ def test_power_is_switched_in_words(rack, told):
 )
 def test_power_that_cannot_be_is_refused_and_told(rack, told, arguments, reason):
     with pytest.raises(OperationRefused) as refused:
-        Orders(rack).power(*arguments)
+        OperatorRequests(rack).power(*arguments)
     assert reason in str(refused.value).replace("'", '"')
     assert not told.operations[-1].ok
     assert rack.operations.powered
 
 
 def test_a_task_is_deleted_and_comes_back_with_its_source(rack, told):
-    orders = Orders(rack)
+    orders = OperatorRequests(rack)
     with pytest.raises(OperationRefused, match="runs: stop it first"):
         orders.delete("speed")
     orders.stop("SPEED")

@@ -6,7 +6,7 @@ import pytest
 from recordings.live_racks import build
 
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.requests import Orders
+from automax_ros.rack.operator.requests import OperatorRequests
 from automax_ros.rack.rack import Rack
 
 YAML = """\
@@ -39,8 +39,8 @@ def rack(tmp_path) -> Rack:
 
 
 @pytest.fixture
-def orders(rack) -> Orders:
-    return Orders(rack)
+def orders(rack) -> OperatorRequests:
+    return OperatorRequests(rack)
 
 
 def test_patterns_mean_commons_elements_and_what_a_task_has(orders):

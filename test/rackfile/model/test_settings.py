@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rack.helpers import HEAD, good
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.kinds import Direction
 from automax_ros.core.names import NameFault
 from automax_ros.core.types import DataType
@@ -97,7 +97,7 @@ def test_setting_names_the_variable_as_the_rack_does(config):
 
 def test_an_element_can_be_set(config):
     assert setting(config, "grid%[1, 2] = 3") == ("GRID%(1,2)", 3)
-    with pytest.raises(Fault, match="GRID% is an array"):
+    with pytest.raises(UserError, match="GRID% is an array"):
         setting(config, "GRID%=3")
 
 
@@ -110,5 +110,5 @@ def test_what_the_rack_itself_writes_cannot_be_set(tmp_path, name):
 
 
 def test_lone_surrogates_are_no_text(config):
-    with pytest.raises(Fault, match=r"not a value for NOTE\$"):
+    with pytest.raises(UserError, match=r"not a value for NOTE\$"):
         setting(config, "NOTE$=\udcff")

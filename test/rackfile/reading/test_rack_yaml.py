@@ -12,7 +12,7 @@ from automax_ros.core.diagnostics import render_all
 from automax_ros.core.yaml_text import MAX_DEPTH, Mapping, Node, Scalar, read_yaml
 from automax_ros.rackfile.loader import LoadResult, load
 from automax_ros.rackfile.reading.files import MAX_BYTES
-from automax_ros.rackfile.reading.values import MAX_FINDINGS, Findings
+from automax_ros.rackfile.reading.values import MAX_FINDINGS, ProblemList
 
 PROPERTY = settings(deadline=None, derandomize=True, database=None, max_examples=300)
 
@@ -34,7 +34,7 @@ common:
 
 
 def places(text: str) -> list[tuple[str, int, int, int]]:
-    findings = Findings()
+    findings = ProblemList()
     read_yaml(text, findings.yaml_flaw)
     return [(item.code, item.span.line, item.span.column, item.span.end_column) for item in findings.in_order()]
 
@@ -92,7 +92,7 @@ TREES = st.recursive(
 def test_trees_come_back_as_yaml_wrote_them(tree, flow):
     """An independent writer, PyYAML's emitter, and the reader agree."""
     text = yaml.safe_dump(tree, default_flow_style=flow, allow_unicode=True)
-    findings = Findings()
+    findings = ProblemList()
     node = read_yaml(text, findings.yaml_flaw)
     if findings.errors:
         allowed = {"AMX6005"} | ({"AMX6004"} if "<<" in text else set())

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rack.helpers import good, loaded
 
 from automax_ros.core.kinds import WriterKind
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.checks.tasks import check_tasks
 
@@ -133,7 +133,7 @@ def test_the_rest_of_a_plants_life(tmp_path):
     rack.run(0.05)
     assert rack.value("RPM") == 0.0
     assert rack.plants["WINDER"].now_ns >= rack.now_ns - 10_000_000
-    Controls(rack).plant("WINDER", "lose_tach", "true")
+    SwitchOperations(rack).plant("WINDER", "lose_tach", "true")
     rack.operations.power_on()
     rack.run(0.01)
     assert rack.value("RPM") == pytest.approx(875.0)
@@ -198,7 +198,7 @@ def test_a_rack_with_feeds_goes_on_from_its_state_bit_for_bit(tmp_path_factory, 
     for rack in (whole, later):
         log = Log(rack)
         rack.observe(log)
-        Controls(rack).plant("WINDER", "load_torque_nm", "5") if "torque" in kind else None
+        SwitchOperations(rack).plant("WINDER", "load_torque_nm", "5") if "torque" in kind else None
         rack.run(0.02)
         rack.log = log
     assert whole.state() == later.state()

@@ -25,7 +25,7 @@ from automax_ros.messages.types.rack_files import (
     fingerprint,
 )
 from automax_ros.messages.types.topics import LATCHED
-from automax_ros.recordings.live.arrival import ArrivalOrder
+from automax_ros.recordings.live.arrival import SendOrder
 from automax_ros.recordings.live.topics import MAX_VALUE_TOPICS, LiveTopics
 from automax_ros.recordings.mcap.channels import MAX_DEPTH, MAX_QOS_BYTES, STREAM, recorded_qos
 from recordings.live_racks import build
@@ -82,7 +82,7 @@ def test_scan_of_a_nameless_or_endless_task_is_refused() -> None:
 def test_messages_that_come_within_the_hold_are_put_in_order(delays: list[tuple[int, int]], offset: int) -> None:
     """Messages 10 ns apart, each up to 90 ns on its way, seen by looks every 25 ns; the clocks differ by ``offset``."""
     coming = [(number * 10 + delay, number) for number, (_, delay) in enumerate(delays)]
-    order: ArrivalOrder[int] = ArrivalOrder(hold_ns=100)
+    order: SendOrder[int] = SendOrder(hold_ns=100)
     found: list[int] = []
     waiting = sorted(coming)
     for look in range(0, coming[-1][1] * 10 + 500, 25):
@@ -96,7 +96,7 @@ def test_messages_that_come_within_the_hold_are_put_in_order(delays: list[tuple[
 
 
 def test_nothing_is_due_before_the_hold_and_the_rest_is_in_order() -> None:
-    order: ArrivalOrder[str] = ArrivalOrder(hold_ns=100)
+    order: SendOrder[str] = SendOrder(hold_ns=100)
     order.add(7, "b")
     order.add(5, "a")
     assert order.due(1000) == []

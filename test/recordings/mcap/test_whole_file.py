@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from automax_ros.recordings.mcap.errors import BagError
-from automax_ros.recordings.mcap.whole_file import written_whole
+from automax_ros.recordings.mcap.whole_file import atomic_write
 from automax_ros.recordings.read.common_log import Cell
 from automax_ros.recordings.tables.export import CommonTable, Table, write_csv
 from automax_ros.recordings.tables.export_npz import write_npz
@@ -54,7 +54,7 @@ def test_a_broken_export_changes_nothing(tmp_path: Path, bag: Path, name: str, b
 
 def test_the_file_appears_at_the_end_with_its_suffix(tmp_path: Path) -> None:
     output = tmp_path / "OUT.svg"
-    with written_whole(output) as place:
+    with atomic_write(output) as place:
         assert (place.parent, place.suffix, place != output) == (tmp_path, ".svg", True)
         place.write_text("whole")
         assert not output.exists()
@@ -68,11 +68,11 @@ def test_links_and_permissions_stay(tmp_path: Path) -> None:
     target.chmod(0o640)
     link = tmp_path / "link.csv"
     link.symlink_to(target)
-    with written_whole(link) as place:
+    with atomic_write(link) as place:
         place.write_text("new")
     assert link.is_symlink()
     assert (target.read_text(), target.stat().st_mode & 0o777) == ("new", 0o640)
-    with written_whole(tmp_path / "fresh.csv") as place:
+    with atomic_write(tmp_path / "fresh.csv") as place:
         place.write_text("new")
     with (tmp_path / "usual").open("w"):
         pass
@@ -84,7 +84,7 @@ def test_a_file_that_must_not_be_written_is_not_replaced(tmp_path: Path) -> None
     output = tmp_path / "OUT.csv"
     output.write_text("old")
     output.chmod(0o444)
-    with pytest.raises(PermissionError), written_whole(output):
+    with pytest.raises(PermissionError), atomic_write(output):
         pass
     assert output.read_text() == "old"
 

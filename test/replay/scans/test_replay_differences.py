@@ -13,7 +13,7 @@ from recordings.live_racks import build
 from automax_ros.core.types import same_bits
 from automax_ros.messages.types.messages import Scan, ScanError, TaskState, Values
 from automax_ros.rack.rack import Rack
-from automax_ros.replay.scans.compare import SETTLED_SCANS, Found, Label, Seen, Tallies, within
+from automax_ros.replay.scans.compare import SETTLED_SCANS, DifferenceCounts, Found, Label, Seen, within
 from automax_ros.replay.scans.report import Kind
 from replay.replays import SPEED, WORK, edited, record, recorded, replayed, rewritten
 
@@ -310,7 +310,7 @@ def test_stream_of_many_types_replays(tmp_path):
 
 def numbers(differences: list[float]) -> tuple[int, float, float] | None:
     """Where and how a row of differences settles; scans count from 1."""
-    tallies = Tallies(0, 10)
+    tallies = DifferenceCounts(0, 10)
     for scan, difference in enumerate(differences, 1):
         found = [Found(Kind.VARIABLE, "X", 0, difference)] if difference else []
         tallies.scan("TASK", scan, scan, found, lambda *_: Label("X"), Seen)

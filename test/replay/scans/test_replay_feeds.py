@@ -6,7 +6,7 @@ import pytest
 
 from automax_ros.core.kinds import WriterKind
 from automax_ros.messages.types.messages import CommonWrite
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.recordings.info.info import bag_info
 from automax_ros.recordings.read.reader import BagReader
@@ -45,9 +45,9 @@ WORK = """\
 
 
 def loading(rack: Rack, number: int) -> None:
-    Controls(rack).plant("SPEED", "load_torque_nm", str(number * 7 % 40 - 20))
+    SwitchOperations(rack).plant("SPEED", "load_torque_nm", str(number * 7 % 40 - 20))
     if number == 9:
-        Controls(rack).plant("SPEED", "lose_tach", "true")
+        SwitchOperations(rack).plant("SPEED", "lose_tach", "true")
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from automax_ros.core.ticks import NS_PER_MS, NS_PER_S
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.rackfile.model.writers import ROS_WRITER
-from automax_ros.ros.intake.intake import MOST_OF_ONE, MOST_ROUNDS_FIRST, Door
+from automax_ros.ros.intake.intake import MOST_OF_ONE, MOST_ROUNDS_FIRST, MessageIntake
 from automax_ros.ros.setup.arguments import split_arguments
 from automax_ros.runtime.time.simulated_pacer import LEAST_TICK_NS, MOST_TICK_NS, SimulatedTime
 from ros.intake.test_requests import parameter
@@ -306,7 +306,7 @@ def test_what_has_come_before_the_clock_is_taken_before_it(monkeypatch):
     """Writes in any number come first; those that come later wait for the next message of the clock at most."""
     log: list[tuple[str, int]] = []
     write, clock = Way("write", log, range(10)), Way("clock", log, [100, 101])
-    door = Door(lambda what, error: pytest.fail(f"{what}: {error}"))
+    door = MessageIntake(lambda what, error: pytest.fail(f"{what}: {error}"))
     door._last = clock
     looks = iter([[clock, write]])
 
@@ -326,7 +326,7 @@ def test_what_has_come_before_the_clock_is_taken_before_it(monkeypatch):
 def test_flood_of_writes_does_not_stop_the_clock(monkeypatch):
     log: list[tuple[str, int]] = []
     write, clock = Way("write", log, range(100_000)), Way("clock", log, [1, 2, 3])
-    door = Door(lambda what, error: pytest.fail(f"{what}: {error}"))
+    door = MessageIntake(lambda what, error: pytest.fail(f"{what}: {error}"))
     door._last = clock
     monkeypatch.setattr("automax_ros.ros.intake.intake.time.sleep", lambda _: None)
 

@@ -23,14 +23,14 @@ def running(folder, **seating):
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
 
-    from automax_ros.ros.distributed.bus import Seating
+    from automax_ros.ros.distributed.bus import ProcessLayout
     from automax_ros.ros.rack_nodes import RackNodes
 
     config = config_in(folder)
     context = Context()
     context.init(args=["--ros-args", "--disable-stdout-logs"])
     executor = SingleThreadedExecutor(context=context)
-    taken = Seating(SEATS, RUN_ID, **seating)
+    taken = ProcessLayout(SEATS, RUN_ID, **seating)
     parts = [RackNodes(Rack(config, local=s), context=context, seating=taken) for s in SEATS]
     for part in parts:
         part.add_to(executor)
@@ -85,7 +85,7 @@ def ask(racks):
 
 @pytest.mark.usefixtures("ros_domain_id")
 def test_processes_that_hear_of_the_start_when_it_is_over_join(tmp_path):
-    with running(tmp_path, lead_ns=0) as racks:
+    with running(tmp_path, start_delay_ns=0) as racks:
         home, one, two = racks["parts"]
         assert (home.bus.joining, one.bus.joining, two.bus.joining) == (False, True, True)
         wait(lambda: one.rack.task("ONE").scan_number > 0 and two.rack.task("TWO").scan_number > 0)

@@ -8,8 +8,8 @@ from system.support import wait_until
 
 from automax_ros.ros.intake import intake as door_module
 from automax_ros.ros.intake import rcl
-from automax_ros.ros.intake.intake import MOST_A_ROUND, MOST_OF_ONE, Door
-from automax_ros.ros.intake.raw_messages import MOST_SENDERS, Senders, Taken
+from automax_ros.ros.intake.intake import MOST_A_ROUND, MOST_OF_ONE, MessageIntake
+from automax_ros.ros.intake.raw_messages import MOST_SENDERS, RawMessage, SequenceTracker
 
 
 class Way:
@@ -35,7 +35,7 @@ def door(monkeypatch):
     """A door that looks by itself, as where rcl is not found."""
     monkeypatch.setattr(door_module, "library", lambda: None)
     reports = []
-    made = Door(lambda what, error: reports.append((what, error)))
+    made = MessageIntake(lambda what, error: reports.append((what, error)))
     made.reports = reports
     yield made
     made.close()
@@ -96,10 +96,10 @@ def test_failure_is_told_and_the_others_go_on(door):
 
 
 def test_senders_tell_copies_and_what_is_missing():
-    senders = Senders()
+    senders = SequenceTracker()
 
     def missing(sender, number):
-        return senders.missing(Taken(b"", 0, 0, number, sender))
+        return senders.missing(RawMessage(b"", 0, 0, number, sender))
 
     assert [missing(b"a", 5), missing(b"a", 6), missing(b"a", 6), missing(b"a", 9)] == [0, 0, None, 2]
     assert missing(b"b", 100) == 0

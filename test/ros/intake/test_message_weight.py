@@ -2,7 +2,7 @@
 
 import pytest
 
-from automax_ros.ros.intake.request_size import MOST, OF_A_MESSAGE, OF_A_TEXT, TooHeavy, weight
+from automax_ros.ros.intake.request_size import MOST, OF_A_MESSAGE, OF_A_TEXT, RequestTooLarge, request_size
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def weigh(ros_domain_id):
         try:
             conversion.from_python(request, raw)
             assert conversion.to_python(raw) == conversion.read(raw) == request
-            return weight(kind.Request, raw)
+            return request_size(kind.Request, raw)
         finally:
             conversion.destroy(raw)
 
@@ -55,7 +55,7 @@ def test_weight_is_that_of_all_parts(weigh):
 def test_heavy_requests_are_refused(weigh, value):
     from rcl_interfaces.srv import SetParameters
 
-    with pytest.raises(TooHeavy):
+    with pytest.raises(RequestTooLarge):
         weigh(SetParameters, SetParameters.Request(parameters=[parameter(**value)]))
 
 
@@ -63,5 +63,5 @@ def test_as_many_parameters_as_a_rack_has_pass_and_more_do_not(weigh):
     from rcl_interfaces.srv import SetParameters
 
     assert weigh(SetParameters, SetParameters.Request(parameters=[parameter(type=2)] * 600)) <= MOST
-    with pytest.raises(TooHeavy):
+    with pytest.raises(RequestTooLarge):
         weigh(SetParameters, SetParameters.Request(parameters=[parameter(type=2)] * 2000))

@@ -5,19 +5,19 @@ import time
 
 from system.support import wait_until
 
-from automax_ros.ros.intake.rack_lock import Turns
+from automax_ros.ros.intake.rack_lock import RackLock
 
 
 def test_visitor_enters_within_itself():
-    turns = Turns()
+    turns = RackLock()
     with turns, turns:
         pass
-    with turns.scanner, turns:
+    with turns.for_scan, turns:
         pass
 
 
 def test_nobody_enters_while_another_is_in():
-    turns, inside, most = Turns(), [], []
+    turns, inside, most = RackLock(), [], []
 
     def visit(entry):
         for _ in range(200):
@@ -26,7 +26,7 @@ def test_nobody_enters_while_another_is_in():
                 most.append(len(inside))
                 inside.pop()
 
-    threads = [threading.Thread(target=visit, args=(entry,)) for entry in (turns, turns, turns.scanner)]
+    threads = [threading.Thread(target=visit, args=(entry,)) for entry in (turns, turns, turns.for_scan)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -37,7 +37,7 @@ def test_nobody_enters_while_another_is_in():
 
 def test_scan_waits_for_one_visit_at_most():
     """A visitor that comes again and again at once would keep a plain lock from the one that waits."""
-    turns, visits, stop = Turns(), [], threading.Event()
+    turns, visits, stop = RackLock(), [], threading.Event()
 
     def visit():
         while not stop.is_set():
@@ -51,7 +51,7 @@ def test_scan_waits_for_one_visit_at_most():
     try:
         for _ in range(20):
             before = len(visits)
-            with turns.scanner:
+            with turns.for_scan:
                 between.append(sum(visits[before:]))
             time.sleep(0.001)
     finally:
@@ -62,10 +62,10 @@ def test_scan_waits_for_one_visit_at_most():
 
 def test_visitor_enters_again_within_itself_while_a_scan_waits():
     """Else both would wait for each other."""
-    turns, scanned = Turns(), threading.Event()
+    turns, scanned = RackLock(), threading.Event()
 
     def scan():
-        with turns.scanner:
+        with turns.for_scan:
             scanned.set()
 
     scanner = threading.Thread(target=scan)

@@ -9,7 +9,7 @@ from system.support import RACKS, ROOT, Automax, wait_until
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.rackfile.processes import seats_of
+from automax_ros.rackfile.processes import processes_of
 
 LINE = ROOT / "config" / "two_racks" / "line" / "rack.yaml"
 OPERATED = RACKS / "operated" / "rack.yaml"
@@ -86,7 +86,7 @@ def test_processes_of_a_distributed_rack_have_enclaves_of_their_own(ros_domain_i
     from automax_ros.ros.security.profiles import operator_of
 
     config = replace(config_of(LINE), namespace="plant/line1")
-    enclaves = {item.path: item for item in enclaves_of_seats(config, seats_of(config))}
+    enclaves = {item.path: item for item in enclaves_of_seats(config, processes_of(config))}
     assert list(enclaves) == ["/plant/line1/common_memory", "/plant/line1/processor_1", "/plant/line1/network_5"]
     network, processor = enclaves["/plant/line1/network_5"], enclaves["/plant/line1/processor_1"]
     assert "/plant/dcsnet/PAPER" in network.names("publish")

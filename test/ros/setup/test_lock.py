@@ -5,7 +5,7 @@ import os
 import pytest
 
 from automax_ros.ros.setup.environment import RosUnavailable
-from automax_ros.ros.setup.lock import LockError, RackAlreadyRuns, RackLock, domain_id
+from automax_ros.ros.setup.lock import InstanceLock, LockError, RackAlreadyRuns, domain_id
 
 
 @pytest.fixture(autouse=True)
@@ -15,52 +15,52 @@ def folder(monkeypatch, tmp_path):
 
 
 def test_second_holder_is_told_who_holds_it():
-    with RackLock("line1", 7):
+    with InstanceLock("line1", 7):
         with pytest.raises(
             RackAlreadyRuns, match=rf"rack /line1 in ROS domain 7 runs already \(process {os.getpid()}\)"
         ):
-            RackLock("line1", 7).__enter__()
-        with RackLock("line1", 8), RackLock("line2", 7):
+            InstanceLock("line1", 7).__enter__()
+        with InstanceLock("line1", 8), InstanceLock("line2", 7):
             pass
 
 
 def test_lock_is_free_afterwards():
     for _ in range(3):
-        with RackLock("line1", 7):
+        with InstanceLock("line1", 7):
             pass
 
 
 def test_seats_share_a_rack_and_hold_their_own():
-    with RackLock("line1", 7, "processor_1"), RackLock("line1", 7, "processor_2"):
+    with InstanceLock("line1", 7, "processor_1"), InstanceLock("line1", 7, "processor_2"):
         with pytest.raises(
             RackAlreadyRuns, match=rf"processor_1 of rack /line1 in ROS domain 7 runs already \(process {os.getpid()}\)"
         ):
-            RackLock("line1", 7, "processor_1").__enter__()
-        with RackLock("line1", 7, "processor_3"):
+            InstanceLock("line1", 7, "processor_1").__enter__()
+        with InstanceLock("line1", 7, "processor_3"):
             pass
 
 
 def test_whole_rack_and_its_seats_exclude_each_other():
-    with RackLock("line1", 7), pytest.raises(RackAlreadyRuns, match=rf"rack /line1 .* \(process {os.getpid()}\)"):
-        RackLock("line1", 7, "processor_1").__enter__()
-    with RackLock("line1", 7, "processor_1"):
+    with InstanceLock("line1", 7), pytest.raises(RackAlreadyRuns, match=rf"rack /line1 .* \(process {os.getpid()}\)"):
+        InstanceLock("line1", 7, "processor_1").__enter__()
+    with InstanceLock("line1", 7, "processor_1"):
         with pytest.raises(RackAlreadyRuns, match=r"\(distributed over several processes\)"):
-            RackLock("line1", 7).__enter__()
-        with RackLock("line1", 8):
+            InstanceLock("line1", 7).__enter__()
+        with InstanceLock("line1", 8):
             pass
-    with RackLock("line1", 7):
+    with InstanceLock("line1", 7):
         pass
 
 
 def test_rack_below_a_namespace_has_a_lock_of_its_own():
-    with RackLock("plant/line1", 7), RackLock("plant_line1", 7), RackLock("line1", 7):
+    with InstanceLock("plant/line1", 7), InstanceLock("plant_line1", 7), InstanceLock("line1", 7):
         pass
 
 
 def test_lock_is_free_after_an_error():
-    with pytest.raises(ZeroDivisionError), RackLock("line1", 7):
+    with pytest.raises(ZeroDivisionError), InstanceLock("line1", 7):
         raise ZeroDivisionError
-    with RackLock("line1", 7):
+    with InstanceLock("line1", 7):
         pass
 
 
@@ -68,7 +68,7 @@ def test_link_in_the_way_is_refused(folder):
     (folder / "elsewhere").write_text("keep")
     (folder / f"automax_ros_{os.getuid()}_7_line1.lock").symlink_to(folder / "elsewhere")
     with pytest.raises(LockError, match="cannot open the lock file"):
-        RackLock("line1", 7).__enter__()
+        InstanceLock("line1", 7).__enter__()
     assert (folder / "elsewhere").read_text() == "keep"
 
 
@@ -88,26 +88,26 @@ def test_wrong_domain(monkeypatch, text):
 
 
 def test_no_file_is_left_behind(folder):
-    with RackLock("line1", 7):
+    with InstanceLock("line1", 7):
         assert len(list(folder.iterdir())) == 1
     assert list(folder.iterdir()) == []
-    with RackLock("line1", 7, "processor_1"):
-        with RackLock("line1", 7, "processor_2"):
+    with InstanceLock("line1", 7, "processor_1"):
+        with InstanceLock("line1", 7, "processor_2"):
             pass
         assert len(list(folder.iterdir())) == 2, "the rack's own is shared, and one seat is held"
     assert list(folder.iterdir()) == []
-    with RackLock("line1", 7), pytest.raises(RackAlreadyRuns):
-        RackLock("line1", 7).__enter__()
+    with InstanceLock("line1", 7), pytest.raises(RackAlreadyRuns):
+        InstanceLock("line1", 7).__enter__()
     assert list(folder.iterdir()) == []
 
 
 def test_a_file_that_was_taken_away_meanwhile_does_not_lock(folder):
     """Between open and flock the holder may have ended: whoever comes then locks the file that stands there now."""
-    first = RackLock("line1", 7)
+    first = InstanceLock("line1", 7)
     first.__enter__()
     (path,) = folder.iterdir()
     path.unlink()
-    with RackLock("line1", 7):
+    with InstanceLock("line1", 7):
         inode = path.stat().st_ino
         first.__exit__(None, None, None)
         assert path.stat().st_ino == inode, "the other's file is left alone"

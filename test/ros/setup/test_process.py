@@ -10,7 +10,7 @@ import pytest
 from rclpy.node import Node
 from system.support import wait_until
 
-from automax_ros.ros.intake.guard import Guard
+from automax_ros.ros.intake.guard import RequestGuard
 from automax_ros.ros.setup.process import RosProcess
 from automax_ros.runtime.health import Health
 
@@ -72,7 +72,7 @@ def test_those_that_stay_are_served_when_others_have_left(ros_domain_id):
     stays.create_timer(0.005, lambda: served.append(1))
     for node in (stays, leaves):
         process.executor.add_node(node)
-    process.spin(Guard(Health(), print))
+    process.spin(RequestGuard(Health(), print))
     wait_until(lambda: bool(served))
     with process.resting():
         process.executor.remove_node(leaves)

@@ -8,7 +8,7 @@ from compile.support import repeatable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from automax_ros.runtime.scan.processor_time import ProcessorTime
+from automax_ros.runtime.scan.processor_time import ModeledExecution
 from automax_ros.runtime.time.scheduler import EventClass, EventKey, Scheduler
 
 Moments = list[tuple[int, str, int]]
@@ -46,7 +46,7 @@ class Rig:
 
     def __init__(self, *jobs: tuple[Job, int, int]) -> None:
         self.scheduler, self.moments, self.overlaps = Scheduler(), [], []
-        self.time = ProcessorTime(self.scheduler, "processor_1")
+        self.time = ModeledExecution(self.scheduler, "processor_1")
         for job, first, period in jobs:
             job.moments = self.moments
             key = EventKey(EventClass.SCAN, job.priority, job.name)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from automax_ros.core.faults import Fault
+from automax_ros.core.faults import UserError
 from automax_ros.core.names import NameFault
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
@@ -156,7 +156,7 @@ def test_a_held_scan_that_is_stopped_is_given_up(stepper):
     assert stepper.place == ("", 0)
     assert stepper.rack.task("SPEED").status is Status.STOPPED
     assert stepper.value("SPEED.N%") == 0, "as before the scan: a recording knows whole scans alone"
-    with pytest.raises(Fault, match="task SPEED does not run"):
+    with pytest.raises(UserError, match="task SPEED does not run"):
         stepper.scan("SPEED")
 
 
@@ -185,14 +185,14 @@ def test_somebody_may_interrupt(tmp_path):
     ],
 )
 def test_what_cannot_be_done_is_said(stepper, act, message):
-    with pytest.raises((Fault, NameFault), match=message.replace("(", r"\(")):
+    with pytest.raises((UserError, NameFault), match=message.replace("(", r"\(")):
         act(stepper)
 
 
 def test_modeled_scans_cannot_be_held_at_a_line(tmp_path):
     stepper = built(tmp_path, RACK.replace("rack: PM1\n", "rack: PM1\nexecution: modeled\n"))
     stepper.start()
-    with pytest.raises(Fault, match="modeled execution cannot be held"):
+    with pytest.raises(UserError, match="modeled execution cannot be held"):
         stepper.break_at("SPEED", 110)
     stepper.break_on("SPEED.N%")
     halt = stepper.scan("DRAW")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import StimuliFile, read_for_rack
 
 RACK = """\
@@ -53,10 +53,10 @@ def read(rack: Rack, folder: Path, text: str) -> StimuliFile:
     return read_for_rack(path, rack)
 
 
-def playing(rack: Rack, folder: Path, text: str) -> Stimulation:
+def playing(rack: Rack, folder: Path, text: str) -> StimuliPlayer:
     """Start the rack with a file that has no errors."""
     file = read(rack, folder, text)
     assert file.stimuli is not None, file.diagnostics
-    found = Stimulation(file.stimuli, rack.scheduler)
+    found = StimuliPlayer(file.stimuli, rack.scheduler)
     rack.start(first=found.begin)
     return found

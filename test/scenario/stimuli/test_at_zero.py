@@ -12,7 +12,7 @@ from automax_ros.rackfile.loader import load
 from automax_ros.recordings.write.recorder import Recorder
 from automax_ros.replay.engine import replay
 from automax_ros.scenario.report import report_of
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
 RACK = """\
@@ -52,7 +52,7 @@ class Run:
         self.rack = Rack(config)
         read = read_for_rack(folder / "stimuli.yaml", self.rack)
         assert read.stimuli is not None, read.diagnostics
-        self.happening = Stimulation(read.stimuli, self.rack.scheduler)
+        self.happening = StimuliPlayer(read.stimuli, self.rack.scheduler)
         stream = RackStream(self.rack, self.rack.fingerprint)
         recorder = Recorder(self.rack, stream, folder / "bag")
         stream.begin()

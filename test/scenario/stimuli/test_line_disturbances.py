@@ -13,10 +13,10 @@ from rack.modeled.modeled_drives import TASK, held
 from replay.replays import edited, record, replayed
 
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.controls import Controls
+from automax_ros.rack.operator.controls import SwitchOperations
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
 SLOW, FAST = (4, 2), (80, 40)
@@ -77,11 +77,11 @@ def test_noise_passes_a_fast_line_sync_and_not_a_slow_one(tmp_path, execution):
         calm = look(rack, 0.5)
         assert calm.swing_us < 0.1
         assert calm.swing < 1.0
-        Controls(rack).plant("MOTOR", "line_noise", "1 7")
+        SwitchOperations(rack).plant("MOTOR", "line_noise", "1 7")
         seen[steps] = look(rack)
         assert abs(seen[steps].mean_us) < 10.0
         assert seen[steps].current == pytest.approx(REFERENCE, rel=0.005)
-        Controls(rack).plant("MOTOR", "repair", "all")
+        SwitchOperations(rack).plant("MOTOR", "repair", "all")
         rack.run(1.0)
         again = look(rack, 0.5)
         assert again.swing_us < 1.0
@@ -101,7 +101,7 @@ def test_notches_and_harmonics_shift_the_firing_slowly_or_at_once(tmp_path, verb
         folder = tmp_path / str(steps[0])
         folder.mkdir()
         rack = drive(folder, steps)
-        Controls(rack).plant("MOTOR", verb, text)
+        SwitchOperations(rack).plant("MOTOR", verb, text)
         first[steps] = look(rack, 0.1)
         rack.run(3.0)
         later = look(rack, 0.5)
@@ -118,7 +118,7 @@ def test_a_fast_line_sync_follows_a_generator_that_takes_a_load(tmp_path, steps,
     rack = powered(tmp_path)
     registers(rack, *steps)
     assert start(rack)
-    Controls(rack).plant("UNWIND", "generator_load", "15 1.5 0.2 0.8")
+    SwitchOperations(rack).plant("UNWIND", "generator_load", "15 1.5 0.2 0.8")
     rack.run(4.0)
     assert rack.value("SYNC@") is lost
     assert logged(rack) == ([7111] if lost else [])
@@ -129,10 +129,10 @@ def test_a_sync_that_is_torn_to_pieces_is_lost(tmp_path):
     """Notches deeper than the wave, a quarter of a cycle before its zero: more than 2000 us."""
     rack = powered(tmp_path)
     assert start(rack)
-    Controls(rack).plant("UNWIND", "line_notches", "120 400 1 -80")
+    SwitchOperations(rack).plant("UNWIND", "line_notches", "120 400 1 -80")
     rack.run(0.2)
     assert active(rack) == {"SYNC@"}
-    Controls(rack).plant("UNWIND", "repair", "all")
+    SwitchOperations(rack).plant("UNWIND", "repair", "all")
     rack.run(1.5)
     rack.write("RESET@", True)
     rack.run(0.05)
@@ -143,7 +143,7 @@ def test_a_notched_line_gives_less_voltage_than_its_angle_promises(tmp_path):
     """52.4: what tach loss takes for armature voltage, DELTA, is then greater at the same speed and current."""
     rack = drive(tmp_path, SLOW)
     sound = rack.value("DELTA%")
-    Controls(rack).plant("MOTOR", "line_notches", "60 300 6 10")  # after the zero: the sync does not see them
+    SwitchOperations(rack).plant("MOTOR", "line_notches", "60 300 6 10")  # after the zero: the sync does not see them
     rack.run(0.5)
     seen = look(rack, 0.2)
     assert abs(seen.mean_us) < 1.0
@@ -162,7 +162,7 @@ STIMULI = """\
 """
 
 
-def played(folder: Path, *, execution: str = "ideal") -> tuple[Rack, Stimulation]:
+def played(folder: Path, *, execution: str = "ideal") -> tuple[Rack, StimuliPlayer]:
     """Return a rack at rest at 0 with these stimuli."""
     folder.mkdir(exist_ok=True)
     held(folder, "57C435", rpm=600, execution=execution)
@@ -172,7 +172,7 @@ def played(folder: Path, *, execution: str = "ideal") -> tuple[Rack, Stimulation
     (folder / "s.yaml").write_text("- {at: 0, set: {PERMIT@: true}}\n" + STIMULI)
     file = read_for_rack(folder / "s.yaml", rack)
     assert file.stimuli is not None, file.diagnostics
-    return rack, Stimulation(file.stimuli, rack.scheduler)
+    return rack, StimuliPlayer(file.stimuli, rack.scheduler)
 
 
 def test_stimuli_name_what_they_set_and_fill_in_what_is_usual(tmp_path):
@@ -228,8 +228,8 @@ def test_a_state_goes_on_bit_for_bit(tmp_path, at):
 
 def test_what_a_line_cannot_do_is_refused(tmp_path):
     rack = held(tmp_path, "57C435", rpm=900)
-    Controls(rack).plant("MOTOR", "line_hz", "49")
+    SwitchOperations(rack).plant("MOTOR", "line_hz", "49")
     before = rack.plants.state()
     with pytest.raises(OperationRefused, match=r"fall from 49 to 46 Hz.*dip_hz of 1 at most"):
-        Controls(rack).plant("MOTOR", "generator_load", "10 3")
+        SwitchOperations(rack).plant("MOTOR", "generator_load", "10 3")
     assert rack.plants.state() == before

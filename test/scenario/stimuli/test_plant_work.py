@@ -8,9 +8,9 @@ import pytest
 from rack.helpers import good
 
 from automax_ros.rack.base.stop_cause import OperationRefused
-from automax_ros.rack.operator.controls import MOST_CHARACTERS, Controls
+from automax_ros.rack.operator.controls import MOST_CHARACTERS, SwitchOperations
 from automax_ros.rack.rack import Rack
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
 RACK = """\
@@ -45,11 +45,11 @@ def rack_of(folder: Path) -> tuple[Rack, Told]:
     return rack, told
 
 
-def played(rack: Rack, folder: Path, text: str) -> Stimulation:
+def played(rack: Rack, folder: Path, text: str) -> StimuliPlayer:
     (folder / "stimuli.yaml").write_text(text)
     file = read_for_rack(folder / "stimuli.yaml", rack)
     assert file.stimuli is not None, file.diagnostics
-    found = Stimulation(file.stimuli, rack.scheduler)
+    found = StimuliPlayer(file.stimuli, rack.scheduler)
     rack.start()
     found.begin()
     return found
@@ -113,7 +113,7 @@ def test_what_cannot_be_done_is_refused_and_told(tmp_path, name, verb, text, why
     rack.start()
     before = rack.plants.state()
     with pytest.raises(OperationRefused, match=why):
-        Controls(rack).plant(name, verb, text)
+        SwitchOperations(rack).plant(name, verb, text)
     assert rack.plants.state() == before
     (operation,) = [item for item in told.operations if item.what == "plant"]
     assert not operation.ok
@@ -124,19 +124,19 @@ def test_a_load_of_many_samples_is_no_operation(tmp_path):
     rack, told = rack_of(tmp_path)
     rack.start()
     for torque in (1.0, 2.0, 3.5):
-        Controls(rack).load("REEL", torque)
+        SwitchOperations(rack).load("REEL", torque)
     assert rack.plants["REEL"].load_torque_nm == 3.5
     assert [item for item in told.operations if item.what == "plant"] == []
     with pytest.raises(OperationRefused, match="load torque"):
-        Controls(rack).load("REEL", float("inf"))
+        SwitchOperations(rack).load("REEL", float("inf"))
     with pytest.raises(OperationRefused, match="no plant"):
-        Controls(rack).load("GONE", 1.0)
+        SwitchOperations(rack).load("GONE", 1.0)
 
 
 def test_a_plant_goes_on_without_power(tmp_path):
     rack, _ = rack_of(tmp_path)
     rack.start()
     rack.operations.power_off()
-    Controls(rack).plant("REEL", "load_torque_nm", "-5")
+    SwitchOperations(rack).plant("REEL", "load_torque_nm", "-5")
     rack.run(1.0)
     assert rack.plants["REEL"].motor.speed_rad_s > 10.0

@@ -8,7 +8,7 @@ import pytest
 
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
-from automax_ros.scenario.stimuli.player import Stimulation
+from automax_ros.scenario.stimuli.player import StimuliPlayer
 from automax_ros.scenario.stimuli.reader import read_for_rack
 
 RACK = """\
@@ -41,7 +41,7 @@ VERBS = """\
 class Common:
     """Notes each write with whether it is made in every process."""
 
-    def __init__(self, rack: Rack, stimulation: Stimulation) -> None:
+    def __init__(self, rack: Rack, stimulation: StimuliPlayer) -> None:
         self.seen: list[tuple[int, int, bool]] = []
         self._rack, self._stimulation = rack, stimulation
         rack.observe(self)
@@ -60,7 +60,7 @@ class Common:
         """Not asked for."""
 
 
-def part(folder: Path, verbs: str, *slots: int) -> tuple[Rack, Stimulation]:
+def part(folder: Path, verbs: str, *slots: int) -> tuple[Rack, StimuliPlayer]:
     (folder / "rack.yaml").write_text(RACK)
     for name in ("ONE", "TWO"):
         (folder / f"{name}.BLK").write_text(TASK)
@@ -70,7 +70,7 @@ def part(folder: Path, verbs: str, *slots: int) -> tuple[Rack, Stimulation]:
     rack = Rack(config, local=slots or None)
     file = read_for_rack(folder / "do.yaml", rack)
     assert file.stimuli is not None, file.diagnostics
-    return rack, Stimulation(file.stimuli, rack.scheduler)
+    return rack, StimuliPlayer(file.stimuli, rack.scheduler)
 
 
 @pytest.mark.parametrize(
