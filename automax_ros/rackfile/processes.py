@@ -48,7 +48,7 @@ class RackProcess:
     Attributes:
         name: that of its first module, ``common_memory`` for the home.
         slots: of its modules, in order.
-        holds_common_memory: whether it holds common memory: it alone publishes the rack's topics and takes what operators want.
+        holds_common_memory: then it alone publishes the rack's topics and takes what operators want.
         modules: the names of its modules, in the order of slots.
         reasons: why its modules share a process, a sentence each; () for a module alone.
     """

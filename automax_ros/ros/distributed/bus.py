@@ -83,8 +83,8 @@ class ProcessLayout:
 
     ``seats`` are the slots of each, ``run_id`` the number of the run, 0 to join the one that is there. ``is_common``
     says whether what happens now happens in every process by itself, as stimuli do. ``start_delay_ns``: so far the
-    start lies ahead of the moment at which all are there, as the home says it. ``awaits_recorder``: it waits for one that
-    hears this process.
+    start lies ahead of the moment at which all are there, as the home says it. ``awaits_recorder``: it waits for
+    one that hears this process.
     """
 
     seats: Sequence[tuple[int, ...]]
