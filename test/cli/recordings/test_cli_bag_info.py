@@ -1,4 +1,4 @@
-"""`automax bag info`: texts, JSON and exit codes; the numbers are tested in test/bags/test_bag_info.py."""
+"""`automax bag info`: texts, JSON and exit codes; the numbers are tested in test/recordings/info/test_bag_info.py."""
 
 import json
 
