@@ -1,4 +1,4 @@
-"""Writes automax_ros/messages/types/message_types.json: the definition and hash of every message type that a recording holds.
+"""Writes automax_ros/messages/types/message_types.json: definition and hash of each message type in recordings.
 
 python tools/generate_message_types.py, after a change in msg_defs/. The definitions of the standard types come from the
 ROS 2 installed with this interpreter (or AMENT_PREFIX_PATH), the type hashes (RIHS01) from rosbags.
