@@ -14,8 +14,8 @@ from automax_ros.core.text import count_of, printable
 from automax_ros.core.ticks import NS_PER_S
 from automax_ros.core.types import Value
 from automax_ros.core.values import value_text
-from automax_ros.rack.modules.drive import Timed
 from automax_ros.rack.modules.module import Module
+from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.model.config import CommonElement
 from automax_ros.runtime.health import Health

@@ -31,7 +31,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from automax_ros.core.kinds import WriteKind
 from automax_ros.core.text import count_of
@@ -449,11 +449,3 @@ class DriveControllerModule:
             if feedback is not None:
                 feedback(plant.circuit.armature_v, plant.data.parameters.line_v)
                 self._parts.tell_writes()
-
-
-@runtime_checkable
-class Timed(Protocol):
-    """A module that counts how its interrupts keep their time."""
-
-    @property
-    def timing(self) -> InterruptTiming: ...  # noqa: D102

@@ -9,7 +9,7 @@ from itertools import cycle
 
 import pytest
 
-from automax_ros.rack.modules.drive import Timed
+from automax_ros.rack.modules.timed import Timed
 from automax_ros.rack.rack import Rack
 from automax_ros.rackfile.loader import load
 from automax_ros.runtime.tasks.task import Status
