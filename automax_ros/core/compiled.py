@@ -166,7 +166,7 @@ def _groups(folder: str, lines: Sequence[list[str]]) -> list[CompiledGroup]:
 
 
 def describe(package: str) -> list[str]:
-    """Return what runs, for people: one line, and one for each group that is not used, with the reason."""
+    """Describe the code that runs: one line, and one for each group that is not used, with the reason."""
     if switched_off():
         return [f"plain Python: {VARIABLE}={os.environ[VARIABLE]}"]
     finder = next((finder for finder in sys.meta_path if isinstance(finder, CompiledFinder)), None)

@@ -123,7 +123,7 @@ class Final(_FromNow):
 
 
 class TimeTrue(_FromNow):
-    """How long a BOOLEAN is TRUE, s."""
+    """The time for which a BOOLEAN is TRUE, s."""
 
     def __init__(self) -> None:
         self._ns = 0

@@ -91,7 +91,7 @@ class StopState:
 class ImageSync:
     """The link of one process. ``seat`` is the slot that names it, ``standing`` the rack's stop state as known here.
 
-    ``send`` receives each batch immediately; it may not write to the rack. ``is_common`` says whether every process
+    ``send`` receives each batch immediately; it may not write to the rack. ``is_common`` returns whether every process
     makes the present writes. ``guard`` executes writes that were deferred, and handles their exceptions: a damaged
     message of another process must not end this one.
     """

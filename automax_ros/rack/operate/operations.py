@@ -152,7 +152,7 @@ class Operations:
         self._tell("stop", name)
 
     def stop_tasks(self) -> None:
-        """Stop all tasks; memory keeps what it holds."""
+        """Stop all tasks; memory is unchanged."""
         for item in self._tasks.values():
             item.stop()
         self._beginning.clear()

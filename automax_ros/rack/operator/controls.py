@@ -1,7 +1,7 @@
 """Operations in and around a rack by hand: controls of modules, faults of plants.
 
 Stimuli, services and commands call them; observers receive each, refused ones too. Neither needs the rack's power
-(decision): a switch is a lever, and a plant stands outside.
+(decision): a switch is a lever, and a plant is outside the rack.
 """
 
 from __future__ import annotations

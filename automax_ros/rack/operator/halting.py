@@ -73,8 +73,8 @@ class Halting:
     def halt(self) -> None:
         """Freeze rack time.
 
-        A rack of which this process holds a part is not halted: the others would go on (decision). A rack that follows
-        another's clock can be halted only by that clock.
+        A rack of which this process holds a part is not halted: the others would continue (decision). A rack that
+        follows another's clock can be halted only by that clock.
         """
         if not self._rack.part.is_whole:
             self._refuse(HALT, "the rack runs in several processes, which do not halt together")

@@ -132,7 +132,7 @@ class OperatorRequests:
         """Replace a task's source by a text; return the warnings of its check.
 
         Raises:
-            ReloadRefused: the source has errors; the old one goes on.
+            ReloadRefused: the source has errors; the old one continues.
         """
         self.install(self.prepare(*self.admit_reload(task, source)), keep_state=keep_state)
         return []
@@ -162,7 +162,7 @@ class OperatorRequests:
         Returns in words which tuned values the task has lost, "" if none: an installation takes them from the source.
 
         Raises:
-            ReloadRefused: the source has errors; the old one goes on.
+            ReloadRefused: the source has errors; the old one continues.
         """
         tuned = self._tuned(prepared.task)
         try:

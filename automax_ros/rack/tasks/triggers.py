@@ -16,7 +16,7 @@ Due = PeriodicAction
 
 
 LATE_NS = UDC_TICK_NS
-"""Lateness from which on a host may have skipped what interrupts."""
+"""A host that is this late may have skipped scans whose end interrupts."""
 _LAST = EventKey(EventClass.OBSERVE, 0, "")
 
 

@@ -94,7 +94,7 @@ def _module(rack: Rack, node: Node, what: str, findings: ProblemList) -> list[Ac
     controls, by_slot = SwitchOperations(rack), {module.config.slot: module for module in rack.modules}
     found: list[Action] = []
     for key, item in named(node, what, findings):
-        plain = Scalar(key.text, True, key.span)  # JSON knows keys in quotes only
+        plain = Scalar(key.text, True, key.span)  # JSON accepts only keys in quotes
         slot = integer_value(plain, f"slot of {what}", findings, low=0, high=15, code="AMX6200")
         if slot is None:
             continue
